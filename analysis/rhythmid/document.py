@@ -1,0 +1,122 @@
+"""A YAML document that remembers where each value stands, so that a complaint can name file and line."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, NoReturn
+
+import yaml
+
+from rhythmid.errors import InputError
+
+
+@dataclass(frozen=True)
+class Node:
+    """A value of the document: a mapping of Nodes, a list of Nodes or a plain value, with its place."""
+
+    value: Any
+    place: str  # "file.yaml:12"
+    path: str  # "force[1].linear_spring.stiffness"
+
+    def fail(self, problem: str) -> NoReturn:
+        """Raise InputError at this place."""
+        raise InputError(f"{self.place}: {self.path + ': ' if self.path else ''}{problem}")
+
+    @property
+    def plain(self) -> Any:
+        """The value without places."""
+        if isinstance(self.value, dict):
+            return {key: node.plain for key, node in self.value.items()}
+        if isinstance(self.value, list):
+            return [node.plain for node in self.value]
+        return self.value
+
+    def mapping(self, known: Iterable[str] | None = None) -> "dict[str, Node]":
+        """The value as a mapping; with `known`, any other key is refused."""
+        if not isinstance(self.value, dict):
+            self.fail("a mapping (key: value) is expected here")
+        if known is not None:
+            known = list(known)
+            for key, node in self.value.items():
+                if key not in known:
+                    near = get_close_matches(str(key), known, 1)
+                    node.fail(f"unknown key; {f'did you mean {near[0]!r}?' if near else 'known: ' + ', '.join(known)}")
+        return self.value
+
+    def items(self) -> "list[Node]":
+        """The value as a list; nothing counts as an empty list."""
+        if self.value is None:
+            return []
+        if not isinstance(self.value, list):
+            self.fail("a list (- item) is expected here")
+        return self.value
+
+    def number(self, low: float = -math.inf, high: float = math.inf) -> float:
+        """The value as a finite number within [low, high]."""
+        if isinstance(self.value, bool) or not isinstance(self.value, (int, float)):
+            try:
+                value = float(self.value)  # YAML 1.1 reads 1e-3 as text
+            except (TypeError, ValueError):
+                self.fail(f"a number is expected, not {self.value!r}")
+        else:
+            value = float(self.value)
+        if math.isnan(value):
+            self.fail("is not a number (NaN)")
+        if not low <= value <= high:
+            self.fail(f"{value:g} is outside [{low:g}, {high:g}]")
+        return value
+
+    def text(self) -> str:
+        """The value as text."""
+        if not isinstance(self.value, str):
+            self.fail(f"text is expected, not {self.value!r}")
+        return self.value
+
+    def choice(self, choices: Iterable[str]) -> str:
+        """The value as one of `choices`."""
+        if self.value not in (choices := list(choices)):
+            self.fail(f"{self.value!r} is none of {', '.join(choices)}")
+        return self.value
+
+
+def _node(raw: yaml.Node | None, name: str, path: str, loader: yaml.SafeLoader) -> Node:
+    if raw is None:
+        return Node(None, name, path)
+    place = f"{name}:{raw.start_mark.line + 1}"
+    if isinstance(raw, yaml.MappingNode):
+        found: dict[str, Node] = {}
+        for key_node, value_node in raw.value:
+            key = str(key_node.value)
+            inner = _node(value_node, name, f"{path}.{key}" if path else key, loader)
+            if key in found:
+                inner.fail("is given twice")
+            found[key] = inner
+        return Node(found, place, path)
+    if isinstance(raw, yaml.SequenceNode):
+        return Node([_node(item, name, f"{path}[{i}]", loader) for i, item in enumerate(raw.value)], place, path)
+    return Node(loader.construct_object(raw), place, path)
+
+
+def parse(text: str, name: str) -> Node:
+    """The document in `text`; `name` stands for it in messages. Raises InputError when it is not YAML."""
+    loader = yaml.SafeLoader(text)
+    try:
+        return _node(loader.get_single_node(), name, "", loader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f":{mark.line + 1}" if mark else ""
+        raise InputError(f"{name}{line}: is not valid YAML: {getattr(error, 'problem', error)}") from None
+    finally:
+        loader.dispose()
+
+
+def read(path: str | Path) -> Node:
+    """The document in the file `path`. Raises InputError when it cannot be read or is not YAML."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "is not a text file"
+        raise InputError(f"{path}: cannot be read: {reason}") from None
+    return parse(text, str(path))

@@ -1,0 +1,107 @@
+"""The catalogue: every element found in the slot folders, in the user's own folders and in installed packages.
+
+A file becomes part of the catalogue by lying there: one `ELEMENT` a file. No list is kept.
+"""
+
+import importlib.util
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+
+from rhythmid.elements.element import SLOTS, Element
+from rhythmid.errors import InputError
+
+ENTRY_POINT_GROUP = "rhythmid.elements"
+BUILT_IN = Path(__file__).parent
+
+
+def _module(path: Path) -> ModuleType:
+    name = f"rhythmid.elements.{path.parent.name}.{path.stem}" if BUILT_IN in path.parents else f"_element_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # inspect.getsource needs to find it
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever a user's file raises is bad input, not a failure of ours
+        raise InputError(f"{path}: this element file does not load: {type(error).__name__}: {error}") from error
+    return module
+
+
+def load_element(path: Path) -> Element:
+    """The one `ELEMENT` of a file. Raises InputError where there is none."""
+    element = getattr(_module(path), "ELEMENT", None)
+    if not isinstance(element, Element):
+        raise InputError(f"{path}: defines no ELEMENT; an element file ends with ELEMENT = Element(...)")
+    return replace(element, source=str(path))
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for path in sorted(folder.glob("*.py")):
+        if not path.name.startswith("_"):
+            yield path
+
+
+@dataclass(frozen=True)
+class Catalogue(Mapping[str, Element]):
+    """Elements by name."""
+
+    elements: Mapping[str, Element]
+
+    def __getitem__(self, name: str) -> Element:
+        try:
+            return self.elements[name]
+        except KeyError:
+            near = get_close_matches(name, self.elements, 1)
+            hint = f"; did you mean {near[0]!r}?" if near else "; see the element reference for the names"
+            raise InputError(f"unknown element {name!r}{hint}") from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.elements
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.elements)
+
+    def __len__(self) -> int:
+        return len(self.elements)
+
+    def without(self, *names: str) -> "Catalogue":
+        """The catalogue less the named elements."""
+        return Catalogue({name: element for name, element in self.elements.items() if name not in names})
+
+
+def load_catalogue(folders: Iterable[str | Path] = ()) -> Catalogue:
+    """All elements: built in, from installed packages (entry points `rhythmid.elements`), and from `folders`.
+
+    A folder may hold element files directly or in sub-folders named after the slots. Raises InputError for a folder
+    that is missing or empty, a file that does not load, and a name that is defined twice.
+    """
+    found: dict[str, Element] = {}
+
+    def add(element: Element) -> None:
+        if element.name in found:
+            raise InputError(
+                f"{element.source}: element {element.name!r} is already defined in {found[element.name].source}; "
+                "give it another name"
+            )
+        found[element.name] = element
+
+    for slot in SLOTS:
+        for path in _files(BUILT_IN / slot):
+            add(load_element(path))
+    for entry in entry_points(group=ENTRY_POINT_GROUP):
+        add(replace(entry.load(), source=entry.value))
+    for given in folders:
+        folder = Path(given)
+        if not folder.is_dir():
+            raise InputError(f"{folder}: no such folder of elements")
+        paths = list(_files(folder)) + [path for slot in SLOTS for path in _files(folder / slot)]
+        if not paths:
+            raise InputError(f"{folder}: holds no element files (*.py)")
+        for path in paths:
+            add(load_element(path))
+    return Catalogue(found)

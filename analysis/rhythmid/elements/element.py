@@ -1,0 +1,115 @@
+"""The shape that all elements share: one physical effect, in one file, with everything the rest needs to know of it.
+
+A file in `elements/<slot>/` defines one `ELEMENT`. Exactly one of these says what the effect does:
+
+- `kernel`   a pure numeric function of one instant, compiled into the simulator. Its arguments by slot:
+               command, actuator   (f, t, <parameters>, <borrowed>, <states>)            -> new f
+               force               (x, v, t, f, <parameters>, <borrowed>, <states>)      -> force on the mass
+               force, `acts="modifier"`  (leg, x, v, t, f, <parameters>, …)              -> new sum of the leg's forces
+               force, `acts="drive"`     (t, <parameters>, …)                            -> added to f before the actuator
+               sensor              (y, t, <parameters>, <borrowed>, <states>)            -> new y
+             A kernel with states returns (result, dstate/dt, …). It may use `math` and nothing else.
+- `delay`    (stamps, **parameters) -> seconds; how much later a command acts, or how much older a measurement is
+             than its stamp says. Shapes (n,) -> (n,).
+- `sampler`  (rng, **parameters) -> f(stamps, samples) -> samples; what happens to samples one after another
+             (noise, rounding). It may remember; feeding it in chunks gives what feeding it whole gives.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import inf
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Slot = Literal["command", "actuator", "force", "sensor", "timing"]
+SLOTS: tuple[Slot, ...] = ("command", "actuator", "force", "sensor", "timing")
+Acts = Literal["body", "leg", "modifier", "drive"]
+Sampler = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of an element.
+
+    `unit` is written for a translational machine (kg, m, s, N); a rotational or otherwise scaled model translates it.
+    `default` is what a model file may leave out; None makes the parameter mandatory.
+    """
+
+    name: str
+    unit: str
+    description: str
+    bounds: tuple[float, float] = (-inf, inf)
+    default: float | None = None
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What a record tells about sizes, in the model's units: the yardstick for first guesses of parameters."""
+
+    position: float  # standard deviation of the measured position
+    velocity: float  # of its rate
+    effort: float  # of the actuator force
+    centre: float  # mean position
+    low: float  # smallest and
+    high: float  # largest position
+    mass: float
+    stiffness: float  # mass * (dominant angular frequency)^2 where the model has no spring
+    frequency: float  # [Hz] dominant frequency of the motion
+    duration: float  # [s] longest record
+    period: float  # [s] sample period
+    forcing_frequency: float = 0.0  # [Hz] pumping frequency, 0 where there is none
+
+
+@dataclass(frozen=True)
+class Element:
+    """One physical effect.
+
+    `borrows` maps a kernel argument to (parameter of another element, value when the model has no such element;
+    None makes that element a condition for using this one). `size` names the parameter that measures how much of the
+    effect there is; the effect is absent at `absent`. `starts` proposes first guesses of physical size from the
+    record's scales. `confusable` maps another element's name to what tells the two apart.
+    """
+
+    name: str
+    slot: Slot
+    title: str
+    equation: str
+    parameters: tuple[Parameter, ...]
+    reference: str
+    kernel: Callable[..., Any] | None = None
+    delay: Callable[..., NDArray[np.float64]] | None = None
+    sampler: Callable[..., Sampler] | None = None
+    acts: Acts = "leg"
+    states: tuple[str, ...] = ()
+    initial: Callable[..., tuple[float, ...]] | None = None  # (x, v, **parameters) -> states at the start; default 0
+    borrows: Mapping[str, tuple[str, float | None]] = field(default_factory=dict)
+    also_known_as: tuple[str, ...] = ()
+    family: str = ""
+    special_case_of: tuple[str, ...] = ()
+    confusable: Mapping[str, str] = field(default_factory=dict)
+    size: str = ""
+    absent: float = 0.0
+    candidate: bool = True  # takes part in the search for missing physics
+    starts: Callable[[Scales], list[dict[str, float]]] | None = None
+    source: str = ""  # file that defines it
+
+    def __post_init__(self) -> None:
+        given = [name for name in ("kernel", "delay", "sampler") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise TypeError(f"element {self.name}: needs exactly one of kernel, delay, sampler; has {given}")
+        if self.slot not in SLOTS:
+            raise TypeError(f"element {self.name}: slot {self.slot!r} is none of {', '.join(SLOTS)}")
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter called `name`; KeyError if there is none."""
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        raise KeyError(name)
+
+    @property
+    def deterministic(self) -> bool:
+        """Whether a noise-free simulation includes it."""
+        return self.sampler is None

@@ -1,0 +1,27 @@
+"""Linear spring: F = -k (x - x_0)."""
+
+from math import inf
+
+from rhythmid.elements.element import Element, Parameter
+
+
+def kernel(x, v, t, f, stiffness, rest_length):
+    return -stiffness * (x - rest_length)
+
+
+ELEMENT = Element(
+    name="linear_spring",
+    slot="force",
+    title="Linear spring",
+    equation="F = −k (x − x₀)",
+    parameters=(
+        Parameter("stiffness", "N/m", "stiffness k", bounds=(0.0, inf)),
+        Parameter("rest_length", "m", "position x₀ at which the spring is free", default=0.0),
+    ),
+    kernel=kernel,
+    size="stiffness",
+    starts=lambda s: [{"stiffness": 0.1 * s.stiffness, "rest_length": s.centre}],
+    also_known_as=("Hooke spring",),
+    confusable={"cubic_stiffness": "one amplitude only: repeat at another amplitude"},
+    reference="Paper, equation (10)",
+)

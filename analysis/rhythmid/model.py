@@ -1,0 +1,304 @@
+"""Model of a machine: an inertia and a list of elements along the signal path, written in a YAML file."""
+
+import math
+import os
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rhythmid.document import Node, parse, read
+from rhythmid.elements.catalogue import Catalogue, load_catalogue
+from rhythmid.elements.element import SLOTS, Element, Parameter
+from rhythmid.errors import InputError
+from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
+
+INERTIA = "inertia.mass"
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Gaussian knowledge of a parameter before the data."""
+
+    mean: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Value:
+    """A parameter's value in a model; one that is not `fixed` is estimated."""
+
+    value: float
+    unit: str
+    fixed: bool = False
+    bounds: tuple[float, float] = (-math.inf, math.inf)
+    prior: Prior | None = None
+
+
+@dataclass(frozen=True)
+class Term:
+    """An element as a model uses it. `label` is its name, numbered when the model uses it more than once."""
+
+    element: Element
+    label: str
+    values: Mapping[str, Value]
+
+
+@dataclass(frozen=True)
+class Model:
+    """An inertia and the elements along the path command -> actuator -> force -> sensor."""
+
+    mass: Value
+    terms: tuple[Term, ...]
+    units: Units = TRANSLATIONAL
+
+    @classmethod
+    def load(cls, path: str | Path, catalogue: Catalogue | None = None) -> "Model":
+        """The model in a YAML file. Raises InputError naming line, parameter and unit of what is wrong."""
+        return _model(read(path), catalogue or load_catalogue())
+
+    @classmethod
+    def from_text(cls, text: str, name: str = "model", catalogue: Catalogue | None = None) -> "Model":
+        """The model in a YAML text; `name` stands for it in messages."""
+        return _model(parse(text, name), catalogue or load_catalogue())
+
+    @property
+    def parameters(self) -> dict[str, Value]:
+        """All parameters, by "label.parameter"; the inertia is "inertia.mass"."""
+        found = {INERTIA: self.mass}
+        for term in self.terms:
+            found |= {f"{term.label}.{name}": value for name, value in term.values.items()}
+        return found
+
+    @property
+    def free(self) -> list[str]:
+        """Names of the parameters that are estimated."""
+        return [name for name, value in self.parameters.items() if not value.fixed]
+
+    def value(self, name: str) -> float:
+        """Value of one parameter. Raises InputError for an unknown name."""
+        parameters = self.parameters
+        if name not in parameters:
+            raise InputError(f"the model has no parameter {name!r}; it has {', '.join(parameters)}")
+        return parameters[name].value
+
+    def with_parameters(self, changes: Mapping[str, Value]) -> "Model":
+        """A copy with some parameters replaced. Raises InputError for an unknown name."""
+        for name in changes:
+            self.value(name)
+        terms = tuple(
+            replace(
+                term,
+                values={name: changes.get(f"{term.label}.{name}", value) for name, value in term.values.items()},
+            )
+            for term in self.terms
+        )
+        return replace(self, mass=changes.get(INERTIA, self.mass), terms=terms)
+
+    def with_values(self, values: Mapping[str, float]) -> "Model":
+        """A copy with some parameter values replaced; bounds and priors stay."""
+        current = self.parameters
+        for name in values:
+            self.value(name)
+        return self.with_parameters({n: replace(current[n], value=float(v)) for n, v in values.items()})
+
+    def with_element(
+        self,
+        element: Element,
+        values: Mapping[str, float] | None = None,
+        fixed: bool = False,
+    ) -> "Model":
+        """A copy with one more element, at the end of its slot. Raises InputError for a parameter without a value."""
+        given = dict(values or {})
+        made: dict[str, Value] = {}
+        for parameter in element.parameters:
+            value = given.pop(parameter.name, parameter.default)
+            if value is None:
+                raise InputError(f"element {element.name!r}: parameter {parameter.name!r} needs a value")
+            made[parameter.name] = Value(float(value), self.units.of(parameter.unit), fixed, parameter.bounds)
+        if given:
+            raise InputError(f"element {element.name!r} has no parameter {next(iter(given))!r}")
+        taken = {term.label for term in self.terms}
+        label = next(name for name in _labels(element.name) if name not in taken)
+        extended = replace(self, terms=(*self.terms, Term(element, label, made)))
+        extended.check_borrowed()
+        return extended
+
+    def without(self, label: str) -> "Model":
+        """A copy without the term called `label`."""
+        return replace(self, terms=tuple(term for term in self.terms if term.label != label))
+
+    def term(self, name: str) -> Term | None:
+        """The first term whose label is `name`, None where there is none."""
+        return next((term for term in self.terms if term.label == name), None)
+
+    def borrowed(self, source: str, default: float | None) -> float | None:
+        """Value of a parameter that an element borrows from another one, or `default` where that is absent."""
+        parameters = self.parameters
+        return parameters[source].value if source in parameters else default
+
+    def check_borrowed(self) -> None:
+        """Raise InputError when an element needs another one that the model lacks."""
+        for term in self.terms:
+            for source, default in term.element.borrows.values():
+                if self.borrowed(source, default) is None:
+                    raise InputError(
+                        f"element {term.label!r} changes {source.split('.')[0]!r}, which the model does not have"
+                    )
+
+    def to_yaml(self) -> str:
+        """The model as YAML text that `load` reads back."""
+        content: dict[str, Any] = {}
+        if self.units not in (TRANSLATIONAL, ROTATIONAL):
+            content["units"] = {"force": self.units.force, "position": self.units.position, "mass": self.units.mass}
+        content["inertia"] = {"mass": _entry(self.mass, (0.0, math.inf))}
+        for slot in SLOTS:
+            terms = [term for term in self.terms if term.element.slot == slot]
+            if terms or slot != "timing":
+                content[slot] = [
+                    {
+                        term.element.name: {
+                            name: _entry(value, term.element.parameter(name).bounds)
+                            for name, value in term.values.items()
+                        }
+                    }
+                    for term in terms
+                ]
+        return yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
+
+    def save(self, path: str | Path) -> None:
+        """Write the model; nothing is left half-written. Raises InputError when the place is not writable."""
+        target = Path(path)
+        partial = target.with_name(f".{target.name}.partial")
+        try:
+            partial.write_text(self.to_yaml(), encoding="utf-8")
+            os.replace(partial, target)
+        except OSError as error:
+            raise InputError(f"{path}: the model cannot be written: {error.strerror}") from None
+
+
+def _labels(name: str) -> Iterator[str]:
+    yield name
+    for number in range(2, 1000):
+        yield f"{name}_{number}"
+
+
+def _entry(value: Value, usual: tuple[float, float]) -> dict[str, Any]:
+    entry: dict[str, Any] = {"value": float(value.value), "unit": value.unit}
+    if value.fixed:
+        entry["fixed"] = True
+    if tuple(value.bounds) != tuple(usual):
+        entry["bounds"] = [float(value.bounds[0]), float(value.bounds[1])]
+    if value.prior is not None:
+        entry["prior"] = {"mean": float(value.prior.mean), "std": float(value.prior.std)}
+    return entry
+
+
+def _value(node: Node, parameter: Parameter, units: Units) -> Value:
+    """Parameter from `{value: …, unit: …}` or from a bare number in the machine's own units."""
+    if not isinstance(node.value, dict):
+        value, unit, fixed, bounds, prior = node.number(), units.of(parameter.unit), False, parameter.bounds, None
+    else:
+        keys = node.mapping(["value", "unit", "fixed", "bounds", "prior"])
+        if "value" not in keys:
+            node.fail("has no value")
+        value = keys["value"].number()
+        unit = units.of(parameter.unit)
+        if "unit" in keys:
+            units.check(str(keys["unit"].value), parameter.unit, f"{keys['unit'].place}: {node.path}")
+        fixed = False
+        if "fixed" in keys:
+            if not isinstance(keys["fixed"].value, bool):
+                keys["fixed"].fail("is true or false")
+            fixed = keys["fixed"].value
+        bounds = parameter.bounds
+        if "bounds" in keys:
+            ends = [end.number() for end in keys["bounds"].items()]
+            if len(ends) != 2 or not ends[0] < ends[1]:
+                keys["bounds"].fail("two numbers [low, high] are expected, low < high")
+            bounds = (max(ends[0], parameter.bounds[0]), min(ends[1], parameter.bounds[1]))
+        prior = None
+        if "prior" in keys:
+            inner = keys["prior"].mapping(["mean", "std"])
+            if set(inner) != {"mean", "std"}:
+                keys["prior"].fail("mean and std are both needed")
+            prior = Prior(inner["mean"].number(), inner["std"].number(low=1e-300))
+    if not bounds[0] <= value <= bounds[1]:
+        node.fail(f"{value:g} {unit} is outside [{bounds[0]:g}, {bounds[1]:g}] ({parameter.description})")
+    if not math.isfinite(value):
+        node.fail("must be finite")
+    return Value(value, unit, fixed, bounds, prior)
+
+
+def _units(document: dict[str, Node], mass: Node | None) -> Units:
+    if "units" in document:
+        given = document["units"].mapping(["force", "position", "mass"])
+        force = given["force"].text() if "force" in given else "N"
+        position = given["position"].text() if "position" in given else "m"
+        default = "kg" if (force, position) == ("N", "m") else f"{force}*s^2/{position}"
+        return Units(force, position, given["mass"].text() if "mass" in given else default)
+    unit = ""
+    if mass is not None and isinstance(mass.value, dict) and "unit" in mass.value:
+        unit = str(mass.value["unit"].value)
+    return ROTATIONAL if re.sub(r"[ ·]", "", unit.replace("**", "^").replace("²", "^2")) in (
+        "kg*m^2",
+        "kgm^2",
+    ) else TRANSLATIONAL
+
+
+def _term(item: Node, slot: str, catalogue: Catalogue, units: Units, taken: set[str]) -> Term:
+    named = item.mapping()
+    if len(named) != 1:
+        item.fail("one element is expected here: - name: {parameter: {value: …, unit: …}}")
+    name, body = next(iter(named.items()))
+    try:
+        element = catalogue[name]
+    except InputError as error:
+        raise InputError(f"{body.place}: {error}") from None
+    if element.slot != slot:
+        body.fail(f"{name} belongs under '{element.slot}:', not under '{slot}:'")
+    given = {} if body.value is None else body.mapping([parameter.name for parameter in element.parameters])
+    values: dict[str, Value] = {}
+    for parameter in element.parameters:
+        if parameter.name in given:
+            values[parameter.name] = _value(given[parameter.name], parameter, units)
+        elif parameter.default is None:
+            body.fail(f"parameter {parameter.name!r} is missing ({parameter.description}, {units.of(parameter.unit)})")
+        else:
+            values[parameter.name] = Value(
+                parameter.default, units.of(parameter.unit), True, parameter.bounds
+            )  # what the file does not mention is not estimated
+    label = next(label for label in _labels(name) if label not in taken)
+    taken.add(label)
+    return Term(element, label, values)
+
+
+def _model(document: Node, catalogue: Catalogue) -> Model:
+    if document.value is None:
+        raise InputError(f"{document.place}: the model file is empty")
+    sections = document.mapping(["units", "inertia", *SLOTS])
+    if "inertia" not in sections:
+        document.fail("the model has no 'inertia:'; write inertia: {mass: {value: 1.0, unit: kg, fixed: true}}")
+    inertia = sections["inertia"].mapping(["mass"])
+    if "mass" not in inertia:
+        sections["inertia"].fail("'mass' is missing")
+    units = _units(sections, inertia["mass"])
+    mass = _value(inertia["mass"], Parameter("mass", "kg", "inertia", bounds=(0.0, math.inf)), units)
+    if mass.value <= 0.0:
+        inertia["mass"].fail("must be greater than 0")
+    taken: set[str] = set()
+    terms = [
+        _term(item, slot, catalogue, units, taken)
+        for slot in SLOTS
+        if slot in sections
+        for item in sections[slot].items()
+    ]
+    model = Model(mass, tuple(terms), units)
+    try:
+        model.check_borrowed()
+    except InputError as error:
+        raise InputError(f"{document.place.rsplit(':', 1)[0]}: {error}") from None
+    return model

@@ -1,0 +1,95 @@
+"""Continuous-time signals: every sampled command or forcing becomes a piecewise polynomial of degree <= 3.
+
+How a sampled signal continues between its samples (its *hold*) is physics: a command over a topic is held until
+the next one arrives (zero order), a measured voltage is band-limited. `scipy.interpolate.PPoly` carries all of them.
+"""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline, CubicSpline, PPoly
+
+Hold = Literal["zero", "linear", "band_limited"]
+Array = NDArray[np.float64]
+
+FAR = 1e300  # seconds; stands for "for ever" in the compiled simulator, where inf - inf would be NaN
+
+
+def zero_order_hold(time: Array, value: Array) -> PPoly:
+    """Signal that keeps each value [any unit] from its time [s] until the next; shapes (n,), (n,)."""
+    knots = np.append(time, time[-1] + FAR)
+    return PPoly(np.asarray(value, dtype=float)[None, :], knots, extrapolate=True)
+
+
+def first_order_hold(time: Array, value: Array) -> PPoly:
+    """Signal that connects the samples with straight lines; shapes (n,), (n,), n >= 2."""
+    slope = np.diff(value) / np.diff(time)
+    return PPoly(np.vstack([slope, value[:-1]]), np.asarray(time, dtype=float), extrapolate=True)
+
+
+def spline(time: Array, value: Array) -> PPoly:
+    """Cubic spline through the samples: a smooth, well-oversampled signal such as the forcing; n >= 2."""
+    if len(time) < 4:
+        return first_order_hold(time, value)
+    fitted = CubicSpline(time, value)
+    return PPoly(fitted.c, fitted.x, extrapolate=True)
+
+
+def band_limited(time: Array, value: Array, oversampling: int = 4) -> PPoly:
+    """Reconstruct a uniformly sampled band-limited signal (anti-alias filtered measurement); n >= 4.
+
+    The samples are mirrored oddly at both ends, so that the periodic continuation has no jump, interpolated with the
+    discrete Fourier transform on an `oversampling` times finer grid together with the derivative, and joined by cubic
+    Hermite pieces.
+    """
+    n = len(value)
+    period = (time[-1] - time[0]) / (n - 1)
+    line = value[0] + (value[-1] - value[0]) * np.arange(n) / (n - 1)
+    departure = value - line
+    mirrored = np.concatenate([departure, -departure[-2:0:-1]])
+    spectrum = np.fft.rfft(mirrored)
+    fine = len(mirrored) * oversampling
+    padded = np.zeros(fine // 2 + 1, dtype=complex)
+    padded[: len(spectrum)] = spectrum
+    padded[len(spectrum) - 1] *= 0.5  # the Nyquist line is shared by +f and -f on the finer grid
+    omega = 2 * np.pi * np.arange(fine // 2 + 1) / (len(mirrored) * period)
+    keep = (n - 1) * oversampling + 1
+    values = np.fft.irfft(padded, fine)[:keep] * oversampling
+    slopes = np.fft.irfft(1j * omega * padded, fine)[:keep] * oversampling
+    grid = time[0] + period * np.arange(keep) / oversampling
+    values = values + np.interp(grid, time, line)
+    slopes = slopes + (value[-1] - value[0]) / (time[-1] - time[0])
+    fitted = CubicHermiteSpline(grid, values, slopes)
+    return PPoly(fitted.c, fitted.x, extrapolate=True)
+
+
+def continuous(time: Array, value: Array, hold: Hold) -> PPoly:
+    """Signal from samples by the named hold."""
+    return {"zero": zero_order_hold, "linear": first_order_hold, "band_limited": band_limited}[hold](time, value)
+
+
+def pieces(signal: PPoly | None) -> tuple[Array, Array]:
+    """Knots (K+1,) and cubic coefficients (4, K), lowest power first, extended over all time.
+
+    Before the first knot a zero-order-held signal is 0 (no command has arrived yet), a smooth one keeps its first
+    value; after the last knot each keeps its last value. None is the zero signal.
+    """
+    if signal is None:
+        return np.array([-FAR, FAR]), np.zeros((4, 1))
+    degree = signal.c.shape[0] - 1
+    body = np.zeros((4, signal.c.shape[1]))
+    body[: degree + 1] = signal.c[::-1]
+    before = np.zeros((4, 1))
+    if degree > 0:
+        before[0, 0] = body[0, 0]
+    if signal.x[-1] > FAR / 2:
+        return np.concatenate([[-FAR], signal.x[:-1], [FAR]]), np.hstack([before, body])
+    after = np.zeros((4, 1))
+    after[0, 0] = float(signal(signal.x[-1]))
+    return np.concatenate([[-FAR], signal.x, [FAR]]), np.hstack([before, body, after])
+
+
+def shifted(signal: PPoly, delay: float) -> PPoly:
+    """The signal `delay` seconds later."""
+    return PPoly(signal.c, signal.x + delay, extrapolate=True)
