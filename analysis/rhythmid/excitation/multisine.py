@@ -1,0 +1,77 @@
+"""Multisines: sums of harmonics of 1/period, repeated; every line is known exactly, so noise shows between the lines.
+
+R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., Wiley 2012, chapter 2.
+"""
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from rhythmid.errors import InputError
+from rhythmid.excitation.excitation import Array, Excitation
+
+
+class Multisine(Excitation):
+    """u(t) = Σ_k a_k cos(2π k t / period + φ_k).
+
+    Lines are given outright (`lines`, with optional relative `weights` and `phases` [rad]), or chosen from `band`:
+    all of them, the odd ones (even distortion then shows on even lines), or with a `pumping` frequency one residue class
+    (k mod P) = `residue`, so that every sideband of a line falls on a class of its own. `rms` [N] sets the size.
+    """
+
+    type: Literal["multisine"] = "multisine"
+    rms: Annotated[float, Field(ge=0)]
+    period: Annotated[float, Field(gt=0)] = 10.0
+    periods: Annotated[int, Field(ge=1)] = 3
+    band: tuple[Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]] = (0.1, 7.0)
+    select: Literal["all", "odd", "residue"] = "odd"
+    pumping: Annotated[float, Field(gt=0)] = 1.0
+    residue: Annotated[int, Field(ge=0)] = 1
+    lines: tuple[Annotated[int, Field(ge=1)], ...] = ()
+    weights: tuple[float, ...] = ()
+    phases: tuple[float, ...] = ()
+    seed: int = 0
+    start_delay: Annotated[float, Field(ge=0)] = 0.0
+
+    @model_validator(mode="after")
+    def _lists_match(self) -> "Multisine":
+        for name in ("weights", "phases"):
+            given = getattr(self, name)
+            if given and len(given) != len(self.lines):
+                raise ValueError(f"{name}: {len(given)} values for {len(self.lines)} lines")
+        if len(self.harmonics) == 0:
+            raise ValueError("band: no line of the multisine falls into it; make the period longer or the band wider")
+        return self
+
+    @property
+    def harmonics(self) -> np.ndarray:
+        """Excited multiples k of 1/period."""
+        if self.lines:
+            return np.array(self.lines)
+        low, high = sorted(self.band)
+        k = np.arange(max(1, math.ceil(low * self.period - 1e-9)), math.floor(high * self.period + 1e-9) + 1)
+        if self.select == "odd":
+            return k[k % 2 == 1]
+        if self.select == "residue":
+            classes = self.pumping * self.period
+            if abs(classes - round(classes)) > 1e-6:
+                raise InputError("multisine: with select residue the period must hold whole pumping periods")
+            return k[k % round(classes) == self.residue % round(classes)]
+        return k
+
+    @property
+    def duration(self) -> float:
+        return self.start_delay + self.period * self.periods
+
+    def shape(self, time: Array) -> Array:
+        k = self.harmonics
+        weight = np.array(self.weights) if self.weights else np.ones(len(k))
+        amplitude = self.rms * math.sqrt(2.0) * weight / np.linalg.norm(weight)
+        phase = np.array(self.phases) if self.phases else np.random.default_rng(self.seed).uniform(0, 2 * np.pi, len(k))
+        t = np.asarray(time) - self.start_delay
+        value = np.zeros(len(t))
+        for number, size, angle in zip(k, amplitude, phase):
+            value += size * np.cos(2 * np.pi * number * t / self.period + angle)
+        return np.where(t >= 0.0, value, 0.0)

@@ -1,0 +1,76 @@
+"""Excitations one after another, and the one function that builds an excitation from its description."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union
+
+import numpy as np
+from pydantic import Field, TypeAdapter, ValidationError
+
+from rhythmid.errors import InputError
+from rhythmid.excitation.chirp import Chirp
+from rhythmid.excitation.excitation import Array, Excitation
+from rhythmid.excitation.multisine import Multisine
+from rhythmid.excitation.profile import Profile
+from rhythmid.excitation.samples import Samples
+from rhythmid.excitation.silence import Silence
+
+
+class Sequence(Excitation):
+    """The `parts` one after another, the whole repeated `repetitions` times (a repeat shows noise and drift)."""
+
+    type: Literal["sequence"] = "sequence"
+    parts: Annotated[tuple["AnyExcitation", ...], Field(min_length=1)]
+    repetitions: Annotated[int, Field(ge=1)] = 1
+
+    @property
+    def duration(self) -> float:
+        return self.repetitions * sum(part.duration for part in self.parts)
+
+    @property
+    def peak(self) -> float:
+        return max(part.peak for part in self.parts)
+
+    def shape(self, time: Array) -> Array:
+        once = sum(part.duration for part in self.parts)
+        t = time - np.floor(time / once + 1e-12) * once
+        value = np.zeros(len(t))
+        start = 0.0
+        for part in self.parts:
+            inside = (t >= start - 1e-9) & (t < start + part.duration - 1e-9)
+            value[inside] = part(np.maximum(t[inside] - start, 0.0))
+            start += part.duration
+        return value
+
+
+AnyExcitation = Annotated[
+    Union[Chirp, Multisine, Profile, Samples, Silence, Sequence], Field(discriminator="type")
+]
+Sequence.model_rebuild()
+_ADAPTER: TypeAdapter[Excitation] = TypeAdapter(AnyExcitation)
+
+
+def _resolve(spec: Any, folder: Path) -> Any:
+    """File names in the description are relative to the file that holds it."""
+    if isinstance(spec, Mapping):
+        return {
+            key: str(folder / value) if key == "file" else _resolve(value, folder) for key, value in spec.items()
+        }
+    if isinstance(spec, (list, tuple)):
+        return [_resolve(item, folder) for item in spec]
+    return spec
+
+
+def build(spec: Mapping[str, Any], folder: str | Path = ".") -> Excitation:
+    """The excitation that `spec` describes: {type: chirp | multisine | profile | samples | silence | sequence, …}.
+
+    Raises InputError, naming the key, for whatever is wrong.
+    """
+    try:
+        made = _ADAPTER.validate_python(_resolve(spec, Path(folder)))
+        _ = made.duration
+        return made
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"][1:]) or "excitation"
+        raise InputError(f"excitation: {where}: {first['msg'].removeprefix('Value error, ')}") from None

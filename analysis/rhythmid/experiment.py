@@ -1,0 +1,431 @@
+"""One file says all of a run: machine, excitation, delays, noise, time mode, what is recorded and where.
+
+`rhythmid simulate`, `rhythmid run` and the launch file read the same experiment.yaml. `Experiment.nodes` is the one
+function that turns it into nodes with parameters; `perform` is the same run without ROS.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.document import Node, parse, read
+from rhythmid.elements.catalogue import Catalogue, load_catalogue
+from rhythmid.errors import InputError
+from rhythmid.excitation.excitation import Excitation
+from rhythmid.excitation.sequence import build
+from rhythmid.model import Model
+from rhythmid.plant import Plant
+from rhythmid.record.messages import Messages
+
+TOPICS = ("excitation", "command", "forcing", "plant/joint_states", "joint_states", "run", "diagnostics")
+
+
+@dataclass(frozen=True)
+class Forcing:
+    """Periodic forcing amplitude [N] cos(2π frequency [Hz] t + phase [rad]); amplitude 0 switches it off."""
+
+    amplitude: float = 1.0
+    frequency: float = 1.0
+    phase: float = 0.0
+
+
+@dataclass(frozen=True)
+class Delay:
+    """A transport delay: constant [s], or a profile of (seconds since start, delay [s]) joined by straight lines."""
+
+    constant: float = 0.0
+    profile: Path | None = None
+
+    def table(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Corner times and delays of the profile. Raises InputError when the file is not such a table."""
+        if self.profile is None:
+            return np.zeros(1), np.array([self.constant])
+        try:
+            table = np.atleast_2d(np.genfromtxt(self.profile, delimiter=",", comments="#"))
+        except (OSError, ValueError) as error:
+            raise InputError(f"{self.profile}: the delay profile cannot be read: {error}") from None
+        table = table[1:] if np.isnan(table[0]).any() else table  # a header line
+        if table.shape[1] != 2 or len(table) == 0 or not np.isfinite(table).all():
+            raise InputError(f"{self.profile}: two columns of numbers are expected: seconds since start, delay [s]")
+        if np.any(np.diff(table[:, 0]) <= 0) or np.any(table[:, 1] < 0):
+            raise InputError(f"{self.profile}: times must increase and delays must not be negative")
+        return table[:, 0], table[:, 1]
+
+    def release(self, stamp_ns: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Stamps [ns] on release: stamp + delay, in order (nothing overtakes). Shapes (n,) -> (n,)."""
+        times, delays = self.table()
+        late = np.rint(np.interp(stamp_ns * 1e-9, times, delays) * 1e9).astype(np.int64)
+        released = stamp_ns + late
+        order = np.arange(len(released), dtype=np.int64)
+        return np.maximum.accumulate(released - order) + order
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Measurement noise: standard deviation [m], correlation from sample to sample, rounding step [m] (0: none)."""
+
+    measurement_std: float = 0.0
+    correlation: float = 0.0
+    quantisation: float = 0.0
+
+
+@dataclass(frozen=True)
+class TimeMode:
+    """`mode` lockstep (simulated time) or realtime; `rate` [Hz]; credit `window` [samples]; process `layout`."""
+
+    mode: Literal["lockstep", "realtime"] = "lockstep"
+    rate: int = 1000
+    window: int = 100
+    layout: Literal["composed", "processes"] = "composed"
+
+    @property
+    def period_ns(self) -> int:
+        return round(1e9 / self.rate)
+
+
+@dataclass(frozen=True)
+class Safety:
+    """Limits of the excitation: largest effort [N], ramps in and out [s], age of the newest measurement [s] and
+    range of positions [m] beyond which it stops by itself."""
+
+    max_effort: float = 100.0
+    ramp: float = 0.0
+    stale_after: float = 0.5
+    envelope: tuple[float, float] = (-math.inf, math.inf)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What is recorded, where and how."""
+
+    path: Path = Path("bag")
+    storage: Literal["mcap", "sqlite3"] = "mcap"
+    topics: tuple[str, ...] = ("excitation", "joint_states", "forcing", "run")
+
+
+@dataclass(frozen=True)
+class NodeSpec:
+    """A node of the graph: its package, executable, name, parameters and remappings."""
+
+    package: str
+    executable: str
+    name: str
+    parameters: Mapping[str, Any]
+    remappings: Mapping[str, str] = field(default_factory=dict)
+
+
+def plant_model(model: Model, forcing: Forcing, noise: Noise, catalogue: Catalogue | None = None) -> Model:
+    """The model that the plant runs: with forcing and noise of the experiment added."""
+    known = catalogue or load_catalogue()
+    if forcing.amplitude != 0.0 and not any(term.element.acts == "drive" for term in model.terms):
+        values = {"amplitude": forcing.amplitude, "frequency": forcing.frequency, "phase": forcing.phase}
+        model = model.with_element(known["periodic_forcing"], values, fixed=True)
+    if noise.measurement_std > 0.0:
+        values = {"std": noise.measurement_std, "correlation": noise.correlation}
+        model = model.with_element(known["measurement_noise"], values, fixed=True)
+    if noise.quantisation > 0.0:
+        model = model.with_element(known["sensor_quantisation"], {"step": noise.quantisation}, fixed=True)
+    return model
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A run, completely described."""
+
+    model: Model
+    model_path: Path
+    excitation: Excitation
+    excitation_spec: Mapping[str, Any]
+    forcing: Forcing = Forcing()
+    input_delay: Delay = Delay()
+    measurement_delay: Delay = Delay()
+    noise: Noise = Noise()
+    time: TimeMode = TimeMode()
+    duration: float = 0.0
+    seed: int = 0
+    initial: tuple[float, float] | None = None  # None: on the limit cycle
+    safety: Safety = Safety()
+    record: Recording = Recording()
+    namespace: str = "/hopper"
+    joint: str = "leg"
+    folder: Path = Path(".")
+    elements: tuple[Path, ...] = ()
+
+    @classmethod
+    def load(cls, path: str | Path, elements: tuple[Path, ...] = ()) -> "Experiment":
+        """The experiment in a YAML file; paths in it are relative to it, except the bag's, which is relative to
+        where the command is run. Raises InputError naming the line and key of what is wrong."""
+        return _experiment(read(path), Path(path).resolve().parent, elements)
+
+    @classmethod
+    def from_text(cls, text: str, folder: str | Path = ".") -> "Experiment":
+        """The experiment in a YAML text whose relative paths start at `folder`."""
+        return _experiment(parse(text, "experiment"), Path(folder).resolve(), ())
+
+    @property
+    def count(self) -> int:
+        """Number of samples N of every topic."""
+        return max(1, round(self.duration * 1e9 / self.time.period_ns))
+
+    @property
+    def plant_model(self) -> Model:
+        """The model with forcing and noise, as the plant runs it."""
+        return plant_model(self.model, self.forcing, self.noise, load_catalogue(self.elements))
+
+    def with_record(self, **changes: Any) -> "Experiment":
+        """A copy that records otherwise."""
+        return replace(self, record=replace(self.record, **changes))
+
+    def description(self) -> dict[str, Any]:
+        """What the topic `run` says: the experiment as run, without model, delays and noise, which are to be found."""
+        return {
+            "program": "rhythmid",
+            "excitation": dict(self.excitation_spec),
+            "forcing": {
+                "amplitude": self.forcing.amplitude,
+                "frequency": self.forcing.frequency,
+                "phase": self.forcing.phase,
+            },
+            "rate": self.time.rate,
+            "time": self.time.mode,
+            "duration": self.count * self.time.period_ns * 1e-9,
+            "namespace": self.namespace,
+            "joint": self.joint,
+            "hold": "zero",
+        }
+
+    def nodes(self) -> list[NodeSpec]:
+        """The graph of this experiment: excitation, two delay injectors, plant, recorder."""
+        shared = {"rate": self.time.rate, "time_mode": self.time.mode, "joint": self.joint}
+
+        def injector(name: str, source: str, target: str, delay: Delay) -> NodeSpec:
+            return NodeSpec(
+                "rhythmid_nodes", "delay_injector", name,
+                {**shared, "delay": delay.constant, "profile": str(delay.profile or ""), "stamp_mode": "arrival"},
+                {"input": source, "output": target},
+            )  # fmt: skip
+
+        low, high = self.safety.envelope
+        return [
+            NodeSpec(
+                "rhythmid_nodes", "plant", "plant",
+                {
+                    **shared,
+                    "model": str(self.model_path),
+                    "elements": [str(folder) for folder in self.elements],
+                    "forcing_amplitude": self.forcing.amplitude,
+                    "forcing_frequency": self.forcing.frequency,
+                    "forcing_phase": self.forcing.phase,
+                    "noise_std": self.noise.measurement_std,
+                    "noise_correlation": self.noise.correlation,
+                    "quantisation": self.noise.quantisation,
+                    "seed": self.seed,
+                    "count": self.count,
+                    "initial": [] if self.initial is None else list(self.initial),
+                },
+            ),
+            injector("command_delay", "excitation", "command", self.input_delay),
+            injector("measurement_delay", "plant/joint_states", "joint_states", self.measurement_delay),
+            NodeSpec(
+                "rhythmid_nodes", "excitation", "excitation",
+                {
+                    **shared,
+                    "excitation": _json(self.excitation_spec),
+                    "folder": str(self.folder),
+                    "count": self.count,
+                    "window": self.time.window,
+                    "max_effort": self.safety.max_effort,
+                    "ramp": self.safety.ramp,
+                    "stale_after": self.safety.stale_after,
+                    "envelope": [low, high],
+                    "run": _json(self.description()),
+                },
+            ),
+            NodeSpec(
+                "rhythmid_nodes", "recorder", "recorder",
+                {
+                    **shared,
+                    "path": str(self.record.path),
+                    "storage": self.record.storage,
+                    "topics": list(self.record.topics),
+                },
+            ),
+        ]  # fmt: skip
+
+
+def _json(value: Any) -> str:
+    import json
+
+    return json.dumps(value, default=str)
+
+
+def ramped(excitation: Excitation, safety: Safety, time: NDArray[np.float64], duration: float) -> NDArray[np.float64]:
+    """Excitation [N] at times [s] since its start, faded in and out over the ramp and clamped to the largest effort."""
+    value = excitation(time)
+    if safety.ramp > 0.0:
+        value = value * np.clip(np.minimum(time, duration - time) / safety.ramp, 0.0, 1.0)
+    return np.clip(value, -safety.max_effort, safety.max_effort)
+
+
+def perform(experiment: Experiment) -> dict[str, Messages]:
+    """Run the experiment without ROS: what each topic of the graph carries, by topic name within the namespace.
+
+    Equals the graph's lockstep run, sample by sample and stamp by stamp.
+    """
+    period = experiment.time.period_ns
+    stamps = np.arange(experiment.count, dtype=np.int64) * period
+    effort = ramped(experiment.excitation, experiment.safety, stamps * 1e-9, experiment.count * period * 1e-9)
+    arrival = experiment.input_delay.release(stamps)
+    plant = Plant(experiment.plant_model, period, experiment.seed, experiment.initial)
+    plant.push_many(arrival, effort)
+    samples = plant.advance(int(stamps[-1]))
+    seen = experiment.measurement_delay.release(stamps)
+    return {
+        "excitation": Messages(stamps, effort=effort),
+        "command": Messages(arrival, effort=effort),
+        "forcing": Messages(stamps, effort=samples.forcing),
+        "plant/joint_states": Messages(
+            stamps, position=samples.position, velocity=samples.velocity, effort=samples.effort
+        ),
+        "joint_states": Messages(seen, position=samples.position, velocity=samples.velocity, effort=samples.effort),
+    }
+
+
+def _delay(node: Node | None, folder: Path) -> Delay:
+    if node is None:
+        return Delay()
+    if isinstance(node.value, dict):
+        keys = node.mapping(["profile"])
+        if "profile" not in keys:
+            node.fail("a delay [s] or {profile: file.csv} is expected")
+        delay = Delay(profile=folder / keys["profile"].text())
+        delay.table()
+        return delay
+    value = node.number()
+    if not 0.0 <= value <= 10.0:
+        node.fail(f"{value:g} s is outside [0, 10]; a delay is in seconds and cannot be negative")
+    return Delay(value)
+
+
+def _numbers(node: Node | None, defaults: Any, **limits: tuple[float, float]) -> dict[str, float]:
+    """Keys of `node` as numbers within their limits; the keys are the fields of the dataclass `defaults`."""
+    if node is None:
+        return {}
+    keys = node.mapping(list(limits))
+    return {name: child.number(*limits[name]) for name, child in keys.items()}
+
+
+def _experiment(document: Node, folder: Path, elements: tuple[Path, ...]) -> Experiment:
+    keys = document.mapping(
+        ["model", "excitation", "forcing", "delays", "noise", "time", "duration", "seed", "initial", "safety",
+         "record", "namespace", "joint", "elements"]
+    )  # fmt: skip
+    for name in ("model", "excitation"):
+        if name not in keys:
+            document.fail(f"'{name}:' is missing")
+    if "elements" in keys:
+        elements = (*elements, *(folder / item.text() for item in keys["elements"].items()))
+    catalogue = load_catalogue(elements)
+    model_path = folder / keys["model"].text()
+    if not model_path.is_file():
+        keys["model"].fail(f"no such file: {model_path}")
+    model = Model.load(model_path, catalogue)
+    spec = keys["excitation"].plain
+    if not isinstance(spec, dict):
+        keys["excitation"].fail("a mapping with a 'type' is expected")
+    try:
+        excitation = build(spec, folder)
+    except InputError as error:
+        raise InputError(f"{keys['excitation'].place}: {error}") from None
+    far = (-math.inf, math.inf)
+    forcing = Forcing(**_numbers(keys.get("forcing"), Forcing, amplitude=far, frequency=(1e-6, 1e6), phase=far))
+    if "forcing" not in keys and model.term("periodic_forcing") is not None:
+        term = model.term("periodic_forcing")
+        assert term is not None
+        forcing = Forcing(**{name: value.value for name, value in term.values.items()})
+    elif model.term("periodic_forcing") is not None:
+        model = model.without("periodic_forcing")
+    delays = keys["delays"].mapping(["input", "measurement"]) if "delays" in keys else {}
+    nodes_delay = {name: _delay(delays.get(name), folder) for name in ("input", "measurement")}
+    for name, label in (("input", "input_delay"), ("measurement", "measurement_delay")):
+        if name not in delays and (term := model.term(label)) is not None:
+            nodes_delay[name] = Delay(term.values["delay"].value)
+    noise = Noise(
+        **_numbers(keys.get("noise"), Noise, measurement_std=(0, math.inf), correlation=(0, 0.9999),
+                   quantisation=(0, math.inf))
+    )  # fmt: skip
+    time = _time(keys.get("time"))
+    duration = keys["duration"].number(1e-6, 1e6) if "duration" in keys else excitation.duration
+    initial = None
+    if "initial" in keys and keys["initial"].value != "limit_cycle":
+        given = keys["initial"].mapping(["position", "velocity"])
+        initial = (
+            given["position"].number() if "position" in given else 0.0,
+            given["velocity"].number() if "velocity" in given else 0.0,
+        )
+    seed = int(keys["seed"].number(0, 2**31)) if "seed" in keys else 0
+    namespace = keys["namespace"].text() if "namespace" in keys else "/hopper"
+    if not namespace.startswith("/"):
+        keys["namespace"].fail("a namespace starts with '/'")
+    experiment = Experiment(
+        model, model_path, excitation, spec, forcing, nodes_delay["input"], nodes_delay["measurement"], noise, time,
+        duration, seed, initial, _safety(keys.get("safety")), _recording(keys.get("record")), namespace,
+        keys["joint"].text() if "joint" in keys else "leg", folder, elements,
+    )  # fmt: skip
+    if excitation.peak > experiment.safety.max_effort:
+        keys["excitation"].fail(
+            f"its peak of {excitation.peak:g} N exceeds safety.max_effort = {experiment.safety.max_effort:g} N"
+        )
+    return experiment
+
+
+def _time(node: Node | None) -> TimeMode:
+    if node is None:
+        return TimeMode()
+    keys = node.mapping(["mode", "rate", "window", "layout"])
+    made: dict[str, Any] = {}
+    if "mode" in keys:
+        made["mode"] = keys["mode"].choice(["lockstep", "realtime"])
+    if "layout" in keys:
+        made["layout"] = keys["layout"].choice(["composed", "processes"])
+    if "rate" in keys:
+        made["rate"] = int(keys["rate"].number(1, 100_000))
+    if "window" in keys:
+        made["window"] = int(keys["window"].number(1, 100))
+    return TimeMode(**made)
+
+
+def _safety(node: Node | None) -> Safety:
+    if node is None:
+        return Safety()
+    keys = node.mapping(["max_effort", "ramp", "stale_after", "envelope"])
+    made: dict[str, Any] = {
+        name: keys[name].number(low, math.inf)
+        for name, low in (("max_effort", 0.0), ("ramp", 0.0), ("stale_after", 1e-3))
+        if name in keys
+    }
+    if "envelope" in keys:
+        ends = [end.number() for end in keys["envelope"].items()]
+        if len(ends) != 2 or not ends[0] < ends[1]:
+            keys["envelope"].fail("two positions [low, high] in m are expected, low < high")
+        made["envelope"] = (ends[0], ends[1])
+    return Safety(**made)
+
+
+def _recording(node: Node | None) -> Recording:
+    if node is None:
+        return Recording()
+    keys = node.mapping(["path", "storage", "topics"])
+    made: dict[str, Any] = {}
+    if "path" in keys:
+        made["path"] = Path(keys["path"].text())
+    if "storage" in keys:
+        made["storage"] = keys["storage"].choice(["mcap", "sqlite3"])
+    if "topics" in keys:
+        made["topics"] = tuple(item.choice(TOPICS) for item in keys["topics"].items())
+    return Recording(**made)
