@@ -20,6 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ from rhythmid.errors import InputError
 from rhythmid.model import INERTIA, Model, Term
 
 _LOCK = threading.Lock()
+InputKind = Literal["force", "base_displacement", "base_acceleration"]
 
 
 def cache_folder() -> Path:
@@ -58,7 +60,13 @@ class Layout:
 
 @dataclass(frozen=True)
 class Compiled:
-    """A compiled structure: `run(times, knots, coefficients, knots, coefficients, parameters, start, max_step, out)`."""
+    """A compiled structure.
+
+    `run(times, ku, cu, kw, cw, kd, cd, parameters, start, max_step, out)` integrates from times[0], where the state is
+    `start`, and fills a row of `out` for each time; it returns how many rows are finite. Knots and cubic pieces belong
+    to the command (ku, cu), the forcing (kw, cw) and, where compiled with `disturbed`, to a further force on the mass
+    (kd, cd). The global interpreter lock is released meanwhile.
+    """
 
     layout: Layout
     run: Callable[..., int]
@@ -104,12 +112,12 @@ class _Writer:
         self.lines.append(f"{targets} = {element.name}({', '.join([*arguments, *values, *states])})")
 
 
-def _right_hand_side(terms: tuple[Term, ...]) -> _Writer:
+def _right_hand_side(terms: tuple[Term, ...], excited: InputKind) -> _Writer:
     writer = _Writer()
     kernels = [term for term in terms if term.element.kernel is not None]
     force = [term for term in kernels if term.element.slot == "force"]
-    writer.lines.append("f = u")
-    for term in (term for term in kernels if term.element.slot == "command"):
+    writer.lines.append("f = u" if excited == "force" else "f = 0.0")
+    for term in (term for term in kernels if term.element.slot == "command" and excited == "force"):
         writer.call(term, ["f", "t"], "f")
     writer.lines.append("f = f + w")
     for term in (term for term in force if term.element.acts == "drive"):
@@ -123,10 +131,12 @@ def _right_hand_side(terms: tuple[Term, ...]) -> _Writer:
     writer.lines.append("body = 0.0")
     for acts in ("leg", "body"):
         for term in (term for term in force if term.element.acts == acts):
-            writer.call(term, ["s0", "s1", "t", "f"], "part")
+            moved = excited == "base_displacement" and acts == "leg"
+            writer.call(term, ["s0 - u", "s1 - du", "t", "f"] if moved else ["s0", "s1", "t", "f"], "part")
             writer.lines.append(f"{acts} = {acts} + part")
     for term in (term for term in force if term.element.acts == "modifier"):
-        writer.call(term, ["leg", "s0", "s1", "t", "f"], "leg")
+        at = ["s0 - u", "s1 - du"] if excited == "base_displacement" else ["s0", "s1"]
+        writer.call(term, ["leg", *at, "t", "f"], "leg")
     writer.lines.append("y = s0")
     for term in (term for term in kernels if term.element.slot == "sensor"):
         writer.call(term, ["y", "t"], "y")
@@ -137,13 +147,23 @@ def _indent(lines: list[str], depth: int) -> str:
     return "\n".join("    " * depth + line for line in lines)
 
 
-def generate(terms: tuple[Term, ...]) -> tuple[str, Layout]:
-    """Source text of the module for this list of terms, and the layout of its arrays."""
-    writer = _right_hand_side(terms)
+def generate(
+    terms: tuple[Term, ...], disturbed: bool = False, excited: InputKind = "force"
+) -> tuple[str, Layout]:
+    """Source text of the module for this list of terms, and the layout of its arrays.
+
+    `excited` says what the command is: a force on the mass; the displacement of the base that the leg stands on; or
+    the base's acceleration, where position and velocity are relative to the base.
+    """
+    writer = _right_hand_side(terms, excited)
     n = len(writer.states)
     p = ", ".join(f"p{i}" for i in range(len(writer.parameters)))
     s = ", ".join(f"s{i}" for i in range(n))
-    rates = ", ".join(["s1", "(f + leg + body) / p0", *(f"d{i}" for i in range(2, n))])
+    total = "(f + leg + body + d) / p0" if disturbed else "(f + leg + body) / p0"
+    if excited == "base_acceleration":
+        total += " - u"
+    known = ", ".join(["t, u, w", *(["du"] if excited == "base_displacement" else []), *(["d"] if disturbed else [])])
+    rates = ", ".join(["s1", total, *(f"d{i}" for i in range(2, n))])
     sources: dict[str, str] = {}
     for term in terms:
         if term.element.kernel is not None:
@@ -153,27 +173,32 @@ def generate(terms: tuple[Term, ...]) -> tuple[str, Layout]:
         """Command u and forcing w at time `at`, within the pieces found before."""
         return [
             f"x = {at} - tu; u = ((c3 * x + c2) * x + c1) * x + c0",
+            *(["du = (3.0 * c3 * x + 2.0 * c2) * x + c1"] if excited == "base_displacement" else []),
             f"x = {at} - tw; w = ((e3 * x + e2) * x + e1) * x + e0",
             *(line.replace("(t,", f"({at},") for line in writer.drive),
+            *([f"x = {at} - td; d = ((g3 * x + g2) * x + g1) * x + g0"] if disturbed else []),
         ]
 
     def stage(number: int, time: str, weight: str) -> str:
         at = [f"s{i}" if number == 1 else f"s{i} + {weight} * a{number - 1}_{i}" for i in range(n)]
         targets = ", ".join([*(f"a{number}_{i}" for i in range(n)), "y", "f"])
-        return f"{targets} = rhs({time}, u, w, {', '.join(at)}, {p})"
+        arguments = ", ".join([time, *known.split(", ")[1:], *at])
+        return f"{targets} = rhs({arguments}, {p})"
 
     piece_u = "tu = ku[i]; c0 = cu[0, i]; c1 = cu[1, i]; c2 = cu[2, i]; c3 = cu[3, i]"
     piece_w = "tw = kw[j]; e0 = cw[0, j]; e1 = cw[1, j]; e2 = cw[2, j]; e3 = cw[3, j]"
-    find = ["while ku[i + 1] <= t:", "    i += 1", "while kw[j + 1] <= t:", "    j += 1", piece_u, piece_w]
+    piece_d = "td = kd[l]; g0 = cd[0, l]; g1 = cd[1, l]; g2 = cd[2, l]; g3 = cd[3, l]"
+    following = ["while kw[j + 1] <= t:", "    j += 1", piece_w]  # smooth signals: no step ends at their knots
+    if disturbed:
+        following += ["while kd[l + 1] <= t:", "    l += 1", piece_d]
+    find = ["while ku[i + 1] <= t:", "    i += 1", piece_u, *following]
     step = [  # the stages at the half step share their inputs, and so do the end of a step and the next one's begin
         stage(1, "t", ""),
         *inputs("t + half"),
         stage(2, "t + half", "half"),
         stage(3, "t + half", "half"),
         "t = begin + (substep + 1) * h",
-        "while kw[j + 1] <= t:",
-        "    j += 1",
-        piece_w,
+        *following,
         *inputs("t"),
         stage(4, "t", "h"),
         *(f"s{i} = s{i} + h / 6.0 * (a1_{i} + 2.0 * (a2_{i} + a3_{i}) + a4_{i})" for i in range(n)),
@@ -181,7 +206,7 @@ def generate(terms: tuple[Term, ...]) -> tuple[str, Layout]:
     record = [
         *find,
         *inputs("t"),
-        f"{', '.join([*(f'a1_{i}' for i in range(n)), 'y', 'f'])} = rhs(t, u, w, {s}, {p})",
+        f"{', '.join([*(f'a1_{i}' for i in range(n)), 'y', 'f'])} = rhs({known}, {s}, {p})",
         *(f"out[k, {i}] = s{i}" for i in range(n)),
         f"out[k, {n}] = y",
         f"out[k, {n + 1}] = f",
@@ -194,21 +219,22 @@ from numba import njit
 {chr(10).join(sources.values())}
 
 @njit(error_model="numpy")
-def rhs(t, u, w, {s}, {p}):
+def rhs({known}, {s}, {p}):
 {_indent(writer.lines, 1)}
     return {rates}, y, f
 
 
 @njit(
-    "int64(float64[::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[::1], float64[::1],"
-    " float64, float64[:, ::1])",
+    "int64(float64[::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1],"
+    " float64[::1], float64[::1], float64, float64[:, ::1])",
     cache=True, nogil=True, error_model="numpy",
 )
-def run(times, ku, cu, kw, cw, parameters, start, max_step, out):
+def run(times, ku, cu, kw, cw, kd, cd, parameters, start, max_step, out):
 {_indent([f"p{i} = parameters[{i}]" for i in range(len(writer.parameters))], 1)}
 {_indent([f"s{i} = start[{i}]" for i in range(n)], 1)}
     i = 0
     j = 0
+    l = 0
     t = times[0]
     k = 0
 {_indent(record, 1)}
@@ -262,24 +288,31 @@ def _load(text: str) -> Callable[..., int]:
 
 
 @lru_cache(maxsize=512)
-def _structure(key: tuple[tuple[str, str], ...], terms: tuple[Term, ...]) -> Compiled:
-    text, layout = generate(terms)
+def _structure(
+    key: tuple[tuple[str, str, str], ...], terms: "_Terms", disturbed: bool, excited: InputKind
+) -> Compiled:
+    text, layout = generate(terms.terms, disturbed, excited)
     return Compiled(layout, _load(text))
 
 
-class _Terms(tuple[Term, ...]):
-    """Terms that compare by structure, so that models differing in values share one compiled function."""
+@dataclass(frozen=True, eq=False)
+class _Terms:
+    """Terms that take no part in the cache's key: models that differ in values share one compiled function."""
+
+    terms: tuple[Term, ...]
 
     def __hash__(self) -> int:
-        return hash(tuple((term.label, term.element.source, term.element.name) for term in self))
+        return 0
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Terms) and [(t.label, t.element.source) for t in self] == [
-            (t.label, t.element.source) for t in other
-        ]
+        return isinstance(other, _Terms)
 
 
-def compile_model(model: Model) -> Compiled:
-    """The compiled structure of a model; parameter values play no part."""
-    terms = _Terms(model.terms)
-    return _structure(tuple((term.label, term.element.name) for term in terms), terms)
+def compile_model(model: Model, disturbed: bool = False, excited: InputKind = "force") -> Compiled:
+    """The compiled structure of a model; parameter values play no part.
+
+    With `disturbed` the structure takes a further, arbitrary force on the mass as a signal; `excited` as in `generate`.
+    """
+    terms = tuple(term for term in model.terms if term.element.kernel is not None)
+    key = tuple((term.label, term.element.name, term.element.source) for term in terms)
+    return _structure(key, _Terms(terms), disturbed, excited)
