@@ -17,6 +17,7 @@ from rhythmid.errors import InputError
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
 INERTIA = "inertia.mass"
+MASS = Parameter("mass", "kg", "inertia", bounds=(0.0, math.inf))
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,8 @@ class Model:
             value = given.pop(parameter.name, parameter.default)
             if value is None:
                 raise InputError(f"element {element.name!r}: parameter {parameter.name!r} needs a value")
-            made[parameter.name] = Value(float(value), self.units.of(parameter.unit), fixed, parameter.bounds)
+            unit = self.units.of(parameter.unit)
+            made[parameter.name] = Value(float(value), unit, fixed or parameter.fixed, parameter.bounds)
         if given:
             raise InputError(f"element {element.name!r} has no parameter {next(iter(given))!r}")
         taken = {term.label for term in self.terms}
@@ -154,14 +156,14 @@ class Model:
         content: dict[str, Any] = {}
         if self.units not in (TRANSLATIONAL, ROTATIONAL):
             content["units"] = {"force": self.units.force, "position": self.units.position, "mass": self.units.mass}
-        content["inertia"] = {"mass": _entry(self.mass, (0.0, math.inf))}
+        content["inertia"] = {"mass": _entry(self.mass, MASS)}
         for slot in SLOTS:
             terms = [term for term in self.terms if term.element.slot == slot]
             if terms or slot != "timing":
                 content[slot] = [
                     {
                         term.element.name: {
-                            name: _entry(value, term.element.parameter(name).bounds)
+                            name: _entry(value, term.element.parameter(name))
                             for name, value in term.values.items()
                         }
                     }
@@ -186,11 +188,11 @@ def _labels(name: str) -> Iterator[str]:
         yield f"{name}_{number}"
 
 
-def _entry(value: Value, usual: tuple[float, float]) -> dict[str, Any]:
+def _entry(value: Value, usual: Parameter) -> dict[str, Any]:
     entry: dict[str, Any] = {"value": float(value.value), "unit": value.unit}
-    if value.fixed:
-        entry["fixed"] = True
-    if tuple(value.bounds) != tuple(usual):
+    if value.fixed or usual.fixed:
+        entry["fixed"] = value.fixed
+    if tuple(value.bounds) != tuple(usual.bounds):
         entry["bounds"] = [float(value.bounds[0]), float(value.bounds[1])]
     if value.prior is not None:
         entry["prior"] = {"mean": float(value.prior.mean), "std": float(value.prior.std)}
@@ -200,7 +202,8 @@ def _entry(value: Value, usual: tuple[float, float]) -> dict[str, Any]:
 def _value(node: Node, parameter: Parameter, units: Units) -> Value:
     """Parameter from `{value: …, unit: …}` or from a bare number in the machine's own units."""
     if not isinstance(node.value, dict):
-        value, unit, fixed, bounds, prior = node.number(), units.of(parameter.unit), False, parameter.bounds, None
+        value, unit, bounds, prior = node.number(), units.of(parameter.unit), parameter.bounds, None
+        fixed = parameter.fixed
     else:
         keys = node.mapping(["value", "unit", "fixed", "bounds", "prior"])
         if "value" not in keys:
@@ -209,7 +212,7 @@ def _value(node: Node, parameter: Parameter, units: Units) -> Value:
         unit = units.of(parameter.unit)
         if "unit" in keys:
             units.check(str(keys["unit"].value), parameter.unit, f"{keys['unit'].place}: {node.path}")
-        fixed = False
+        fixed = parameter.fixed
         if "fixed" in keys:
             if not isinstance(keys["fixed"].value, bool):
                 keys["fixed"].fail("is true or false")
@@ -286,7 +289,7 @@ def _model(document: Node, catalogue: Catalogue) -> Model:
     if "mass" not in inertia:
         sections["inertia"].fail("'mass' is missing")
     units = _units(sections, inertia["mass"])
-    mass = _value(inertia["mass"], Parameter("mass", "kg", "inertia", bounds=(0.0, math.inf)), units)
+    mass = _value(inertia["mass"], MASS, units)
     if mass.value <= 0.0:
         inertia["mass"].fail("must be greater than 0")
     taken: set[str] = set()

@@ -17,13 +17,14 @@ A file in `elements/<slot>/` defines one `ELEMENT`. Exactly one of these says wh
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from math import inf
+from math import inf, pi
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 Slot = Literal["command", "actuator", "force", "sensor", "timing"]
+STEP = "simulation.step"  # borrowed under this name: the largest integration step [s], which no effect can be faster than
 SLOTS: tuple[Slot, ...] = ("command", "actuator", "force", "sensor", "timing")
 Acts = Literal["body", "leg", "modifier", "drive"]
 Sampler = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
@@ -34,7 +35,8 @@ class Parameter:
     """A parameter of an element.
 
     `unit` is written for a translational machine (kg, m, s, N); a rotational or otherwise scaled model translates it.
-    `default` is what a model file may leave out; None makes the parameter mandatory.
+    `default` is what a model file may leave out; None makes the parameter mandatory. A parameter that is `fixed` is not
+    estimated unless a model file says `fixed: false`: a seed, a side, an exponent.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Parameter:
     description: str
     bounds: tuple[float, float] = (-inf, inf)
     default: float | None = None
+    fixed: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,22 @@ class Scales:
     duration: float  # [s] longest record
     period: float  # [s] sample period
     forcing_frequency: float = 0.0  # [Hz] pumping frequency, 0 where there is none
+    residual_frequency: float = 0.0  # [Hz] strongest line that the nominal model leaves unexplained, 0 where unknown
+
+    @property
+    def force(self) -> float:
+        """Typical force of the leg, stiffness times displacement."""
+        return self.stiffness * self.position
+
+    @property
+    def damping(self) -> float:
+        """The damping coefficient sqrt(k m), half the critical one."""
+        return (self.stiffness * self.mass) ** 0.5
+
+    @property
+    def natural_frequency(self) -> float:
+        """Frequency [Hz] of the mass on the spring."""
+        return (self.stiffness / self.mass) ** 0.5 / (2.0 * pi)
 
 
 @dataclass(frozen=True)
@@ -67,9 +86,11 @@ class Element:
     """One physical effect.
 
     `borrows` maps a kernel argument to (parameter of another element, value when the model has no such element;
-    None makes that element a condition for using this one). `size` names the parameter that measures how much of the
-    effect there is; the effect is absent at `absent`. `starts` proposes first guesses of physical size from the
-    record's scales. `confusable` maps another element's name to what tells the two apart.
+    None makes that element a condition for using this one); `STEP` is always there. `size` names the parameter that
+    measures how much of the effect there is; with it at `absent` the model behaves as without the element, whatever its
+    other parameters. `starts` proposes first guesses of physical size from the record's scales, several where the shape
+    matters. `special_case_of` names richer elements that contain this one, exactly or in a limit of their parameters;
+    `confusable` maps another element's name to what tells the two apart. A `rotational` effect needs an angle for x.
     """
 
     name: str
@@ -92,6 +113,7 @@ class Element:
     size: str = ""
     absent: float = 0.0
     candidate: bool = True  # takes part in the search for missing physics
+    rotational: bool = False  # makes sense only where the position is an angle
     starts: Callable[[Scales], list[dict[str, float]]] | None = None
     source: str = ""  # file that defines it
 
