@@ -39,7 +39,9 @@ class Messages:
         for name in (*FIELDS, "receive_ns"):
             column = getattr(self, name)
             if column is not None and np.shape(column) != np.shape(self.stamp_ns):
-                raise ValueError(f"{name} has shape {np.shape(column)}, stamps have {np.shape(self.stamp_ns)}")
+                raise ValueError(
+                    f"{name} has shape {np.shape(column)}, stamps have {np.shape(self.stamp_ns)}"
+                )
 
     def __len__(self) -> int:
         return len(self.stamp_ns)
@@ -55,10 +57,16 @@ class Messages:
             column = getattr(self, name)
             if column is not None and not np.isfinite(column).all():
                 first = int(np.argmin(np.isfinite(column)))
-                raise InputError(f"{topic}: {name} of message {first} is {column[first]}: only finite values are written")
+                raise InputError(
+                    f"{topic}: {name} of message {first} is {column[first]}: only finite values are written"
+                )
         for name in ("stamp_ns", "receive_ns"):
             column = getattr(self, name)
-            if column is not None and len(column) and not 0 <= np.min(column) <= np.max(column) <= LAST_STAMP_NS:
+            if (
+                column is not None
+                and len(column)
+                and not 0 <= np.min(column) <= np.max(column) <= LAST_STAMP_NS
+            ):
                 raise InputError(f"{topic}: {name} lies outside [0, 2^31) s, which a message cannot hold")
 
     def serialised(self, joint: str = "leg", frame_id: str = "") -> NDArray[np.uint8]:
@@ -71,6 +79,12 @@ class Messages:
         for name, column in present.items():
             rows[name] = column
         return rows.view(np.uint8).reshape(-1, len(template))
+
+
+def string_message(value: str) -> bytes:
+    """CDR bytes of a std_msgs/msg/String."""
+    data = value.encode() + b"\0"
+    return b"\x00\x01\x00\x00" + len(data).to_bytes(4, "little") + data
 
 
 def _joint_state_layout(

@@ -1,0 +1,107 @@
+"""A rosbag2 recording on disk: a directory, or one of its storage files, compressed or not, finished or not."""
+
+import re
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import yaml
+
+from rhythmid.errors import InputError
+from rhythmid.record.block import Block, Topic, Wanted
+from rhythmid.record.compression import decompress_file
+from rhythmid.record.mcap_reader import McapReader
+from rhythmid.record.sqlite_reader import SqliteReader
+
+READERS = {".mcap": McapReader, ".db3": SqliteReader}
+SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
+
+
+def is_bag(path: Path) -> bool:
+    """Whether the path looks like a bag: a directory, or a file with a storage file's suffix."""
+    return path.is_dir() or path.name.endswith(SUFFIXES)
+
+
+class Bag:
+    """A recording. `topics`, `truncated` and `notes` are complete once `blocks` is exhausted.
+
+    Attributes
+    ----------
+    files : storage files in the order of recording.
+    topics : all topics by name, with or without messages.
+    truncated : whether the recording breaks off (its recorder was killed or is still running).
+    notes : what a user should know about the state of the files, one line each.
+
+    Raises InputError when there is no such recording.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self.topics: dict[str, Topic] = {}
+        self.truncated = False
+        self.notes: list[str] = []
+        if self.path.is_dir():
+            self.files = self._files_of_directory()
+        elif not self.path.exists():
+            raise InputError(f"{self.path}: no such bag")
+        elif is_bag(self.path):
+            self.files = [self.path]
+        else:
+            raise InputError(
+                f"{self.path}: is neither a bag directory nor a file named {', '.join(SUFFIXES)}"
+            )
+
+    @property
+    def name(self) -> str:
+        """Name of the recording, without suffixes."""
+        return self.path.resolve().name.split(".")[0] if self.path.is_file() else self.path.resolve().name
+
+    def _files_of_directory(self) -> list[Path]:
+        metadata = self.path / "metadata.yaml"
+        present = [file for file in self.path.iterdir() if file.name.endswith(SUFFIXES)]
+        if not present:
+            raise InputError(f"{self.path}: holds no recording (no {' or '.join(SUFFIXES[:2])} file)")
+        present.sort(
+            key=lambda file: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", file.name)]
+        )
+        if not metadata.is_file():
+            self.notes.append("metadata.yaml is missing: the recorder was not closed")
+            return present
+        try:
+            listed = yaml.safe_load(metadata.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
+            files = [self.path / Path(name).name for name in listed["relative_file_paths"]]
+        except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError):
+            self.notes.append("metadata.yaml is damaged: all storage files of the directory were read")
+            return present
+        if missing := [file.name for file in files if not file.is_file()]:
+            raise InputError(f"{self.path}: {missing[0]}, which metadata.yaml lists, is missing")
+        return files
+
+    def blocks(self, wanted: Wanted = lambda topic: True) -> Iterator[Block]:
+        """Messages of the wanted topics, block by block in the order of recording. Raises InputError."""
+        for file in self.files:
+            if file.suffix != ".zstd":
+                yield from self._read(file, wanted)
+                continue
+            with TemporaryDirectory(prefix="rhythmid-") as folder:
+                plain = Path(folder) / file.stem
+                try:
+                    decompress_file(file, plain)
+                except (ValueError, OSError) as error:
+                    raise InputError(f"{file}: cannot be decompressed: {error}") from None
+                yield from self._read(plain, wanted)
+
+    def _read(self, file: Path, wanted: Wanted) -> Iterator[Block]:
+        reader = READERS[file.suffix](file)
+        try:
+            yield from reader.blocks(wanted)
+        except InputError:
+            raise
+        except (ValueError, struct.error) as error:
+            raise InputError(f"{file}: is damaged: {error}") from None
+        self.topics.update(reader.topics)
+        self.notes += [f"{file.name}: {note}" for note in reader.damage]
+        if reader.truncated:
+            self.truncated = True
+            self.notes.append(f"{file.name}: breaks off; what precedes the break was read")

@@ -1,0 +1,139 @@
+"""Fields of a bag's messages as arrays: by layout where all messages of a block have the same, one by one elsewhere."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.serde import SerdeError
+
+from rhythmid.errors import InputError
+from rhythmid.record.bag import Bag
+from rhythmid.record.block import Block, Topic
+from rhythmid.record.field import Field
+from rhythmid.record.layout import Layout, Unsupported, value_of
+from rhythmid.record.message_types import stamp_path, type_fields, typestore
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Fields of one topic, in the order in which its n messages were recorded.
+
+    Attributes
+    ----------
+    log_ns : int64[n], when each message was received [ns].
+    stamp_ns : int64[n], its header's stamp [ns]; None if the type has none.
+    values : field -> float64[n]; NaN also where `missing`.
+    missing : field -> bool[n], whether the message has no such entry (a joint that it does not list).
+    singly : number of messages that had to be deserialised one by one.
+    """
+
+    topic: Topic
+    log_ns: NDArray[np.int64]
+    stamp_ns: NDArray[np.int64] | None
+    values: Mapping[Field, NDArray[np.float64]]
+    missing: Mapping[Field, NDArray[np.bool_]]
+    singly: int = 0
+
+
+@dataclass
+class _Reader:
+    """Collects the columns of one topic block by block."""
+
+    topic: Topic
+    fields: tuple[Field, ...]
+    direct: bool
+    layout: Layout | None = None
+    log_ns: list[NDArray[np.int64]] = field(default_factory=list)
+    rows: list[NDArray[np.float64]] = field(default_factory=list)  # float64[fields, n] each
+    missing: list[NDArray[np.bool_]] = field(default_factory=list)
+    singly: int = 0
+
+    def __post_init__(self) -> None:
+        for wanted in self.fields:
+            wanted.check(self.topic.type, type_fields(self.topic))
+        stamp = stamp_path(self.topic)
+        self.has_stamp = stamp is not None
+        self.paths = [*self.fields, *(Field.parse(f"{stamp}.{part}") for part in ("sec", "nanosec") if stamp)]
+
+    def add(self, block: Block) -> None:
+        if block.topic.type != self.topic.type:
+            raise InputError(
+                f"{self.topic.name}: carries both {self.topic.type} and {block.topic.type}; only one type can be read"
+            )
+        rows = self._by_layout(block) if self.direct else None
+        if rows is None:
+            rows, missing = self._one_by_one(block)
+        else:
+            missing = np.zeros(rows.shape, dtype=bool)
+        self.log_ns.append(block.log_ns)
+        self.rows.append(rows)
+        self.missing.append(missing)
+
+    def _by_layout(self, block: Block) -> NDArray[np.float64] | None:
+        """Columns by layout; None if the messages' layouts vary."""
+        for attempt in range(2):
+            try:
+                if self.layout is None or attempt:
+                    self.layout = Layout(next(iter(block)), self.topic.type, type_fields(self.topic))
+                found = [self.layout.locate(path) for path in self.paths]
+            except (Unsupported, LookupError):
+                continue
+            names = [name for _, used in found for name in used]
+            if self.layout.fits(block, names):
+                return np.array([self.layout.read(block, number) for number, _ in found]).reshape(
+                    len(found), -1
+                )
+        self.layout = None
+        return None
+
+    def _one_by_one(self, block: Block) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        store = typestore(self.topic)
+        rows = np.full((len(self.paths), len(block)), np.nan)
+        missing = np.zeros(rows.shape, dtype=bool)
+        self.singly += len(block)
+        for column, data in enumerate(block):
+            try:
+                message = store.deserialize_cdr(data, self.topic.type)
+            except SerdeError as error:
+                at = f"message received at {block.log_ns[column] * 1e-9:.6f} s"
+                raise InputError(
+                    f"{self.topic.name}: {at} is not a valid {self.topic.type}: {error}"
+                ) from None
+            for row, path in enumerate(self.paths):
+                try:
+                    rows[row, column] = value_of(message, path)
+                except LookupError:
+                    missing[row, column] = True
+        return rows, missing
+
+    def columns(self) -> Columns:
+        rows = np.hstack([np.empty((len(self.paths), 0)), *self.rows])
+        missing = np.hstack([np.empty((len(self.paths), 0), dtype=bool), *self.missing])
+        stamp_ns = None
+        if self.has_stamp:
+            second, nanosecond = rows[-2:].astype(np.int64)
+            stamp_ns = second * 1_000_000_000 + nanosecond
+        return Columns(
+            self.topic,
+            np.concatenate([np.empty(0, dtype=np.int64), *self.log_ns]),
+            stamp_ns,
+            dict(zip(self.fields, rows, strict=False)),
+            dict(zip(self.fields, missing, strict=False)),
+            self.singly,
+        )
+
+
+def read_columns(bag: Bag, wanted: Mapping[str, Sequence[Field]], direct: bool = True) -> dict[str, Columns]:
+    """Read fields of the topics `wanted` (topic -> fields) in one pass over the bag.
+
+    `direct=False` deserialises every message one by one, with the same result. Topics without messages are left out;
+    `bag.topics` tells them from those that the bag does not have. Raises InputError when a type or field is unknown.
+    """
+    readers: dict[str, _Reader] = {}
+    for block in bag.blocks(lambda topic: topic.name in wanted):
+        name = block.topic.name
+        if name not in readers:
+            readers[name] = _Reader(block.topic, tuple(wanted[name]), direct)
+        readers[name].add(block)
+    return {name: reader.columns() for name, reader in readers.items()}

@@ -1,0 +1,91 @@
+"""Field paths: which number of a message, such as `effort[leg]`, `data[3]` or `wrench.force.z`."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+from rosbags.interfaces import Nodetype
+
+from rhythmid.errors import InputError
+
+_STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[\s*([^\[\]]+?)\s*\]")
+NAMES = ("name", "names", "joint_names")  # lists that name the entries of the lists beside or below them
+
+TypeFields = Mapping[
+    str, Any
+]  # message type -> (constants, [(field, description)]), as rosbags parses definitions
+
+
+@dataclass(frozen=True)
+class Field:
+    """A path to one number. `steps` are field names (str), positions (int) and names of entries ((name,))."""
+
+    text: str
+    steps: tuple[Any, ...]
+
+    @classmethod
+    def parse(cls, text: str) -> "Field":
+        """The path in `text`: names joined by dots, each followed by [index] or [name of joint] where it is a list."""
+        steps: list[Any] = []
+        at = 0
+        while at < len(text):
+            match = _STEP.match(text, at)
+            if match is None or (not steps and match.group(1) is None) or (at == 0 and text[0] == "."):
+                raise InputError(
+                    f"field {text!r} is not a path such as effort[leg], data[3] or wrench.force.z"
+                )
+            name, entry = match.groups()
+            steps.append(name if name else int(entry) if entry.isdigit() else (entry,))
+            at = match.end()
+        if not steps:
+            raise InputError(
+                "field is empty; a path such as effort[leg], data[3] or wrench.force.z is expected"
+            )
+        return cls(text, tuple(steps))
+
+    def check(self, msgtype: str, types: TypeFields) -> None:
+        """Raise InputError unless messages of `msgtype` have such a number."""
+        kind: Any = (Nodetype.NAME, msgtype)
+        named = False  # whether some message on the way names entries
+        done = ""
+        for step in self.steps:
+            if isinstance(step, str):
+                if kind[0] != Nodetype.NAME:
+                    raise InputError(f"field {self.text!r}: {done or msgtype} has no parts{_hint(kind)}")
+                fields = dict(types[kind[1]][1])
+                if step not in fields:
+                    near = get_close_matches(step, fields, 1)
+                    mend = f"did you mean {near[0]!r}?" if near else f"it has {', '.join(fields)}"
+                    raise InputError(f"field {self.text!r}: {kind[1]} has no field {step!r}; {mend}")
+                named = named or any(name in fields and _is_list_of_text(fields[name]) for name in NAMES)
+                kind = fields[step]
+                done = f"{done}.{step}" if done else step
+                continue
+            if kind[0] not in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+                raise InputError(f"field {self.text!r}: {done} is not a list")
+            if isinstance(step, tuple) and not named:
+                raise InputError(
+                    f"field {self.text!r}: entries of {done} have no names; give a position such as {done}[0]"
+                )
+            if kind[0] == Nodetype.ARRAY and isinstance(step, int) and step >= kind[1][1]:
+                raise InputError(f"field {self.text!r}: {done} has {kind[1][1]} entries, counted from 0")
+            kind = kind[1][0]
+            done += f"[{step if isinstance(step, int) else step[0]}]"
+        if kind[0] != Nodetype.BASE or kind[1][0] in ("string", "wstring"):
+            raise InputError(f"field {self.text!r}: {done} is not one number{_hint(kind)}")
+
+
+def _is_list_of_text(kind: Any) -> bool:
+    return kind[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE) and kind[1][0][0] == Nodetype.BASE and (
+        kind[1][0][1][0] == "string"
+    )  # fmt: skip
+
+
+def _hint(kind: Any) -> str:
+    if kind[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        return "; it is a list: add an index such as [0] or a joint's name such as [leg]"
+    if kind[0] == Nodetype.NAME:
+        return f"; it is a {kind[1]}: name one of its fields"
+    return ""

@@ -1,0 +1,139 @@
+"""MCAP files read front to back (format: https://mcap.dev/spec).
+
+The index at the end of a file is not needed, so that a file whose recorder was killed reads like any other, up to the
+last whole message. Records are found by hopping from length to length; numbers are then gathered by array.
+"""
+
+import mmap
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from rhythmid.errors import InputError
+from rhythmid.record.block import Block, Topic, Wanted, by_topic, gather
+from rhythmid.record.compression import decompress
+from rhythmid.record.mcap_writer import CHANNEL, CHUNK, FOOTER, MAGIC, MESSAGE, SCHEMA
+
+_head = struct.Struct("<BQ")
+_MESSAGE_BATCH = 100_000  # messages that lie outside of chunks are handed out in blocks of at most this many
+
+
+class McapReader:
+    """One MCAP file. After `blocks` is exhausted, `topics` lists all topics, `truncated` tells whether the file breaks
+    off, and `damage` what had to be skipped."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.topics: dict[str, Topic] = {}
+        self.truncated = False
+        self.damage: list[str] = []
+        self._schemas: dict[int, tuple[str, str, str]] = {}
+        self._channels: dict[int, Topic] = {}
+        try:
+            with path.open("rb") as file:
+                if file.read(len(MAGIC)) != MAGIC:
+                    raise InputError(
+                        f"{path}: is not an MCAP file (it does not start with the MCAP magic bytes)"
+                    )
+                self._data = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+
+    def blocks(self, wanted: Wanted = lambda topic: True) -> Iterator[Block]:
+        """Messages of the wanted topics, block by block in file order."""
+        at, end = len(MAGIC), len(self._data)
+        while at < end:
+            loose, at = self._scan(self._data, at, end)
+            yield from self._split(self._data, loose, wanted)
+            if at + 9 > end or (size := _head.unpack_from(self._data, at)[1]) > end - at - 9:
+                break
+            op = self._data[at]
+            if op == FOOTER:
+                return
+            if op == 0:
+                break
+            if op == CHUNK:
+                yield from self._chunk(at + 9, at + 9 + size, wanted, whole=True)
+                at += 9 + size
+        self.truncated = True
+        if at + 9 <= end and self._data[at] == CHUNK:
+            yield from self._chunk(at + 9, end, wanted, whole=False)
+
+    def _scan(self, data: bytes | memoryview, at: int, end: int) -> tuple[list[int], int]:
+        """Offsets of message records from `at` up to a chunk, the footer, a record that breaks off, or the end."""
+        found: list[int] = []
+        unpack, add = _head.unpack_from, found.append
+        while at + 9 <= end:
+            op, size = unpack(data, at)
+            following = at + 9 + size
+            if following > end or len(found) >= _MESSAGE_BATCH and data is self._data:
+                break
+            if op == MESSAGE:
+                add(at)
+            elif op == SCHEMA:
+                self._declare_schema(bytes(data[at + 9 : following]))
+            elif op == CHANNEL:
+                self._declare_channel(bytes(data[at + 9 : following]))
+            elif op in (0, FOOTER, CHUNK):  # 0 is no record: zeros where a file system lost the tail
+                break
+            at = following
+        return found, at
+
+    def _split(self, data: bytes | memoryview, found: list[int], wanted: Wanted) -> Iterator[Block]:
+        if not found:
+            return
+        at = np.array(found, dtype=np.int64)
+        topics = {number: topic for number, topic in self._channels.items() if wanted(topic)}
+        size = gather(data, at + 1, "<i8") - 22
+        log_ns = gather(data, at + 15, "<i8")
+        yield from by_topic(topics, gather(data, at + 9, "<u2"), data, at + 31, size, log_ns)
+
+    def _chunk(self, at: int, end: int, wanted: Wanted, whole: bool) -> Iterator[Block]:
+        """Messages of the chunk whose content starts at `at`; of one that breaks off, those that are there."""
+        try:
+            size, checksum = struct.unpack_from("<QI", self._data, at + 16)
+            method, content = _text(self._data, at + 28)
+            content += 8  # length of what follows
+            plain = (
+                self._data[content:end]
+                if method == ""
+                else decompress(bytes(self._data[content:end]), method)
+            )
+            if whole and len(plain) != size:
+                raise ValueError(f"{len(plain)} bytes instead of {size}")
+            if whole and checksum and zlib.crc32(plain) != checksum:
+                raise ValueError("its checksum is wrong")
+        except (ValueError, struct.error) as error:
+            self.damage.append(f"chunk at byte {at - 9} is damaged and was skipped: {error}")
+            return
+        found, stop = self._scan(plain, 0, len(plain))
+        if whole and stop < len(plain):
+            self.damage.append(
+                f"chunk at byte {at - 9} is damaged: its last {len(plain) - stop} bytes were skipped"
+            )
+        yield from self._split(plain, found, wanted)
+
+    def _declare_schema(self, body: bytes) -> None:
+        (number,) = struct.unpack_from("<H", body)
+        name, at = _text(body, 2)
+        encoding, at = _text(body, at)
+        self._schemas[number] = name, encoding, _text(body, at)[0]
+
+    def _declare_channel(self, body: bytes) -> None:
+        number, schema = struct.unpack_from("<HH", body)
+        if number in self._channels:
+            return
+        name, at = _text(body, 4)
+        encoding, _ = _text(body, at)
+        msgtype, form, definition = self._schemas.get(schema, ("", "", ""))
+        self._channels[number] = Topic(name, msgtype, encoding, definition, form)
+        self.topics[name] = self._channels[number]
+
+
+def _text(data: bytes | memoryview, at: int) -> tuple[str, int]:
+    """A length-prefixed string at `at`, and where it ends."""
+    (size,) = struct.unpack_from("<I", data, at)
+    return bytes(data[at + 4 : at + 4 + size]).decode("utf-8", "replace"), at + 4 + size

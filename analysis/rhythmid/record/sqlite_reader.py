@@ -1,0 +1,85 @@
+"""sqlite3 storage files of rosbag2, also those whose recorder was killed in the middle of a transaction."""
+
+import shutil
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from rhythmid.errors import InputError
+from rhythmid.record.block import Block, Topic, Wanted, by_topic
+
+_ROWS = 50_000  # rows fetched at once
+
+
+class SqliteReader:
+    """One .db3 file. `truncated` tells whether its recorder was killed; `topics` lists all topics once opened.
+
+    A journal beside the file holds what sqlite needs to undo or finish the last transaction. That needs writing, so
+    file and journal are copied and the copy is opened; the recording itself is never changed.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.topics: dict[str, Topic] = {}
+        self.damage: list[str] = []
+        self._journals = [
+            journal for end in ("-journal", "-wal")
+            if (journal := path.with_name(path.name + end)).is_file() and journal.stat().st_size
+        ]  # fmt: skip
+        self.truncated = bool(self._journals)
+
+    def blocks(self, wanted: Wanted = lambda topic: True) -> Iterator[Block]:
+        """Messages of the wanted topics, block by block in the order of recording."""
+        try:
+            with self.path.open("rb") as file:
+                if file.read(15) != b"SQLite format 3":
+                    raise InputError(
+                        f"{self.path}: is not an sqlite3 bag (it does not start like an sqlite database)"
+                    )
+            if not self._journals:
+                yield from self._read(self.path, "mode=ro", wanted)
+                return
+            with TemporaryDirectory(prefix="rhythmid-") as folder:
+                for file in (self.path, *self._journals):
+                    shutil.copy(file, folder)
+                yield from self._read(Path(folder) / self.path.name, "mode=rw", wanted)
+        except sqlite3.Error as error:
+            raise InputError(f"{self.path}: is not a readable sqlite3 bag: {error}") from None
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be read: {error.strerror or error}") from None
+
+    def _read(self, path: Path, mode: str, wanted: Wanted) -> Iterator[Block]:
+        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?{mode}", uri=True)) as database:
+            numbered = _topics(database)
+            self.topics = {topic.name: topic for topic in numbered.values()}
+            chosen = {number: topic for number, topic in numbered.items() if wanted(topic)}
+            rows = database.execute(
+                f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({','.join(map(str, chosen))})"
+                " ORDER BY id"
+            )
+            while batch := rows.fetchmany(_ROWS):
+                number, log_ns, data = zip(*batch, strict=True)
+                size = np.fromiter(map(len, data), dtype=np.int64, count=len(data))
+                start = np.cumsum(size) - size
+                yield from by_topic(
+                    chosen, np.array(number), b"".join(data), start, size, np.array(log_ns, dtype=np.int64)
+                )
+
+
+def _topics(database: sqlite3.Connection) -> dict[int, Topic]:
+    tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+    if not {"topics", "messages"} <= tables:
+        raise sqlite3.DatabaseError("it has no tables 'topics' and 'messages'")
+    definitions: dict[str, tuple[str, str]] = {}
+    if "message_definitions" in tables:
+        query = "SELECT topic_type, encoded_message_definition, encoding FROM message_definitions"
+        definitions = {name: (definition, form) for name, definition, form in database.execute(query)}
+    query = "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
+    return {
+        number: Topic(name, msgtype, encoding, *definitions.get(msgtype, ("", "")))
+        for number, name, msgtype, encoding in database.execute(query)
+    }
