@@ -201,12 +201,24 @@ class Experiment:
 
     def nodes(self) -> list[NodeSpec]:
         """The graph of this experiment: excitation, two delay injectors, plant, recorder."""
-        shared = {"rate": self.time.rate, "time_mode": self.time.mode, "joint": self.joint}
+        run = {
+            "time_mode": self.time.mode,
+            "rate": self.time.rate,
+            "window": self.time.window,
+            "count": self.count,
+        }
+        streams = [topic for topic in self.record.topics if topic not in ("run", "diagnostics")]
+        sinks = ["recorder"] if streams else []  # what the credit of lockstep waits for at the end of the path
 
         def injector(name: str, source: str, target: str, delay: Delay) -> NodeSpec:
             return NodeSpec(
                 "rhythmid_nodes", "delay_injector", name,
-                {**shared, "delay": delay.constant, "profile": str(delay.profile or ""), "stamp_mode": "arrival"},
+                {
+                    "time_mode": self.time.mode,
+                    "delay": delay.constant,
+                    "profile": str(delay.profile or ""),
+                    "stamp_mode": "arrival",
+                },
                 {"input": source, "output": target},
             )  # fmt: skip
 
@@ -215,7 +227,8 @@ class Experiment:
             NodeSpec(
                 "rhythmid_nodes", "plant", "plant",
                 {
-                    **shared,
+                    **run,
+                    "joint": self.joint,
                     "model": str(self.model_path),
                     "elements": [str(folder) for folder in self.elements],
                     "forcing_amplitude": self.forcing.amplitude,
@@ -225,8 +238,8 @@ class Experiment:
                     "noise_correlation": self.noise.correlation,
                     "quantisation": self.noise.quantisation,
                     "seed": self.seed,
-                    "count": self.count,
                     "initial": [] if self.initial is None else list(self.initial),
+                    "consumers": sinks,
                 },
             ),
             injector("command_delay", "excitation", "command", self.input_delay),
@@ -234,26 +247,28 @@ class Experiment:
             NodeSpec(
                 "rhythmid_nodes", "excitation", "excitation",
                 {
-                    **shared,
+                    **run,
+                    "joint": self.joint,
                     "excitation": _json(self.excitation_spec),
                     "folder": str(self.folder),
-                    "count": self.count,
-                    "window": self.time.window,
                     "max_effort": self.safety.max_effort,
                     "ramp": self.safety.ramp,
                     "stale_after": self.safety.stale_after,
                     "envelope": [low, high],
                     "run": _json(self.description()),
+                    "subscribers": 1 + ("excitation" in self.record.topics),
+                    "consumers": ["plant", *sinks],
                 },
             ),
             NodeSpec(
                 "rhythmid_nodes", "recorder", "recorder",
                 {
-                    **shared,
+                    **run,
                     "path": str(self.record.path),
                     "storage": self.record.storage,
                     "topics": list(self.record.topics),
                 },
+                {"diagnostics": "/diagnostics"},
             ),
         ]  # fmt: skip
 

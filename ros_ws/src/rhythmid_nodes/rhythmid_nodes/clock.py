@@ -1,0 +1,103 @@
+"""Wall clock and an absolute periodic grid on it (clock_nanosleep with TIMER_ABSTIME)."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import threading
+import time
+from collections.abc import Callable
+
+from .lateness import Lateness
+
+_TIMER_ABSTIME = 1
+_SLICE_NS = 100_000_000  # a sleeping thread looks for `stop` this often
+
+
+class _Timespec(ctypes.Structure):
+    _fields_ = [("tv_sec", ctypes.c_long), ("tv_nsec", ctypes.c_long)]
+
+
+_libc = ctypes.CDLL(None, use_errno=True)
+
+
+class Clock:
+    """Nanoseconds since the Unix epoch that never step: CLOCK_MONOTONIC plus an offset taken once.
+
+    Processes of one machine that are started at different times agree but for steps of the system clock between.
+    """
+
+    def __init__(self) -> None:
+        self._offset_ns = time.time_ns() - time.monotonic_ns()
+
+    def now(self) -> int:
+        return time.monotonic_ns() + self._offset_ns
+
+    def sleep_until(self, due_ns: int) -> None:
+        """Sleep until `due_ns`; absolute, so an interrupted or late sleep does not shift the next one."""
+        seconds, nanoseconds = divmod(due_ns - self._offset_ns, 1_000_000_000)
+        wake = _Timespec(seconds, nanoseconds)
+        _libc.clock_nanosleep(time.CLOCK_MONOTONIC, _TIMER_ABSTIME, ctypes.byref(wake), None)
+
+
+class Worker:
+    """A thread that ends when asked and hands its failure to whoever watches the node."""
+
+    def __init__(self, name: str, body: Callable[[], None], priority: int = 0) -> None:
+        self.stopping = threading.Event()
+        self.failure: BaseException | None = None
+        self.priority_refused = False
+        self._body = body
+        self._priority = priority
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self, timeout: float | None = None) -> None:
+        self.stopping.set()
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
+            self._thread.join(timeout)
+
+    def _run(self) -> None:
+        if self._priority:
+            try:
+                os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(self._priority))
+            except OSError:
+                self.priority_refused = True
+        try:
+            self._body()
+        except BaseException as failure:
+            self.failure = failure
+
+
+class Grid(Worker):
+    """Calls `tick(stamp_ns)` at every multiple of `period_ns` of the clock, without drift and without skipping.
+
+    After an overrun the missed ticks follow at once, each with its own grid stamp; how late each came is in `lateness`.
+    """
+
+    def __init__(
+        self, clock: Clock, period_ns: int, tick: Callable[[int], None], lateness: Lateness, priority: int = 0
+    ) -> None:
+        super().__init__("grid", self._loop, priority)
+        self._clock, self._period_ns, self._tick, self._lateness = clock, period_ns, tick, lateness
+
+    def _loop(self) -> None:
+        due = (self._clock.now() // self._period_ns + 2) * self._period_ns
+        while not self.stopping.is_set():
+            self._clock.sleep_until(due)
+            self._lateness.add(max(0, self._clock.now() - due))
+            self._tick(due)
+            due += self._period_ns
+
+
+def sleep_in_slices(clock: Clock, due_ns: int, stopping: threading.Event) -> bool:
+    """Sleep until `due_ns`, looking for `stopping` ten times a second; False if it was asked to stop."""
+    while True:
+        now = clock.now()
+        if stopping.is_set():
+            return False
+        if now >= due_ns:
+            return True
+        clock.sleep_until(min(due_ns, now + _SLICE_NS))

@@ -1,0 +1,161 @@
+"""delay_injector: passes messages on after a delay, constant or following a profile, without looking into them.
+
+Topics `input` and `output` are to be remapped. The order is kept: nothing overtakes, whatever the delay does.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter as RosParameter
+from std_msgs.msg import String
+
+from rhythmid.errors import InputError
+from rhythmid.experiment import Delay
+
+from .clock import Clock, Worker, sleep_in_slices
+from .joint_state import restamped, stamp_of
+from .lateness import Lateness
+from .node import PRIORITY, TIME_MODE, GraphNode, run
+from .parameters import Parameter
+from .qos import AdaptiveSubscription, latched, message_type, stream
+
+DELAY = Parameter("delay", 0.0, "time by which every message is held back", "s", (0.0, 10.0), settable=True)
+PARAMETERS = (
+    TIME_MODE,
+    PRIORITY,
+    DELAY,
+    Parameter("profile", "", "CSV file of seconds since start and delay [s] that replaces `delay`; empty: none"),
+    Parameter(
+        "stamp_mode", "arrival", "header stamp on release: the time of release, or the original one",
+        choices=("arrival", "keep"),
+    ),
+    Parameter(
+        "delay_from", "header", "realtime: what the delay counts from; receive for a sender with another clock",
+        choices=("header", "receive"),
+    ),
+    Parameter("type", "sensor_msgs/msg/JointState", "message type; its first field is a std_msgs/Header"),
+    Parameter("queue_size", 100_000, "messages held back at most; more are dropped and counted", bounds=(1, 10**7)),
+)  # fmt: skip
+
+
+class DelayInjector(GraphNode):
+    """Holds messages back; in lockstep it adds exactly the delay to the stamp and passes them on at once."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("delay_injector", PARAMETERS, **options)
+        values = self.values
+        if self.lockstep and values["stamp_mode"] == "keep":
+            raise InputError(
+                "parameter stamp_mode = 'keep': in lockstep the stamp is the only clock; use 'arrival'"
+            )
+        self._type = message_type(values["type"])
+        first = next(iter(self._type.get_fields_and_field_types().values()))
+        if first != "std_msgs/Header":
+            raise InputError(f"parameter type = {values['type']!r} has no header as its first field")
+        self._profile = Delay(profile=Path(values["profile"])).table() if values["profile"] else None
+        self._delay_ns = round(values["delay"] * 1e9)
+        self._start_ns: int | None = 0 if self.lockstep else None
+        self._last_ns = -1
+        self._relayed = self._dropped = 0
+        self._applied_ns = 0
+        self._error = Lateness()
+        self._clock = Clock()
+        self._queue: deque[tuple[int, int, bytes]] = deque()
+        self._arrived = threading.Event()
+        self._output = self.create_publisher(self._type, "output", stream(self.lockstep))
+        self._input = AdaptiveSubscription(
+            self, "input", self._on_lockstep if self.lockstep else self._on_realtime
+        )
+        if self._profile is not None and not self.lockstep:
+            self.create_subscription(String, "run", self._on_run, latched())
+        self.add_on_set_parameters_callback(self._on_set)
+        if not self.lockstep:
+            self._relay = Worker("relay", self._release_due, values["priority"])
+            self.workers.append(self._relay)
+
+    def figures(self) -> dict[str, str]:
+        applied = self._applied_ns / self._relayed * 1e-6 if self._relayed else 0.0
+        return {
+            "relayed": str(self._relayed),
+            "dropped": str(self._dropped),
+            "queued": str(len(self._queue)),
+            "delay_ms": f"{self._delay_ns * 1e-6:.6f}" if self._profile is None else "profile",
+            "applied_delay_mean_ms": f"{applied:.6f}",
+            **self._error.summary("delay_error"),
+        }
+
+    def obstacles(self) -> list[str]:
+        found = [] if self._input.matched else [f"no publisher of {self._input.topic}"]
+        return (
+            found
+            if self._output.get_subscription_count()
+            else [*found, f"no subscriber of {self._output.topic}"]
+        )
+
+    def _on_set(self, parameters: list[RosParameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name == DELAY.name:
+                if self._profile is not None:
+                    return SetParametersResult(successful=False, reason="the delay follows a profile")
+                before, self._delay_ns = self._delay_ns, round(float(parameter.value or 0.0) * 1e9)
+                self.get_logger().info(f"delay {before * 1e-9:g} s -> {self._delay_ns * 1e-9:g} s")
+        return SetParametersResult(successful=True)
+
+    def _on_run(self, message: String) -> None:
+        self._start_ns = json.loads(message.data).get("start_ns", self._start_ns)
+
+    def _delay_at(self, stamp_ns: int) -> int:
+        """Delay [ns] of a message stamped then; before the run starts the profile's first value."""
+        if self._profile is None:
+            return self._delay_ns
+        since = 0 if self._start_ns is None else stamp_ns - self._start_ns
+        return int(np.rint(np.interp(since * 1e-9, *self._profile) * 1e9))
+
+    def _on_lockstep(self, data: bytes) -> None:
+        stamp_ns = stamp_of(data)
+        self._last_ns = max(stamp_ns + self._delay_at(stamp_ns), self._last_ns + 1)
+        self._relayed += 1
+        self._applied_ns += self._last_ns - stamp_ns
+        self._output.publish(restamped(data, self._last_ns))
+
+    def _on_realtime(self, data: bytes) -> None:
+        origin_ns = stamp_of(data) if self.values["delay_from"] == "header" else self._clock.now()
+        if len(self._queue) >= self.values["queue_size"]:
+            self._dropped += 1
+            return
+        self._last_ns = max(origin_ns + self._delay_at(origin_ns), self._last_ns + 1)
+        self._queue.append((self._last_ns, origin_ns, data))
+        self._arrived.set()
+
+    def _release_due(self) -> None:
+        keep = self.values["stamp_mode"] == "keep"
+        stopping = self._relay.stopping
+        while not stopping.is_set():
+            if not self._queue:
+                self._arrived.wait(0.1)
+                self._arrived.clear()
+                continue
+            due_ns, origin_ns, data = self._queue[0]
+            if not sleep_in_slices(self._clock, due_ns, stopping):
+                return
+            self._queue.popleft()
+            released_ns = self._clock.now()
+            self._output.publish(data if keep else restamped(data, released_ns))
+            self._relayed += 1
+            self._applied_ns += released_ns - origin_ns
+            self._error.add(max(0, released_ns - due_ns))
+
+
+def main() -> None:
+    run(DelayInjector)
+
+
+if __name__ == "__main__":
+    main()

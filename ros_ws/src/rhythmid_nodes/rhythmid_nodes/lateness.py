@@ -1,0 +1,45 @@
+"""How late things happen against their due time: counts, mean, 99th percentile, maximum in constant memory."""
+
+from __future__ import annotations
+
+_BIN_NS = 10_000
+_BINS = 10_000
+
+
+class Lateness:
+    """A histogram of delays past a due time, 10 us bins up to 100 ms; mean and maximum are exact."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.max_ns = 0
+        self._sum_ns = 0
+        self._bins = [0] * (_BINS + 1)
+
+    def add(self, late_ns: int) -> None:
+        """Count one event that came `late_ns` >= 0 after it was due."""
+        self.count += 1
+        self._sum_ns += late_ns
+        if late_ns > self.max_ns:
+            self.max_ns = late_ns
+        self._bins[min(late_ns // _BIN_NS, _BINS)] += 1
+
+    @property
+    def mean_ns(self) -> float:
+        return self._sum_ns / self.count if self.count else 0.0
+
+    def percentile_ns(self, percent: float) -> int:
+        """Upper edge of the bin that holds the percentile, never above the maximum."""
+        wanted, seen = self.count * percent / 100.0, 0
+        for index, number in enumerate(self._bins):
+            seen += number
+            if seen >= wanted and seen:
+                return min((index + 1) * _BIN_NS, self.max_ns)
+        return self.max_ns
+
+    def summary(self, name: str) -> dict[str, str]:
+        """Diagnostic values `<name>_mean|p99|max` in milliseconds."""
+        return {
+            f"{name}_mean_ms": f"{self.mean_ns * 1e-6:.4f}",
+            f"{name}_p99_ms": f"{self.percentile_ns(99.0) * 1e-6:.4f}",
+            f"{name}_max_ms": f"{self.max_ns * 1e-6:.4f}",
+        }

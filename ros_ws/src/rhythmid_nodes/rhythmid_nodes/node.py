@@ -1,0 +1,142 @@
+"""What every node of the graph has: declared parameters, diagnostics, workers, and a way to be run and ended."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import rclpy
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
+
+from rhythmid.errors import InputError
+
+from .clock import Worker
+from .diagnostics import Diagnostics
+from .parameters import Parameter, declare
+
+_PR_SET_PDEATHSIG = 1
+
+RATE = Parameter("rate", 1000, "samples per second of the common grid", "Hz", (1, 100_000))
+TIME_MODE = Parameter(
+    "time_mode", "realtime", "clock of the graph: the machine's, or simulated time driven by the data",
+    choices=("realtime", "lockstep"),
+)  # fmt: skip
+JOINT = Parameter("joint", "leg", "joint that the messages speak of")
+WINDOW = Parameter("window", 100, "lockstep: samples in flight at most", "samples", (1, 100))
+COUNT = Parameter("count", 0, "samples of the whole run; 0: no end (realtime only)", "samples", (0, 2**31))
+PRIORITY = Parameter(
+    "priority",
+    0,
+    "SCHED_FIFO priority of the clock thread; 0: none; needs the right to set it",
+    bounds=(0, 99),
+)
+
+
+class GraphNode(Node):
+    """A node with `values` (its parameters by name), /diagnostics, and workers that end with it."""
+
+    def __init__(self, name: str, parameters: tuple[Parameter, ...], **options: Any) -> None:
+        super().__init__(name, **options)
+        self.values = declare(self, parameters)
+        self.lockstep = self.values["time_mode"] == "lockstep"
+        self.workers: list[Worker] = []
+        self.done = False  # set by a node whose work ends by itself; the process then ends
+        self.diagnostics = Diagnostics(self, self.figures, self.obstacles)
+
+    @property
+    def period_ns(self) -> int:
+        """Period of the common grid, for nodes that have the parameter `rate`."""
+        return round(1e9 / self.values["rate"])
+
+    def figures(self) -> dict[str, str]:
+        """Key-value pairs for /diagnostics."""
+        return {}
+
+    def obstacles(self) -> list[str]:
+        """What keeps the node from its work; empty when it is ready."""
+        return []
+
+    def begin(self) -> None:
+        """Start the workers, once every node of the process stands."""
+        for worker in self.workers:
+            worker.start()
+
+    @property
+    def failure(self) -> BaseException | None:
+        """Why a worker died, if one did."""
+        return next((worker.failure for worker in self.workers if worker.failure is not None), None)
+
+    def close(self) -> None:
+        """End the workers and say the last figures; the context is still valid."""
+        for worker in self.workers:
+            worker.stop(timeout=5.0)
+        self.diagnostics.publish_last()
+
+
+def _end_with_supervisor() -> None:
+    """Let the kernel send SIGINT when the supervising process dies, however it dies."""
+    supervisor = os.environ.get("RHYTHMID_SUPERVISOR")
+    if supervisor is not None:
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGINT)
+        if os.getppid() != int(supervisor):
+            sys.exit(1)
+
+
+def serve(build: Sequence[Callable[[], GraphNode]], arguments: list[str]) -> int:
+    """Run the nodes in this process on one EventsExecutor until SIGINT, SIGTERM or a failure; the exit code.
+
+    0: asked to stop; 2: a parameter or other input was refused, told in one line; 1: a failure of ours.
+    """
+    asked: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda received, _frame: asked.append(received))
+    _end_with_supervisor()
+    sys.setswitchinterval(2e-4)  # a waiting clock thread gets the interpreter within 0.2 ms
+    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    nodes: list[GraphNode] = []
+    code = 0
+    try:
+        nodes.extend(make() for make in build)
+        executor = EventsExecutor()
+        for node in nodes:
+            executor.add_node(node)
+        gc.collect()
+        gc.freeze()  # later collections look at young objects only, which takes microseconds
+        for node in nodes:
+            node.begin()
+        while not asked and not any(node.done for node in nodes):
+            executor.spin_once(timeout_sec=0.1)  # EventsExecutor.spin() never returns on a signal
+            for node in nodes:
+                if node.failure is not None:
+                    raise node.failure
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        code = 2
+    except Exception:
+        traceback.print_exc()
+        code = 1
+    finally:
+        for node in nodes:
+            try:
+                node.close()
+            except Exception:
+                traceback.print_exc()
+                code = code or 1
+        for node in nodes:
+            node.destroy_node()
+        try_shutdown()
+    return code
+
+
+def run(build: Callable[[], GraphNode]) -> None:
+    """Entry point of a process that holds one node."""
+    sys.exit(serve([build], sys.argv))

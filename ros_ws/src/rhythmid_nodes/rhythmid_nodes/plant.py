@@ -1,0 +1,183 @@
+"""plant: the machine. Takes `command`, publishes `plant/joint_states` and `forcing`; the physics is rhythmid's."""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+from sensor_msgs.msg import JointState
+
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.errors import InputError
+from rhythmid.experiment import Forcing, Noise, plant_model
+from rhythmid.model import Model
+from rhythmid.plant import Plant
+
+from .clock import Clock, Grid
+from .joint_state import JointStateReader, JointStateWriter
+from .lateness import Lateness
+from .lockstep import Acknowledger, Credit, block
+from .node import COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
+from .parameters import Parameter
+from .qos import stream
+
+_LARGE = 1e12
+PARAMETERS = (
+    RATE,
+    TIME_MODE,
+    JOINT,
+    WINDOW,
+    COUNT,
+    PRIORITY,
+    Parameter("model", "", "model YAML file of the machine"),
+    Parameter("elements", None, "folders with further elements that the model names", items=str),
+    Parameter("forcing_amplitude", 1.0, "periodic forcing made on the machine; 0: none", "N", (-_LARGE, _LARGE)),
+    Parameter("forcing_frequency", 1.0, "frequency of the forcing", "Hz", (1e-6, 1e6)),
+    Parameter("forcing_phase", 0.0, "phase of the forcing", "rad", (-_LARGE, _LARGE)),
+    Parameter("noise_std", 0.0, "measurement noise", "m", (0.0, _LARGE)),
+    Parameter("noise_correlation", 0.0, "correlation of the noise from sample to sample", "", (0.0, 0.9999)),
+    Parameter("quantisation", 0.0, "rounding step of the sensor; 0: none", "m", (0.0, _LARGE)),
+    Parameter("seed", 0, "seed of the noise", "", (0, 2**31)),
+    Parameter(
+        "initial", None, "position [m] and velocity [m/s] at the start; not given: on the limit cycle", items=float
+    ),
+    Parameter("consumers", None, "lockstep: nodes whose announcements the plant waits for", items=str),
+)  # fmt: skip
+
+
+class PlantNode(GraphNode):
+    """A thin shell: messages in and out, clock or lockstep; `rhythmid.plant.Plant` does the rest."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("plant", PARAMETERS, **options)
+        self._plant = self._build()
+        self._reader = JointStateReader(self.values["joint"])
+        self._state_writer = JointStateWriter(self.values["joint"], "position", "velocity", "effort")
+        self._forcing_writer = JointStateWriter(self.values["joint"], "effort")
+        profile = stream(self.lockstep)
+        self._states = self.create_publisher(JointState, "plant/joint_states", profile)
+        self._forcing = self.create_publisher(JointState, "forcing", profile)
+        self._command_topic = self.resolve_topic_name("command")
+        self._commands = self._late = self._foreign = self._samples = 0
+        self._lateness = Lateness()
+        self._newest_ns = -1
+        if self.lockstep:
+            self._block = block(self.values["window"])
+            self._count = self.values["count"]
+            if self._count == 0:
+                raise InputError("parameter count = 0: in lockstep the number of samples must be known")
+            self._ack = Acknowledger(self, self.values["window"], self.period_ns, self._count)
+            self._credit = Credit(
+                self, self.values["consumers"] or (), self.values["window"], self.period_ns, self._advance_lockstep
+            )
+            self.create_subscription(JointState, "command", self._on_lockstep, profile, raw=True)
+        else:
+            self._clock = Clock()
+            self._origin_ns: int | None = None
+            self._done_ns = 0  # time since the origin up to which the plant has been integrated
+            self._arrived: deque[tuple[int, int, float]] = deque()
+            self.create_subscription(JointState, "command", self._on_realtime, profile, raw=True)
+            grid = Grid(self._clock, self.period_ns, self._tick, self._lateness, self.values["priority"])
+            self.workers.append(grid)
+
+    def _build(self) -> Plant:
+        values = self.values
+        if not values["model"]:
+            raise InputError("parameter model is missing: name a model YAML file")
+        initial = values["initial"]
+        if initial is not None and len(initial) != 2:
+            raise InputError(f"parameter initial = {initial}: position [m] and velocity [m/s] are expected")
+        catalogue = load_catalogue(tuple(Path(folder) for folder in values["elements"] or ()))
+        model = Model.load(values["model"], catalogue)
+        if model.term("periodic_forcing") is not None:
+            model = model.without("periodic_forcing")
+        forcing = Forcing(values["forcing_amplitude"], values["forcing_frequency"], values["forcing_phase"])
+        noise = Noise(values["noise_std"], values["noise_correlation"], values["quantisation"])
+        complete = plant_model(model, forcing, noise, catalogue)
+
+        def plant() -> Plant:
+            return Plant(complete, self.period_ns, values["seed"], tuple(initial) if initial else None)
+
+        plant().advance(2 * self.period_ns)  # compiles now what would otherwise be compiled in the first tick
+        return plant()
+
+    def figures(self) -> dict[str, str]:
+        return {
+            "samples": str(self._samples),
+            "commands": str(self._commands),
+            "late_commands": str(self._late),
+            "foreign_commands": str(self._foreign),
+            **self._lateness.summary("lateness"),
+        }
+
+    def obstacles(self) -> list[str]:
+        found = []
+        if self.count_publishers(self._command_topic) == 0:
+            found.append(f"no publisher of {self._command_topic}")
+        if self._states.get_subscription_count() == 0:
+            found.append(f"no subscriber of {self._states.topic}")
+        return found
+
+    def _publish(self, until_ns: int, origin_ns: int) -> None:
+        samples = self._plant.advance(until_ns)
+        rows = zip(
+            samples.stamp_ns.tolist(), samples.position.tolist(), samples.velocity.tolist(),
+            samples.effort.tolist(), samples.forcing.tolist(), strict=True,
+        )  # fmt: skip
+        for stamp_ns, position, velocity, effort, forcing in rows:
+            stamp_ns += origin_ns
+            self._states.publish(self._state_writer.write(stamp_ns, position, velocity, effort))
+            self._forcing.publish(self._forcing_writer.write(stamp_ns, forcing))
+            self._samples += 1
+
+    # Lockstep: a command stamped s tells that every command up to s is known, so the plant may go on to s.
+
+    def _on_lockstep(self, data: bytes) -> None:
+        sample = self._reader.read(data)
+        if sample is None:
+            raise InputError(f"a command does not name the joint {self.values['joint']!r}")
+        self._plant.push(sample.stamp_ns, sample.effort)
+        self._newest_ns = sample.stamp_ns
+        self._commands += 1
+        self._ack.taken(self._commands)
+        if self._commands % self._block == 0 or self._commands >= self._count:
+            self._advance_lockstep()
+
+    def _advance_lockstep(self) -> None:
+        last = min(self._credit.limit, self._count) - 1
+        until_ns = min(self._newest_ns, last * self.period_ns)
+        if until_ns >= 0:
+            self._publish(until_ns, origin_ns=0)
+
+    # Real time: a command acts from its stamp on, which is when it was released, even between two ticks; one that
+    # comes after the plant has passed its stamp acts at once and is counted as late.
+
+    def _on_realtime(self, data: bytes) -> None:
+        sample = self._reader.read(data)
+        if sample is None:
+            self._foreign += 1
+            return
+        self._arrived.append((sample.stamp_ns, self._clock.now(), sample.effort))
+
+    def _tick(self, stamp_ns: int) -> None:
+        if self._origin_ns is None:
+            self._origin_ns = stamp_ns
+        while self._arrived:
+            released_ns, received_ns, effort = self._arrived.popleft()
+            act_ns = min(released_ns, received_ns) - self._origin_ns  # a foreign clock may be ahead of ours
+            self._late += act_ns < self._done_ns
+            act_ns = max(act_ns, self._done_ns, self._newest_ns + 1)
+            self._plant.push(act_ns, effort)
+            self._newest_ns = act_ns
+            self._commands += 1
+        self._done_ns = stamp_ns - self._origin_ns
+        self._publish(self._done_ns, self._origin_ns)
+
+
+def main() -> None:
+    run(PlantNode)
+
+
+if __name__ == "__main__":
+    main()

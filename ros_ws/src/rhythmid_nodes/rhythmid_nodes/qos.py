@@ -1,0 +1,103 @@
+"""Quality of service: reliable between our own nodes, adapted to whatever a robot offers on its topics."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Sequence
+
+from rclpy.event_handler import QoSMessageLostInfo, SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from rhythmid.errors import InputError
+
+WINDOW_MAX = 100
+"""Largest credit window: more messages in flight than this overflow the transport's queues."""
+
+_DISCOVERY_PERIOD = 0.05
+
+
+def stream(lockstep: bool) -> QoSProfile:
+    """A stream of samples. In lockstep late joiners get what is still in flight, so that nothing can be lost."""
+    durability = DurabilityPolicy.TRANSIENT_LOCAL if lockstep else DurabilityPolicy.VOLATILE
+    return QoSProfile(
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=durability,
+        history=HistoryPolicy.KEEP_LAST,
+        depth=WINDOW_MAX if lockstep else 1000,
+    )
+
+
+def latched(depth: int = 10) -> QoSProfile:
+    """State that late joiners must see: reliable, transient local."""
+    return QoSProfile(
+        reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL, depth=depth
+    )
+
+
+def adapted(publishers: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
+    """The strongest subscription that matches all `publishers` (rosbag2's rule)."""
+    profiles = [publisher.qos_profile for publisher in publishers]
+    reliable = all(profile.reliability == ReliabilityPolicy.RELIABLE for profile in profiles)
+    latching = all(profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for profile in profiles)
+    return QoSProfile(
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latching else DurabilityPolicy.VOLATILE,
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+    )
+
+
+def message_type(name: str) -> type:
+    """The Python class of a ROS message type such as `sensor_msgs/msg/JointState`."""
+    try:
+        package, folder, message = name.split("/")
+        return getattr(importlib.import_module(f"{package}.{folder}"), message)
+    except (ValueError, ImportError, AttributeError):
+        raise InputError(
+            f"message type {name} is not installed here; install its package or leave the topic out"
+        ) from None
+
+
+class AdaptiveSubscription:
+    """A raw subscription made as soon as a publisher shows its type and quality of service.
+
+    `found(type_name, publishers)` is called once, before the first message. `lost` counts the messages that the
+    transport says it could not deliver.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        topic: str,
+        callback: Callable[[bytes], None],
+        found: Callable[[str, Sequence[TopicEndpointInfo]], None] | None = None,
+        depth: int = 2000,
+    ) -> None:
+        self.topic = node.resolve_topic_name(topic)
+        self.subscription: Subscription | None = None
+        self.lost = 0
+        self._node, self._callback, self._found, self._depth = node, callback, found, depth
+        self._timer = node.create_timer(_DISCOVERY_PERIOD, self._look)
+
+    @property
+    def matched(self) -> bool:
+        return self.subscription is not None and self._node.count_publishers(self.topic) > 0
+
+    def _look(self) -> None:
+        publishers = self._node.get_publishers_info_by_topic(self.topic)
+        if not publishers:
+            return
+        self._timer.cancel()
+        type_name = publishers[0].topic_type
+        if self._found is not None:
+            self._found(type_name, publishers)
+        self.subscription = self._node.create_subscription(
+            message_type(type_name), self.topic, self._callback, adapted(publishers, self._depth), raw=True,
+            event_callbacks=SubscriptionEventCallbacks(message_lost=self._on_lost),
+        )  # fmt: skip
+
+    def _on_lost(self, event: QoSMessageLostInfo) -> None:
+        self.lost = event.total_count
