@@ -1,0 +1,53 @@
+# Everything runs in .venv, made from the locked requirements. `make help` says what there is.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+DEMO   := out/demo
+
+PACKAGES := analysis $(patsubst %/setup.py,%,$(wildcard ros_ws/src/*/setup.py))
+METADATA := $(wildcard $(foreach package,$(PACKAGES),$(addprefix $(package)/,*.py *.cfg *.toml *.xml launch/* config/* layouts/*)))
+
+.DEFAULT_GOAL := help
+.PHONY: help install test lint format demo picture benchmark docker lock clean
+
+help: ## Show this list
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
+
+install: $(VENV)/.packages ## Create .venv with the locked requirements and all packages (PYTHON=python3.12 to choose)
+
+$(VENV)/.requirements: requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' 2>/dev/null || \
+		{ echo "error: rhythmid needs Python 3.11 or 3.12, and $(PYTHON) is not one; try: make $(or $(MAKECMDGOALS),install) PYTHON=python3.12" >&2; exit 2; }
+	$(PYTHON) -m venv --clear $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements.lock
+	@touch $@
+
+$(VENV)/.packages: $(VENV)/.requirements $(METADATA)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation \
+		$(foreach package,$(PACKAGES),--editable ./$(package))
+	@# an editable install leaves out what ROS looks for in share/
+	@for package in $(PACKAGES); do \
+		(cd $$package && $(CURDIR)/$(BIN)/python -W ignore setup.py --quiet install_data --install-dir $(CURDIR)/$(VENV)) || exit 1; \
+	done
+	@touch $@
+
+test: lint ## Run the linters and all tests, fast ones first
+	$(BIN)/python -m pytest
+
+lint: install ## Run ruff and pyright
+	$(BIN)/ruff check .
+	$(BIN)/pyright --pythonpath $(BIN)/python
+
+format: install ## Format the code
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+lock: install ## Resolve the requirements anew into requirements.lock
+	$(BIN)/python -m pip install --quiet uv
+	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.11 \
+		--custom-compile-command "make lock" --output-file requirements.lock \
+		analysis/pyproject.toml --group pyproject.toml:ros --group pyproject.toml:test
+
+clean: ## Remove what was built, not what was recorded
+	rm -rf $(VENV) build install log .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -o -name '*.egg-info' | xargs rm -rf
