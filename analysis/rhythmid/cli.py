@@ -1,14 +1,16 @@
 """The command `rhythmid`. Exit codes: 0 an answer was reached, 2 bad usage or bad input, 1 a failure of ours."""
 
 import json
+import math
 import os
 import sys
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated, Any, Optional
+from typing import Annotated, Any, NoReturn
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 
 from rhythmid import __version__
 from rhythmid.errors import InputError
@@ -24,11 +26,11 @@ COMMAND_GROUP = "rhythmid.commands"
 console = Console(stderr=True)
 
 Bags = Annotated[list[Path], typer.Argument(help="Bag directories, .mcap/.db3 files, or signals.yaml files of tables.")]
-SignalsFile = Annotated[Optional[Path], typer.Option("--signals", help="Which recorded channel is what.")]
-JsonFile = Annotated[Optional[Path], typer.Option("--json", help="Write the result as JSON.")]
-ReportFile = Annotated[Optional[Path], typer.Option("--report", help="Write a self-contained HTML page.")]
+SignalsFile = Annotated[Path | None, typer.Option("--signals", help="Which recorded channel is what.")]
+JsonFile = Annotated[Path | None, typer.Option("--json", help="Write the result as JSON.")]
+ReportFile = Annotated[Path | None, typer.Option("--report", help="Write a self-contained HTML page.")]
 Elements = Annotated[
-    Optional[list[Path]], typer.Option("--elements", help="Folder with elements of your own; may be repeated.")
+    list[Path] | None, typer.Option("--elements", help="Folder with elements of your own; may be repeated.")
 ]
 
 
@@ -82,7 +84,7 @@ def _finite(value: Any) -> Any:
         return [_finite(item) for item in value]
     if hasattr(value, "tolist"):
         return _finite(value.tolist())
-    if isinstance(value, float) and (value != value or value in (float("inf"), float("-inf"))):
+    if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
 
@@ -125,23 +127,24 @@ def main() -> None:
     for entry in entry_points(group=COMMAND_GROUP):
         entry.load()(app)
     try:
-        app(standalone_mode=False)
+        code = app(standalone_mode=False)
     except InputError as error:
-        console.print(f"[bold red]error:[/] {error}", highlight=False, soft_wrap=True, markup=True)
-        sys.exit(2)
-    except typer.Exit as done:
-        sys.exit(done.exit_code)
-    except typer.Abort:
-        sys.exit(130)
-    except KeyboardInterrupt:
+        _refuse(str(error))
+    except (typer.Abort, KeyboardInterrupt):
         sys.exit(130)
     except Exception as error:
-        import click
+        describe = getattr(error, "format_message", None)  # bad usage, found by the parser
+        if describe is None:
+            raise
+        _refuse(describe())
+    else:
+        sys.exit(code if isinstance(code, int) else 0)
 
-        if isinstance(error, click.ClickException):
-            error.show()
-            sys.exit(2)
-        raise
+
+def _refuse(problem: str) -> NoReturn:
+    if problem:  # there is none when the command is called with nothing and shows its help
+        console.print("[bold red]error:[/]", escape(" ".join(problem.split())), highlight=False, soft_wrap=True)
+    sys.exit(2)
 
 
 if __name__ == "__main__":

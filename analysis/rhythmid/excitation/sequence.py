@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, TypeAdapter, ValidationError
@@ -44,7 +44,7 @@ class Sequence(Excitation):
 
 
 AnyExcitation = Annotated[
-    Union[Chirp, Multisine, Profile, Samples, Silence, Sequence], Field(discriminator="type")
+    Chirp | Multisine | Profile | Samples | Silence | Sequence, Field(discriminator="type")
 ]
 Sequence.model_rebuild()
 _ADAPTER: TypeAdapter[Excitation] = TypeAdapter(AnyExcitation)
