@@ -1,0 +1,80 @@
+"""Colour of the noise: an autoregressive model of residuals, and the filter that whitens them.
+
+P. Stoica, R. Moses, Spectral Analysis of Signals, 2005, section 3.4 (Levinson-Durbin recursion). Coloured noise that is
+taken for white makes every test shout; whitening makes least squares the maximum-likelihood estimate again.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """n_k = Σ_i a_i n_{k−i} + e_k with `coefficients` a (p,) and innovations e of standard deviation `std`."""
+
+    coefficients: Array
+    std: float
+
+    @property
+    def order(self) -> int:
+        return len(self.coefficients)
+
+    @property
+    def variance(self) -> float:
+        """Variance of the noise itself."""
+        if self.order == 0:
+            return self.std**2
+        response = 1.0 - np.fft.rfft(np.concatenate([[0.0], self.coefficients]), 4096)
+        return float(self.std**2 * np.mean(1.0 / np.abs(response) ** 2))
+
+    @property
+    def long_run_variance(self) -> float:
+        """Spectral density at zero frequency: what slow averages of the noise scatter with."""
+        return float(self.std**2 / (1.0 - self.coefficients.sum()) ** 2)
+
+    def whiten(self, samples: Array) -> Array:
+        """Innovations in units of their standard deviation; (n,) or (n, q) -> (n − p, …)."""
+        p = self.order
+        white = samples[p:].copy()
+        for lag, coefficient in enumerate(self.coefficients, start=1):
+            white -= coefficient * samples[p - lag : len(samples) - lag]
+        return white / self.std
+
+
+def runs(used: NDArray[np.bool_]) -> list[slice]:
+    """Unbroken stretches of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], used.astype(np.int8), [0]])))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2])]
+
+
+def estimate_noise(residuals: Sequence[Array], highest: int = 24, floor: float = 1e-300) -> NoiseModel:
+    """Autoregressive model of residual stretches (n_i,), its order chosen by the Bayesian information criterion."""
+    stretches = [r for r in residuals if len(r) > 8]
+    total = sum(len(r) for r in stretches)
+    if total == 0:
+        return NoiseModel(np.empty(0), max(floor, 1e-300))
+    highest = int(min(highest, total // 20, min(len(r) for r in stretches) // 2))
+    covariance = np.zeros(highest + 1)
+    for r in stretches:
+        for lag in range(highest + 1):
+            covariance[lag] += float(r[lag:] @ r[: len(r) - lag])
+    covariance /= total
+    if covariance[0] <= floor**2:
+        return NoiseModel(np.empty(0), max(floor, 1e-300))
+    best, best_score = NoiseModel(np.empty(0), float(np.sqrt(covariance[0]))), np.log(covariance[0])
+    a, error = np.empty(0), covariance[0]
+    for order in range(1, highest + 1):
+        reflection = (covariance[order] - a @ covariance[order - 1 : 0 : -1][: order - 1]) / error
+        a = np.concatenate([a - reflection * a[::-1], [reflection]])
+        error *= 1.0 - reflection**2
+        if error <= 0.0:
+            break
+        score = np.log(error) + order * np.log(total) / total
+        if score < best_score:
+            best, best_score = NoiseModel(a.copy(), float(np.sqrt(error))), score
+    return best

@@ -1,0 +1,182 @@
+"""Records made ready for the time domain: continuous inputs, measured samples, and which of them count.
+
+Samples are compared in block averages: far above the machine's dynamics there is nothing to learn, and averaging the
+simulation in the same way keeps the comparison unbiased.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PPoly
+
+from rhythmid.compiled import InputKind
+from rhythmid.elements.element import Scales
+from rhythmid.errors import InputError
+from rhythmid.model import Model
+try:
+    from rhythmid.record.record import Record
+except ImportError:
+    Record = object
+from rhythmid.signal import continuous, spline
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Series:
+    """One record's measurement with its inputs as functions of time.
+
+    `time` (n,) [s] and `value` (n,) are the stamps and samples of the measurement; `block` samples are averaged into
+    one; `used` (n // block,) marks the averages that the fit may see; `period` [s] is the usual sample period.
+    """
+
+    name: str
+    time: Array
+    value: Array
+    command: PPoly | None
+    forcing: PPoly | None
+    block: int
+    used: Mask
+    period: float
+    kind: InputKind = "force"
+
+    @property
+    def blocks(self) -> int:
+        """Number of block averages."""
+        return len(self.time) // self.block
+
+    def average(self, samples: Array) -> Array:
+        """Block averages of samples (n,) or (n, q), shape (n // block, …)."""
+        kept = samples[: self.blocks * self.block]
+        return kept.reshape(self.blocks, self.block, *samples.shape[1:]).mean(axis=1)
+
+    @property
+    def averaged(self) -> Array:
+        """Block averages of the measurement."""
+        return self.average(self.value)
+
+    @property
+    def averaged_time(self) -> Array:
+        """Block averages of the stamps [s]."""
+        return self.average(self.time)
+
+
+def bandwidth(value: Array, period: float, share: float = 0.9999) -> float:
+    """Frequency [Hz] below which `share` of the motion's power lies (its mean and trend left out)."""
+    n = len(value)
+    detrended = value - np.linspace(value[: max(1, n // 50)].mean(), value[-max(1, n // 50) :].mean(), n)
+    power = np.abs(np.fft.rfft(detrended * np.hanning(n))) ** 2
+    floor = np.median(power[len(power) // 2 :])  # measurement noise, as the upper half of the band shows it
+    power = np.maximum(power - 4.0 * floor, 0.0)
+    total = np.cumsum(power)
+    if total[-1] <= 0.0:
+        return 0.5 / period
+    return float(np.searchsorted(total, share * total[-1]) / (n * period))
+
+
+def block_length(value: Array, period: float) -> int:
+    """Samples to average: as many as still leave sixteen averages in the fastest period that carries power."""
+    return int(np.clip(np.floor(1.0 / (16.0 * bandwidth(value, period) * period)), 1, 10))
+
+
+def _spline_of(time: Array, value: Array) -> PPoly:
+    keep = np.concatenate([[True], np.diff(time) > 0])
+    return spline(time[keep], value[keep])
+
+
+def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]:
+    """Series of all records. With `block` None the averaging is chosen from the records' bandwidth.
+
+    Raises InputError for a record too short to say anything.
+    """
+    made: list[Series] = []
+    for record in records:
+        time, value = record.output.time, record.output.value
+        if len(time) < 16:
+            raise InputError(f"{record.name}: has only {len(time)} samples of the output; at least 16 are needed")
+        period = float(np.median(np.diff(time)))
+        command = None
+        if record.input is not None and len(record.input.time) > 1:
+            if record.input_kind == "base_displacement" and record.hold == "zero":
+                command = _spline_of(record.input.time, record.input.value)
+            else:
+                command = continuous(record.input.time, record.input.value, record.hold)
+        forcing = None
+        if record.forcing is not None and np.any(record.forcing.value != 0.0):
+            forcing = _spline_of(record.forcing.time, record.forcing.value)
+        made.append(
+            Series(record.name, time, value, command, forcing, 1, np.ones(len(time), bool), period, record.input_kind)
+        )
+    if block is None:
+        block = min(block_length(s.value, s.period) for s in made)
+    return [replace(s, block=block, used=np.ones(len(s.time) // block, bool)) for s in made]
+
+
+def split(series: Series, length: float) -> list[Series]:
+    """Cut a series into windows of about `length` [s], each of which gets a start of its own (multiple shooting)."""
+    size = max(8 * series.block, round(length / series.period / series.block) * series.block)
+    parts: list[Series] = []
+    for first in range(0, len(series.time) - 4 * series.block, size):
+        window = slice(first, min(first + size, len(series.time)))
+        used = series.used[first // series.block : first // series.block + (window.stop - first) // series.block]
+        parts.append(
+            replace(series, name=f"{series.name}@{series.time[first]:.2f}s", time=series.time[window],
+                    value=series.value[window], used=used)
+        )  # fmt: skip
+    return parts
+
+
+def hold_out_tail(series: Sequence[Series], share: float = 0.2) -> tuple[list[Series], list[Series]]:
+    """Each series with its last part hidden from the fit, and the same with only that part to be judged."""
+    seen, unseen = [], []
+    for one in series:
+        last = np.arange(one.blocks) >= round((1.0 - share) * one.blocks)
+        seen.append(replace(one, used=one.used & ~last))
+        unseen.append(replace(one, used=one.used & last))
+    return seen, unseen
+
+
+def dominant_frequency(series: Series) -> float:
+    """Frequency [Hz] of the strongest line of the motion."""
+    value = series.averaged - series.averaged.mean()
+    power = np.abs(np.fft.rfft(value * np.hanning(len(value)))) ** 2
+    power[0] = 0.0
+    return float(max(1, int(np.argmax(power))) / (len(value) * series.period * series.block))
+
+
+def scales(series: Sequence[Series], model: Model) -> Scales:
+    """Sizes that the records show, for first guesses of parameters."""
+    biggest = max(series, key=lambda s: float(np.std(s.averaged)))
+    position = max(float(np.std(biggest.averaged)), 1e-12)
+    step = biggest.period * biggest.block
+    velocity = float(np.std(np.gradient(biggest.averaged, step))) if biggest.blocks > 2 else position
+    frequency = dominant_frequency(biggest)
+    stiffness = model.borrowed("linear_spring.stiffness", None) or model.mass.value * (2 * np.pi * frequency) ** 2
+    effort, pumping = 0.0, 0.0
+    for one in series:
+        total = np.zeros(len(one.time))
+        for signal in (one.command, one.forcing):
+            if signal is not None:
+                inside = (one.time >= signal.x[0]) & (one.time <= min(signal.x[-1], 1e200))
+                total[inside] += signal(one.time[inside])
+        effort = max(effort, float(np.std(total)))
+        if one.forcing is not None:
+            line = replace(one, value=np.asarray(one.forcing(one.time)))
+            pumping = dominant_frequency(line)
+    return Scales(
+        position=position,
+        velocity=max(velocity, 1e-12),
+        effort=effort or stiffness * position,
+        centre=float(np.mean(np.concatenate([s.averaged for s in series]))),
+        low=min(float(s.averaged.min()) for s in series),
+        high=max(float(s.averaged.max()) for s in series),
+        mass=model.mass.value,
+        stiffness=float(stiffness),
+        frequency=frequency,
+        duration=max(float(s.time[-1] - s.time[0]) for s in series),
+        period=biggest.period,
+        forcing_frequency=pumping,
+    )
