@@ -72,7 +72,8 @@ class Compiled:
     run: Callable[..., int]
 
 
-def _kernel_source(element: Element) -> str:
+def kernel_source(element: Element, name: str) -> str:
+    """Source text of an element's kernel as a function called `name`. Raises InputError when it has none to read."""
     assert element.kernel is not None
     try:
         source = textwrap.dedent(inspect.getsource(element.kernel))
@@ -80,8 +81,7 @@ def _kernel_source(element: Element) -> str:
         raise InputError(f"element {element.name!r}: its kernel's source text cannot be read ({error})") from None
     if not source.lstrip().startswith("def "):
         raise InputError(f"element {element.name!r}: its kernel must be a plain function written with def")
-    name = element.kernel.__name__
-    return source.replace(f"def {name}(", f"def {element.name}(", 1)
+    return source.replace(f"def {element.kernel.__name__}(", f"def {name}(", 1)
 
 
 class _Writer:
@@ -167,7 +167,7 @@ def generate(
     sources: dict[str, str] = {}
     for term in terms:
         if term.element.kernel is not None:
-            sources[term.element.name] = "@njit(error_model='numpy')\n" + _kernel_source(term.element)
+            sources[term.element.name] = "@njit(error_model='numpy')\n" + kernel_source(term.element, term.element.name)
 
     def inputs(at: str) -> list[str]:
         """Command u and forcing w at time `at`, within the pieces found before."""
@@ -263,8 +263,8 @@ def run(times, ku, cu, kw, cw, kd, cd, parameters, start, max_step, out):
 
 
 @lru_cache(maxsize=256)
-def _load(text: str) -> Callable[..., int]:
-    """Compile the module (or take its machine code from the cache on disk)."""
+def load_module(text: str) -> Callable[..., int]:
+    """`run` of a generated module, compiled or, where this text was compiled before, from the cache on disk."""
     name = f"rhythmid_kernel_{hashlib.sha256(text.encode()).hexdigest()[:24]}"
     folder = cache_folder()
     path = folder / f"{name}.py"
@@ -293,7 +293,7 @@ def _structure(
     key: tuple[tuple[str, str, str], ...], terms: "_Terms", disturbed: bool, excited: InputKind
 ) -> Compiled:
     text, layout = generate(terms.terms, disturbed, excited)
-    return Compiled(layout, _load(text))
+    return Compiled(layout, load_module(text))
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,3 +317,46 @@ def compile_model(model: Model, disturbed: bool = False, excited: InputKind = "f
     terms = tuple(term for term in model.terms if term.element.kernel is not None)
     key = tuple((term.label, term.element.name, term.element.source) for term in terms)
     return _structure(key, _Terms(terms), disturbed, excited)
+
+
+def generate_rates(terms: tuple[Term, ...], excited: InputKind = "force") -> tuple[str, Layout]:
+    """Source text of a module whose `run` evaluates the right-hand side at given points, and the layout of its arrays."""
+    text, layout = generate(terms, False, excited)
+    writer = _right_hand_side(terms, excited)
+    n, p = len(layout.states), len(layout.parameters)
+    targets = ", ".join(f"out[k, {i}]" for i in range(n + 2))
+    known = "t, u, w, 0.0" if excited == "base_displacement" else "t, u, w"
+    arguments = ", ".join([known, *(f"states[k, {i}]" for i in range(n)), *(f"parameters[{i}]" for i in range(p))])
+    values = [f"p{i} = parameters[{i}]" for i in range(p)]
+    right_hand_side = text.split("@njit(\n", 1)[0]
+    return f'''{right_hand_side}@njit(
+    "int64(float64[::1], float64[::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1])",
+    cache=True, nogil=True, error_model="numpy",
+)
+def run(times, command, forcing, states, parameters, out):
+{_indent(values, 1)}
+    for k in range(times.shape[0]):
+        t = times[k]
+        u = command[k]
+        w = forcing[k]
+{_indent(writer.drive, 2)}
+        {targets} = rhs({arguments})
+    return times.shape[0]
+''', layout
+
+
+@lru_cache(maxsize=256)
+def _rates(key: tuple[tuple[str, str, str], ...], terms: "_Terms", excited: InputKind) -> Compiled:
+    text, layout = generate_rates(terms.terms, excited)
+    return Compiled(layout, load_module(text))
+
+
+def compile_rates(model: Model, excited: InputKind = "force") -> Compiled:
+    """The model's right-hand side at given points, for its linearisation.
+
+    `run(times (n,), command (n,), forcing (n,), states (n, q), parameters, out (n, q + 2))` fills rows of state rates,
+    sensor output and total actuator force. Signals in the command path are taken as they are, without its delays.
+    """
+    terms = tuple(term for term in model.terms if term.element.kernel is not None)
+    key = tuple((term.label, term.element.name, term.element.source) for term in terms)
+    return _rates(key, _Terms(terms), excited)
