@@ -66,7 +66,7 @@ class DelayInjector(GraphNode):
         self._relayed = self._dropped = 0
         self._applied_ns = 0
         self._error = Lateness()
-        self._clock = Clock()
+        self._wall = Clock()
         self._queue: deque[tuple[int, int, bytes]] = deque()
         self._arrived = threading.Event()
         self._output = self.create_publisher(self._type, "output", stream(self.lockstep))
@@ -126,7 +126,7 @@ class DelayInjector(GraphNode):
         self._output.publish(restamped(data, self._last_ns))
 
     def _on_realtime(self, data: bytes) -> None:
-        origin_ns = stamp_of(data) if self.values["delay_from"] == "header" else self._clock.now()
+        origin_ns = stamp_of(data) if self.values["delay_from"] == "header" else self._wall.now()
         if len(self._queue) >= self.values["queue_size"]:
             self._dropped += 1
             return
@@ -143,10 +143,10 @@ class DelayInjector(GraphNode):
                 self._arrived.clear()
                 continue
             due_ns, origin_ns, data = self._queue[0]
-            if not sleep_in_slices(self._clock, due_ns, stopping):
+            if not sleep_in_slices(self._wall, due_ns, stopping):
                 return
             self._queue.popleft()
-            released_ns = self._clock.now()
+            released_ns = self._wall.now()
             self._output.publish(data if keep else restamped(data, released_ns))
             self._relayed += 1
             self._applied_ns += released_ns - origin_ns

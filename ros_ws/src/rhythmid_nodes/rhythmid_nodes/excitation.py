@@ -74,7 +74,7 @@ class ExcitationNode(GraphNode):
         self._run = self.create_publisher(String, "run", latched())
         self.create_service(Trigger, "~/start", self._on_start)
         self.create_service(Trigger, "~/stop", self._on_stop)
-        self._clock = Clock()
+        self._wall = Clock()
         if self.lockstep:
             self._credit = Credit(
                 self, self.values["consumers"], self.values["window"], self.period_ns, self._send_lockstep
@@ -83,7 +83,7 @@ class ExcitationNode(GraphNode):
             self.create_subscription(
                 JointState, "joint_states", self._on_measurement, qos_profile_sensor_data, raw=True
             )
-            grid = Grid(self._clock, self.period_ns, self._tick, self._lateness, self.values["priority"])
+            grid = Grid(self._wall, self.period_ns, self._tick, self._lateness, self.values["priority"])
             self.workers.append(grid)
         if self.values["unattended"]:
             self.create_timer(0.05, self._attend)
@@ -132,7 +132,7 @@ class ExcitationNode(GraphNode):
         stale = self.values["stale_after"]
         if self._seen_ns is None:
             return "no measurement on joint_states yet" if stale > 0.0 else ""
-        age = (self._clock.now() - self._seen_ns) * 1e-9
+        age = (self._wall.now() - self._seen_ns) * 1e-9
         if age > stale > 0.0:
             return f"the newest measurement is {age:.3f} s old, allowed are {stale:g} s"
         if not self._low <= self._position <= self._high:  # NaN is outside, too
@@ -145,7 +145,7 @@ class ExcitationNode(GraphNode):
         """A node that is ended while it plays leaves a last command of zero."""
         with self._lock:
             if not self.lockstep and self._state in ("running", "ramping"):
-                self._halt(self._clock.now(), "the node was ended")
+                self._halt(self._wall.now(), "the node was ended")
         super().close()
 
     # Start and stop
@@ -174,9 +174,7 @@ class ExcitationNode(GraphNode):
             if obstacles := self.obstacles():
                 return "; ".join(obstacles)
             self._sent, self._fade_from = 0, None
-            self._start_ns = (
-                0 if self.lockstep else (self._clock.now() // self.period_ns + 2) * self.period_ns
-            )
+            self._start_ns = 0 if self.lockstep else (self._wall.now() // self.period_ns + 2) * self.period_ns
             self._enter("running")
         if self.lockstep:
             self._send_lockstep()
@@ -256,9 +254,9 @@ class ExcitationNode(GraphNode):
         if sample is None:
             return
         with self._lock:
-            self._position, self._seen_ns = sample.position, self._clock.now()
+            self._position, self._seen_ns = sample.position, self._wall.now()
             if self._state in ("running", "ramping") and not self._low <= sample.position <= self._high:
-                self._halt(self._clock.now(), self._danger())
+                self._halt(self._wall.now(), self._danger())
 
 
 def main() -> None:

@@ -69,16 +69,20 @@ class PlantNode(GraphNode):
                 raise InputError("parameter count = 0: in lockstep the number of samples must be known")
             self._ack = Acknowledger(self, self.values["window"], self.period_ns, self._count)
             self._credit = Credit(
-                self, self.values["consumers"] or (), self.values["window"], self.period_ns, self._advance_lockstep
+                self,
+                self.values["consumers"] or (),
+                self.values["window"],
+                self.period_ns,
+                self._advance_lockstep,
             )
             self.create_subscription(JointState, "command", self._on_lockstep, profile, raw=True)
         else:
-            self._clock = Clock()
+            self._wall = Clock()
             self._origin_ns: int | None = None
             self._done_ns = 0  # time since the origin up to which the plant has been integrated
             self._arrived: deque[tuple[int, int, float]] = deque()
             self.create_subscription(JointState, "command", self._on_realtime, profile, raw=True)
-            grid = Grid(self._clock, self.period_ns, self._tick, self._lateness, self.values["priority"])
+            grid = Grid(self._wall, self.period_ns, self._tick, self._lateness, self.values["priority"])
             self.workers.append(grid)
 
     def _build(self) -> Plant:
@@ -158,7 +162,7 @@ class PlantNode(GraphNode):
         if sample is None:
             self._foreign += 1
             return
-        self._arrived.append((sample.stamp_ns, self._clock.now(), sample.effort))
+        self._arrived.append((sample.stamp_ns, self._wall.now(), sample.effort))
 
     def _tick(self, stamp_ns: int) -> None:
         if self._origin_ns is None:

@@ -75,7 +75,7 @@ class Recorder(GraphNode):
             raise InputError("parameter topics is empty: name what to record")
         self._paused = self._closed = False
         self._skipped = 0
-        self._clock = Clock()
+        self._wall = Clock()
         self._simulated_ns = 0
         self._ack = (
             Acknowledger(self, values["window"], self.period_ns, values["count"]) if self.lockstep else None
@@ -144,7 +144,7 @@ class Recorder(GraphNode):
     def _receive_time(self, track: Track, stamp_ns: int) -> int:
         """The machine's time, or in lockstep the simulated one: the newest stamp of any stream."""
         if not self.lockstep:
-            return self._clock.now()
+            return self._wall.now()
         if track.is_stream:
             self._simulated_ns = max(self._simulated_ns, stamp_ns)
             return stamp_ns

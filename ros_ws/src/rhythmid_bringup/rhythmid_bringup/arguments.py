@@ -1,0 +1,41 @@
+"""A node of an experiment as a command line: name, namespace, remappings and a parameter file."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rhythmid.experiment import NodeSpec
+
+
+def given_parameters(spec: NodeSpec) -> dict[str, Any]:
+    """The node's parameters without empty lists, which ROS cannot hold: not given means none."""
+    return {name: value for name, value in spec.parameters.items() if value != []}
+
+
+def ros_arguments(
+    spec: NodeSpec, namespace: str, folder: Path, extra: Mapping[str, Any] | None = None
+) -> list[str]:
+    """Arguments from `--ros-args` on; writes the parameter file into `folder`."""
+    path = folder / f"{spec.name}.yaml"
+    parameters = {**given_parameters(spec), **(extra or {})}
+    text = yaml.safe_dump({"/**": {"ros__parameters": parameters}}, width=2**16)
+    path.write_text(text, encoding="utf-8")
+    arguments = ["--ros-args", "--params-file", str(path)]
+    for source, target in {"__node": spec.name, "__ns": namespace, **spec.remappings}.items():
+        arguments += ["-r", f"{source}:={target}"]
+    return arguments
+
+
+def command(spec: NodeSpec, arguments: list[str]) -> list[str]:
+    """The command that runs the node in a process of its own."""
+    return [sys.executable, "-P", "-m", f"{spec.package}.{spec.executable}", *arguments]
+
+
+def compose_command(graph: Path) -> list[str]:
+    """The command that runs all nodes of `graph` (see rhythmid_nodes.compose) in one process."""
+    return [sys.executable, "-P", "-m", "rhythmid_nodes.compose", str(graph)]

@@ -1,0 +1,29 @@
+"""The command `rhythmid run`, added to `rhythmid` through the entry point group `rhythmid.commands`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def add(app: typer.Typer) -> None:
+    """Add `run` to the command."""
+
+    @app.command()
+    def run(
+        experiment: Annotated[Path, typer.Argument(help="Experiment file.")],
+        out: Annotated[
+            Path | None, typer.Option("--out", help="Bag to write, instead of the one named in it.")
+        ] = None,
+        node: Annotated[
+            str | None,
+            typer.Option("--node", help="Run only this node, here and unattended (one container per node)."),
+        ] = None,
+    ) -> None:
+        """Run the graph of an experiment: starts, watches and stops its nodes and leaves a bag."""
+        # ROS is heavy and need not be installed for the other commands
+        from rhythmid_bringup.run import run_alone, run_graph
+
+        raise typer.Exit(run_graph(experiment, out) if node is None else run_alone(experiment, out, node))

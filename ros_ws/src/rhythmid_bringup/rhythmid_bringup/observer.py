@@ -1,0 +1,76 @@
+"""The supervisor's own node: hears /diagnostics, `run` and `lockstep/ack`, and tells the excitation to start or stop."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from std_msgs.msg import Header, String
+from std_srvs.srv import Trigger
+
+from rhythmid_nodes.lockstep import ACK_TOPIC
+from rhythmid_nodes.qos import latched
+
+
+class Observer(Node):
+    """What is known of the graph.
+
+    Attributes
+    ----------
+    obstacles : node name -> what keeps the node from its work ("" when it is ready), as /diagnostics says.
+    figures : node name -> its key-value pairs, the newest.
+    run : content of the topic `run`, the newest; empty before the start.
+    acknowledged_ns : simulated time up to which the recorder has everything (lockstep).
+    """
+
+    def __init__(self, namespace: str) -> None:
+        super().__init__("supervisor", namespace=namespace)
+        self.obstacles: dict[str, str] = {}
+        self.figures: dict[str, dict[str, str]] = {}
+        self.run: dict[str, Any] = {}
+        self.acknowledged_ns = 0
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, latched(100))
+        self.create_subscription(String, "run", self._on_run, latched())
+        self.create_subscription(Header, ACK_TOPIC, self._on_ack, latched())
+        self._start = self.create_client(Trigger, "excitation/start")
+        self._stop = self.create_client(Trigger, "excitation/stop")
+        self._answer: Any = None
+        self._started = False
+
+    @property
+    def state(self) -> str:
+        """State of the excitation: "" before the start, then running, finished or stopped."""
+        return self.run.get("state", "")
+
+    def ask_start(self) -> str | None:
+        """Ask the excitation to start, unless it is being asked or has started; its refusal when there is one."""
+        if self._answer is None:
+            if self._start.service_is_ready() and not self._started:
+                self._answer = self._start.call_async(Trigger.Request())
+            return None
+        if not self._answer.done():
+            return None
+        response, self._answer = self._answer.result(), None
+        self._started = response.success
+        return None if response.success else response.message
+
+    def ask_stop(self) -> None:
+        """Ask the excitation to fade out and stop."""
+        if self._stop.service_is_ready():
+            self._stop.call_async(Trigger.Request())
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            namespace, _, name = status.name.rpartition("/")
+            if namespace == self.get_namespace().rstrip("/"):
+                self.obstacles[name] = status.message.removeprefix("not ready: ").removeprefix("ok")
+                self.figures[name] = {pair.key: pair.value for pair in status.values}
+
+    def _on_run(self, message: String) -> None:
+        self.run = json.loads(message.data)
+
+    def _on_ack(self, header: Header) -> None:
+        if header.frame_id == "recorder":
+            self.acknowledged_ns = header.stamp.sec * 1_000_000_000 + header.stamp.nanosec

@@ -1,0 +1,73 @@
+"""Supervised processes: output passed on line by line, ended like ros2 launch does it (SIGINT, SIGTERM, SIGKILL)."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+
+GRACE = 5.0  # seconds between one signal and the next
+
+
+class Supervised:
+    """A child process in a session of its own, so that a Ctrl-C reaches the supervisor alone."""
+
+    def __init__(
+        self,
+        name: str,
+        command: Sequence[str],
+        environment: Mapping[str, str],
+        tell: Callable[[str, str], None],
+    ) -> None:
+        self.name = name
+        self.last_line = ""
+        self._tell = tell
+        self._process = subprocess.Popen(
+            command,
+            env=dict(environment),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            start_new_session=True,
+        )
+        self._reader = threading.Thread(target=self._pass_on, daemon=True)
+        self._reader.start()
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
+    def returncode(self) -> int | None:
+        """Exit code, minus the signal's number if killed; None while it runs."""
+        return self._process.poll()
+
+    def signal(self, number: signal.Signals) -> None:
+        if self.returncode is None:
+            self._process.send_signal(number)
+
+    def join_output(self) -> None:
+        """Wait until everything that an ended process said has been passed on."""
+        self._reader.join(1.0)
+
+    def _pass_on(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            self.last_line = line.rstrip()
+            self._tell(self.name, self.last_line)
+
+
+def end(processes: Sequence[Supervised], meanwhile: Callable[[], None] = lambda: time.sleep(0.02)) -> None:
+    """End all processes; `meanwhile` is called while they take their time."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
+        for process in processes:
+            process.signal(number)
+        patience = time.monotonic() + GRACE
+        while time.monotonic() < patience:
+            if all(process.returncode is not None for process in processes):
+                return
+            meanwhile()

@@ -1,0 +1,80 @@
+"""`rhythmid run`: from an experiment file to a bag and a summary."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+
+from rhythmid.errors import InputError
+from rhythmid.experiment import Experiment
+
+from .arguments import command, ros_arguments
+from .environment import own_domain, run_environment
+from .summary import show
+from .supervisor import Supervisor
+
+console = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def load(path: Path, out: Path | None) -> Experiment:
+    """The experiment with its bag's absolute path. Raises InputError when the bag's place is taken."""
+    experiment = Experiment.load(path)
+    bag = (out or experiment.record.path).absolute()
+    if os.path.lexists(bag):
+        raise InputError(f"{bag}: exists already and is not overwritten; choose another path or remove it")
+    return experiment.with_record(path=bag)
+
+
+def run_graph(path: Path, out: Path | None) -> int:
+    """Run the whole graph under supervision.
+
+    The exit code is 0 when the run came to its end or the user stopped it, 2 when a node refused its parameters, and
+    1 when a node died or the excitation stopped by itself.
+    """
+    experiment = load(path, out)
+    folder = Path(tempfile.mkdtemp(prefix="rhythmid-"))
+    with own_domain() as domain, interruptions() as interrupted:
+        environment = run_environment(os.environ, domain, folder)
+        os.environ.update(environment)  # the supervisor's own node must be in the same domain
+        supervisor = Supervisor(experiment, folder, environment, console, interrupted)
+        outcome = supervisor.run()
+    show(console, experiment, supervisor.observed, outcome)
+    if outcome.code == 0:
+        shutil.rmtree(folder, ignore_errors=True)
+    else:
+        console.print(f"parameters and logs of the nodes: {folder}")
+    return outcome.code
+
+
+def run_alone(path: Path, out: Path | None, name: str) -> int:
+    """Become one node of the experiment; without supervisor the excitation starts by itself."""
+    experiment = load(path, out)
+    specs = {spec.name: spec for spec in experiment.nodes()}
+    if name not in specs:
+        raise InputError(f"no node {name!r} in the graph; it has {', '.join(specs)}")
+    folder = Path(tempfile.mkdtemp(prefix="rhythmid-"))
+    extra = {"unattended": True} if specs[name].executable == "excitation" else {}
+    line = command(specs[name], ros_arguments(specs[name], experiment.namespace, folder, extra))
+    os.execve(line[0], line, run_environment(os.environ, None, folder))
+
+
+@contextmanager
+def interruptions() -> Iterator[Callable[[], bool]]:
+    """Within the block SIGINT and SIGTERM are only noted; yields a function that says whether one came."""
+    came: list[int] = []
+    before = {
+        number: signal.signal(number, lambda received, _frame: came.append(received))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield lambda: bool(came)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

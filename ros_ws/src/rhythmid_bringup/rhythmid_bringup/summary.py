@@ -1,0 +1,31 @@
+"""What a run leaves on the screen: rates, lateness, losses, applied delays, and where the bag is."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from rhythmid.experiment import Experiment
+
+from .supervisor import Observed, Outcome
+
+
+def show(console: Console, experiment: Experiment, observed: Observed, outcome: Outcome) -> None:
+    """Print the summary of a run."""
+    if observed.figures:
+        table = Table(box=None, show_header=False, pad_edge=False)
+        for spec in experiment.nodes():
+            figures = observed.figures.get(spec.name, {})
+            for number, (key, value) in enumerate(figures.items()):
+                table.add_row(spec.name if number == 0 else "", key, escape(value))
+        console.print(table)
+    colour = "green" if outcome.code == 0 else "red"
+    console.print(
+        f"[{colour}]{escape(outcome.sentence)}[/]: {observed.played:.3f} s played in {observed.elapsed:.1f} s"
+    )
+    bag = experiment.record.path
+    if (bag / "metadata.yaml").is_file():
+        console.print(f"bag: {bag}")
+    elif bag.is_dir():
+        console.print(f"bag: {bag} was not closed; bring back what is in it with 'rhythmid recover'")

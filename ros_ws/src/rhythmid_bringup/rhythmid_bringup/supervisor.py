@@ -1,0 +1,208 @@
+"""Supervises the graph of an experiment: start, wait until ready, excite, watch, stop."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import rclpy
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from rhythmid.experiment import Delay, Experiment
+
+from .arguments import command, compose_command, ros_arguments
+from .observer import Observer
+from .processes import Supervised, end
+
+READY_WITHIN = 60.0  # seconds; importing ROS and compiling the model take most of it on a busy machine
+POST_ROLL = 0.25  # seconds recorded in real time after the last response can have arrived
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended: exit code and one sentence."""
+
+    code: int
+    sentence: str
+
+
+@dataclass
+class Observed:
+    """What the supervisor saw: the figures of every node, simulated or real seconds played, and how long it took."""
+
+    figures: dict[str, dict[str, str]] = field(default_factory=dict)
+    played: float = 0.0
+    elapsed: float = 0.0
+
+
+class Supervisor:
+    """One run of the graph. `interrupted()` says whether the user wants it to stop."""
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        folder: Path,
+        environment: dict[str, str],
+        console: Console,
+        interrupted: Callable[[], bool],
+    ) -> None:
+        self.observed = Observed()
+        self._experiment, self._folder, self._environment = experiment, folder, environment
+        self._console, self._interrupted = console, interrupted
+        self._processes: list[Supervised] = []
+        self._lockstep = experiment.time.mode == "lockstep"
+        self._length = experiment.count * experiment.time.period_ns * 1e-9
+        self._nodes = [spec.name for spec in experiment.nodes()]
+        self._streams = any(topic not in ("run", "diagnostics") for topic in experiment.record.topics)
+
+    def run(self) -> Outcome:
+        """Run to the end, and leave no process behind whatever happens."""
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        observer = Observer(self._experiment.namespace)
+        self._executor = EventsExecutor()
+        self._executor.add_node(observer)
+        try:
+            self._launch()
+            outcome = self._wait_until_ready(observer) or self._play(observer)
+            end(self._processes, self._listen)
+            for process in self._processes:
+                process.join_output()
+            self.observed.figures = observer.figures
+        finally:
+            for process in self._processes:
+                process.signal(signal.SIGKILL)
+            observer.destroy_node()
+            try_shutdown()
+        return outcome
+
+    def _listen(self) -> None:
+        self._executor.spin_once(timeout_sec=0.05)
+
+    def _tell(self, name: str, line: str) -> None:
+        self._console.print(f"[dim]{escape(f'[{name}]')}[/] {escape(line)}")
+
+    def _launch(self) -> None:
+        specs = self._experiment.nodes()
+        arguments = [ros_arguments(spec, self._experiment.namespace, self._folder) for spec in specs]
+        if self._experiment.time.layout == "composed":
+            graph = self._folder / "graph.json"
+            listed = [
+                {"executable": spec.executable, "arguments": given} for spec, given in zip(specs, arguments)
+            ]
+            graph.write_text(json.dumps(listed), encoding="utf-8")
+            lines = {"graph": compose_command(graph)}
+        else:
+            lines = {spec.name: command(spec, given) for spec, given in zip(specs, arguments)}
+        for name, line in lines.items():
+            self._processes.append(Supervised(name, line, self._environment, self._tell))
+
+    def _trouble(self) -> Outcome | None:
+        """A node that has ended, or the user's wish to stop."""
+        for process in self._processes:
+            code = process.returncode
+            if code is not None:
+                process.join_output()
+                how = (
+                    f"was killed by {signal.Signals(-code).name}"
+                    if code < 0
+                    else f"ended with exit code {code}"
+                )
+                return Outcome(2 if code == 2 else 1, f"{process.name} {how}")
+        return Outcome(0, "stopped by the user") if self._interrupted() else None
+
+    def _wait_until_ready(self, observer: Observer) -> Outcome | None:
+        """Until every node says that it is ready and the excitation has started; why not, if it comes to nothing."""
+        patience = time.monotonic() + READY_WITHIN
+        refusal: str | None = None
+        with self._console.status("waiting for the nodes") as status:
+            while not observer.state:
+                if trouble := self._trouble():
+                    return trouble
+                silent = [name for name in self._nodes if name not in observer.obstacles]
+                waiting = [f"{name}: {why}" for name, why in observer.obstacles.items() if why]
+                if not silent and not waiting:
+                    refusal = observer.ask_start() or refusal
+                missing = (
+                    "; ".join([*(f"{name}: not up yet" for name in silent), *waiting])
+                    or refusal
+                    or "the start"
+                )
+                if time.monotonic() > patience:
+                    return Outcome(1, f"not ready after {READY_WITHIN:g} s: {missing}")
+                status.update(f"waiting for {missing}")
+                self._listen()
+        return None
+
+    def _play(self, observer: Observer) -> Outcome:
+        """Until the end of the run, or of a node, or of the user's patience."""
+        started = time.monotonic()
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.completed:.1f} of {task.total:.1f} s"),
+        )
+        with Progress(
+            *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=self._console
+        ) as progress:
+            bar = progress.add_task(self._experiment.time.mode, total=self._length)
+            outcome = None
+            while outcome is None:
+                self._listen()
+                now = time.monotonic() - started
+                self.observed.elapsed = now
+                self.observed.played = (
+                    observer.acknowledged_ns * 1e-9 if self._lockstep and self._streams else now
+                )
+                self.observed.played = min(self.observed.played, self._length)
+                progress.update(bar, completed=self.observed.played)
+                outcome = self._trouble() or self._ending(observer)
+        if self._interrupted():
+            self._fade_out(observer)
+        return outcome
+
+    def _ending(self, observer: Observer) -> Outcome | None:
+        """How the run ended by itself, if it has."""
+        if observer.state not in ("finished", "stopped"):
+            return None
+        if self._lockstep:
+            if (
+                self._streams
+                and observer.acknowledged_ns < self._experiment.count * self._experiment.time.period_ns
+            ):
+                return None
+        else:
+            self._record_tail()
+        if observer.state == "finished":
+            return Outcome(0, "finished")
+        reason = observer.run.get("reason", "")
+        return Outcome(0 if reason == "asked to stop" else 1, f"excitation stopped: {reason}")
+
+    def _record_tail(self) -> None:
+        """Go on recording until the last response has come through both delays."""
+        until = time.monotonic() + longest(self._experiment.input_delay) + POST_ROLL
+        until += longest(self._experiment.measurement_delay)
+        while time.monotonic() < until and self._trouble() is None:
+            self._listen()
+
+    def _fade_out(self, observer: Observer) -> None:
+        """Let the excitation ramp down before the graph goes."""
+        if self._lockstep or observer.state != "running":
+            return
+        observer.ask_stop()
+        patience = time.monotonic() + self._experiment.safety.ramp + 1.0
+        while observer.state == "running" and time.monotonic() < patience:
+            self._listen()
+
+
+def longest(delay: Delay) -> float:
+    """The longest delay [s] of a constant or a profile."""
+    return float(delay.table()[1].max())
