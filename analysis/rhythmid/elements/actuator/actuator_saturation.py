@@ -1,0 +1,29 @@
+"""Actuator saturation: the force is limited to [-L, L]. Nothing is seen of it while the force stays within."""
+
+from math import inf
+
+from rhythmid.elements.element import Element, Parameter
+
+
+def kernel(f, t, limit):
+    return max(-limit, min(limit, f))
+
+
+ELEMENT = Element(
+    name="actuator_saturation",
+    slot="actuator",
+    title="Actuator saturation",
+    equation="f → clip(f, −L, L)",
+    parameters=(Parameter("limit", "N", "largest force L", bounds=(0.0, inf)),),
+    kernel=kernel,
+    size="limit",
+    absent=inf,
+    starts=lambda s: [{"limit": w * s.effort} for w in (1.0, 1.4, 2.0, 3.0) if s.effort > 0.0],
+    also_known_as=("force limit", "current limit", "clipping"),
+    family="actuator nonlinearity",
+    confusable={
+        "actuator_nonlinearity": "smooth compression against a sharp limit: vary the amplitude around it",
+        "actuator_rate_limit": "limits the force, not its rate",
+    },
+    reference="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, 1968",
+)
