@@ -1,0 +1,34 @@
+"""Flight damping: F = -c_f v for v <= 0, the phase in which the paper's switched damper is off.
+
+The force is continuous at the switch; only its slope jumps. Together with a free stance damping it spans the same
+models as a viscous damper in both phases.
+"""
+
+from math import inf
+
+from rhythmid.elements.element import Element, Parameter
+
+
+def kernel(x, v, t, f, damping):
+    return -damping * min(v, 0.0)
+
+
+ELEMENT = Element(
+    name="flight_damping",
+    slot="force",
+    title="Flight damping",
+    equation="F = −c_f v for v ≤ 0",
+    parameters=(Parameter("damping", "N*s/m", "damping c_f while v ≤ 0", bounds=(0.0, inf)),),
+    kernel=kernel,
+    size="damping",
+    starts=lambda s: [{"damping": 0.02 * s.damping}],
+    also_known_as=("rebound damping", "asymmetric damping"),
+    family="damping",
+    special_case_of=("viscoelastic_relaxation",),  # for τ_m → 0, with the stance damping taking up the rest
+    confusable={
+        "viscous_damper": "the same model where the stance damping is free",
+        "viscoelastic_relaxation": "short relaxation times: excite high frequencies, or a bias force",
+        "quadratic_drag": "one amplitude only",
+    },
+    reference="Paper, equation (10), with the damper's flight value",
+)
