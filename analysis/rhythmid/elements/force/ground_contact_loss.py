@@ -1,0 +1,40 @@
+"""Loss of ground contact: the leg's forces vanish, wholly or in part, while it is longer than its rest length.
+
+A modifier: all forces of the leg are multiplied by 1 - rho for e = x - rest length > 0. A damped leg's force jumps
+there; the jump is averaged over one integration step, with the share of the step after lift-off told by the speed.
+"""
+
+from rhythmid.elements.element import STEP, Element, Parameter
+
+
+def kernel(leg, x, v, t, f, loss, rest_length, step):
+    e = x - rest_length
+    half = 0.5 * abs(v) * step  # half of the way travelled in one step
+    if e >= half:
+        airborne = 1.0
+    elif e <= -half:
+        airborne = 0.0
+    else:
+        airborne = 0.5 + 0.5 * e / half
+    return leg * (1.0 - loss * airborne)
+
+
+ELEMENT = Element(
+    name="ground_contact_loss",
+    slot="force",
+    title="Loss of ground contact",
+    equation="leg force × (1 − ρ) for e > 0,  e = x − x₀",
+    parameters=(Parameter("loss", "1", "share ρ of the leg's force that vanishes; 1 lifts off", bounds=(0.0, 1.0)),),
+    borrows={"rest_length": ("linear_spring.rest_length", None), "step": (STEP, 1e-3)},
+    kernel=kernel,
+    acts="modifier",
+    size="loss",
+    starts=lambda s: [{"loss": 0.3}],
+    also_known_as=("lift-off", "unilateral contact", "flight phase"),
+    family="contact",
+    confusable={
+        "bilinear_stiffness": "keeps the damping, and its kink is anywhere",
+        "flight_damping": "acts beyond the rest length, not by direction",
+    },
+    reference="P. Holmes, R. J. Full, D. Koditschek, J. Guckenheimer, SIAM Review 48(2), 2006, 207-304",
+)
