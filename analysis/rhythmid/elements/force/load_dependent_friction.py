@@ -1,0 +1,38 @@
+"""Load-dependent friction of a gear or a bearing: F = -mu |f| sgn(v), with f the actuator force it transmits.
+
+It comes on top of the load-free level, which is a `coulomb_friction` of its own. The sign is regularised as there.
+"""
+
+import math
+
+from rhythmid.elements.element import STEP, Element, Parameter
+
+
+def kernel(x, v, t, f, coefficient, transition, mass, step):
+    level = coefficient * abs(f)
+    return -level * math.tanh(v / max(transition, 0.5 * level * step / mass, 1e-300))
+
+
+ELEMENT = Element(
+    name="load_dependent_friction",
+    slot="force",
+    title="Load-dependent friction",
+    equation="F = −μ |f| sgn v",
+    parameters=(
+        Parameter("coefficient", "1", "friction coefficient μ", bounds=(0.0, 1.0)),
+        Parameter("transition", "m/s", "speed v_t over which the sign turns", bounds=(0.0, math.inf), default=1e-3),
+    ),
+    borrows={"mass": ("inertia.mass", None), "step": (STEP, 1e-3)},
+    kernel=kernel,
+    size="coefficient",
+    starts=lambda s: [{"coefficient": 0.05, "transition": 0.1 * s.velocity}],
+    also_known_as=("gear friction", "torque-dependent friction"),
+    family="friction",
+    confusable={
+        "coulomb_friction": "same at constant load: vary the actuator force",
+        "viscous_damper": "one amplitude only",
+        "actuator_gain": "where f and v always have one sign",
+    },
+    reference="M. Duclusaud et al., Extended friction models for the physics simulation of servo actuators, "
+    "arXiv 2410.08650, 2024",
+)
