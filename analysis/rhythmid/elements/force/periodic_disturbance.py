@@ -1,0 +1,48 @@
+"""Periodic disturbance from outside: F = a sin(2 pi f t + phi), at a frequency that is not locked to the cycle.
+
+(a, phi) and (-a, phi + pi) are the same, so a is kept positive. Over a record of length T the fit in f has one minimum
+every 1/T: starts are useful from a residual's spectrum, whose strongest line comes first; the others cover a guess.
+"""
+
+import math
+
+from rhythmid.elements.element import Element, Parameter
+
+
+def kernel(x, v, t, f, amplitude, frequency, phase):
+    return amplitude * math.sin(2.0 * math.pi * frequency * t + phase)
+
+
+def starts(scales):
+    frequencies = [ratio * scales.natural_frequency for ratio in (0.5, 0.8, 1.2, 1.8, 3.0)]
+    if scales.residual_frequency > 0.0:
+        frequencies.insert(0, scales.residual_frequency)
+    return [
+        {"amplitude": 0.01 * scales.force, "frequency": f, "phase": phase}
+        for f in frequencies
+        for phase in (0.0, 0.5 * math.pi)
+    ]
+
+
+ELEMENT = Element(
+    name="periodic_disturbance",
+    slot="force",
+    title="Periodic disturbance",
+    equation="F = a sin(2πf t + φ)",
+    parameters=(
+        Parameter("amplitude", "N", "amplitude a", bounds=(0.0, math.inf)),
+        Parameter("frequency", "Hz", "frequency f", bounds=(0.0, math.inf)),
+        Parameter("phase", "rad", "phase φ at t = 0", default=0.0),
+    ),
+    kernel=kernel,
+    acts="body",
+    size="amplitude",
+    starts=starts,
+    also_known_as=("hum", "rotating imbalance", "external vibration"),
+    family="disturbance",
+    confusable={
+        "position_ripple": "periodic in time, not in position: change the speed",
+        "periodic_forcing": "locked to the cycle: its amplitude and phase are nominal parameters",
+    },
+    reference="Any text on vibrations, e.g. D. J. Inman, Engineering Vibration",
+)
