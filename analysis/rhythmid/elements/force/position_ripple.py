@@ -1,0 +1,46 @@
+"""Position ripple: F = A sin(2 pi x / lambda + phi), for instance the cogging of a linear motor or an eccentric gear.
+
+(A, phi) and (-A, phi + pi) are the same ripple, so A is kept positive. A fit in lambda has one minimum for every
+period that fits into the range of motion: it needs a grid of starts.
+"""
+
+import math
+
+from rhythmid.elements.element import Element, Parameter
+
+
+def kernel(x, v, t, f, amplitude, wavelength, phase):
+    return amplitude * math.sin(2.0 * math.pi * x / wavelength + phase)
+
+
+def starts(scales):
+    travel = scales.high - scales.low
+    return [
+        {"amplitude": 0.01 * scales.force, "wavelength": travel / periods, "phase": phase}
+        for periods in (1.0, 1.5, 2.0, 2.5, 3.0, 4.0)
+        for phase in (0.0, 0.5 * math.pi)
+    ]
+
+
+ELEMENT = Element(
+    name="position_ripple",
+    slot="force",
+    title="Position ripple",
+    equation="F = A sin(2πx/λ + φ)",
+    parameters=(
+        Parameter("amplitude", "N", "amplitude A", bounds=(0.0, math.inf)),
+        Parameter("wavelength", "m", "period λ in position", bounds=(1e-9, math.inf)),
+        Parameter("phase", "rad", "phase φ at x = 0", default=0.0),
+    ),
+    kernel=kernel,
+    acts="body",
+    size="amplitude",
+    starts=starts,
+    also_known_as=("cogging", "detent force", "torque ripple", "gear eccentricity"),
+    family="ripple",
+    confusable={
+        "cubic_stiffness": "long wavelengths: use the whole range of motion",
+        "periodic_disturbance": "periodic in position, not in time: change the speed",
+    },
+    reference="D. Hanselman, Brushless Permanent Magnet Motor Design, 2nd ed., 2003",
+)
