@@ -1,0 +1,51 @@
+"""Second mode: a mass m_2 attached to the first by a spring and a damper (a loose part, a payload, a flexible mount).
+
+F = k_2 (q - x) + c_2 (dq/dt - v), m_2 d2q/dt2 = -F, with k_2 = m_2 w^2, c_2 = 2 zeta m_2 w, w = 2 pi f_2. q is the
+attached mass's position, measured from its rest relative to the first mass; its weight is a constant force, which the
+spring's rest length takes. A mode too fast for the integration step (w h > 1) is slowed down to w = 1 / h, where it
+is an added mass all the same. A fit in f_2 has local minima: it needs a grid of starts.
+"""
+
+import math
+
+from rhythmid.elements.element import STEP, Element, Parameter
+
+
+def kernel(x, v, t, f, mass, frequency, damping_ratio, step, position, velocity):
+    omega = min(2.0 * math.pi * frequency, 1.0 / step)
+    pull = omega * omega * (position - x) + 2.0 * damping_ratio * omega * (velocity - v)  # per unit of attached mass
+    return mass * pull, velocity, -pull
+
+
+def starts(scales):
+    frequencies = [ratio * scales.natural_frequency for ratio in (0.7, 1.4, 2.0, 2.8, 4.0, 5.6)]
+    if scales.residual_frequency > 0.0:
+        frequencies.insert(0, scales.residual_frequency)
+    return [{"mass": 0.03 * scales.mass, "frequency": f, "damping_ratio": 0.1} for f in frequencies]
+
+
+ELEMENT = Element(
+    name="second_mode",
+    slot="force",
+    title="Second mode",
+    equation="F = k₂ (q − x) + c₂ (q̇ − v),  m₂ q̈ = −F,  k₂ = m₂ (2πf₂)²,  c₂ = 2ζ₂ m₂ 2πf₂",
+    parameters=(
+        Parameter("mass", "kg", "attached mass m₂", bounds=(0.0, math.inf)),
+        Parameter("frequency", "Hz", "frequency f₂ of the attached mass with the first one held", bounds=(0.0, math.inf)),
+        Parameter("damping_ratio", "1", "its damping ratio ζ₂", bounds=(0.0, 2.0), default=0.05),
+    ),
+    borrows={"step": (STEP, 1e-3)},
+    kernel=kernel,
+    acts="body",
+    states=("position", "velocity"),
+    initial=lambda x, v, mass, frequency, damping_ratio, step: (x, v),
+    size="mass",
+    starts=starts,
+    also_known_as=("attached mass", "tuned mass", "structural resonance", "flexible payload"),
+    family="resonance",
+    confusable={
+        "sensor_lag": "far below f₂ only: excite around and above it",
+        "viscoelastic_relaxation": "an overdamped mode",
+    },
+    reference="J. P. Den Hartog, Mechanical Vibrations, 4th ed., 1956, section 3.2",
+)
