@@ -1,0 +1,38 @@
+"""Stiffness jump: the linear spring's stiffness becomes k (1 + delta) at the time t_s (a crack, a slipped clamp).
+
+The step is spread over one integration step, so that the motion depends smoothly on t_s. A fit in t_s has local
+minima: it needs a grid of starts.
+"""
+
+from math import inf
+
+from rhythmid.elements.element import STEP, Element, Parameter
+
+
+def kernel(x, v, t, f, change, time, stiffness, rest_length, step):
+    done = max(0.0, min(1.0, 0.5 + (t - time) / step))
+    return -stiffness * change * done * (x - rest_length)
+
+
+ELEMENT = Element(
+    name="stiffness_jump",
+    slot="force",
+    title="Stiffness jump",
+    equation="F = −k δ e for t > t_s,  e = x − x₀",
+    parameters=(
+        Parameter("change", "1", "relative change δ of the stiffness", bounds=(-1.0, inf)),
+        Parameter("time", "s", "time t_s of the change"),
+    ),
+    borrows={
+        "stiffness": ("linear_spring.stiffness", None),
+        "rest_length": ("linear_spring.rest_length", 0.0),
+        "step": (STEP, 1e-3),
+    },
+    kernel=kernel,
+    size="change",
+    starts=lambda s: [{"change": 0.005, "time": share * s.duration} for share in (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)],
+    also_known_as=("crack", "sudden softening", "slipped clamp"),
+    family="drift",
+    confusable={"stiffness_drift": "a step against a ramp"},
+    reference="M. Basseville, I. V. Nikiforov, Detection of Abrupt Changes, Prentice Hall, 1993",
+)
