@@ -1,0 +1,30 @@
+"""Delay drift, on the measurement's side: the measurement delay grows with time, tau_y + r t.
+
+Its counterpart for commands is `input_delay_drift`. A clock skew of epsilon = r / (1 - r) gives the same record: only
+knowledge of the clocks tells the two apart, and both are then reported together.
+"""
+
+from rhythmid.elements.element import Element, Parameter
+
+
+def delay_of(stamps, rate):
+    return rate * stamps
+
+
+ELEMENT = Element(
+    name="delay_drift",
+    slot="timing",
+    title="Measurement delay drift",
+    equation="y(t) = ȳ(t − r t)",
+    parameters=(Parameter("rate", "1", "rate r of the measurement delay", bounds=(-0.1, 0.1)),),
+    delay=delay_of,
+    size="rate",
+    starts=lambda s: [{"rate": 0.02 / (s.natural_frequency * s.duration)}],
+    also_known_as=("latency drift",),
+    family="clock",
+    confusable={
+        "clock_skew": "the same to first order: only knowledge of the clocks tells",
+        "input_delay_drift": "moves the limit cycle's phase as well",
+    },
+    reference="S. B. Moon, P. Skelly, D. Towsley, INFOCOM 1999, 227-234",
+)
