@@ -53,63 +53,81 @@ class Node:
             self.fail("a list (- item) is expected here")
         return self.value
 
-    def number(self, low: float = -math.inf, high: float = math.inf) -> float:
-        """The value as a finite number within [low, high]."""
-        if isinstance(self.value, bool) or not isinstance(self.value, (int, float)):
-            try:
-                value = float(self.value)  # YAML 1.1 reads 1e-3 as text
-            except (TypeError, ValueError):
-                self.fail(f"a number is expected, not {self.value!r}")
-        else:
-            value = float(self.value)
+    def number(self, low: float = -math.inf, high: float = math.inf, finite: bool = True) -> float:
+        """The value as a number within [low, high]; `finite=False` allows infinity, for the ends of a range."""
+        if not isinstance(self.value, (int, float, str)) or isinstance(self.value, bool):
+            self.fail(f"a number is expected, not {self.plain!r}")
+        try:
+            value = float(self.value)  # YAML 1.1 reads 1e-3 as text
+        except (ValueError, OverflowError):
+            self.fail(f"a number is expected, not {self.value!r}")
         if math.isnan(value):
             self.fail("is not a number (NaN)")
+        if finite and math.isinf(value):
+            self.fail("must be finite")
         if not low <= value <= high:
             self.fail(f"{value:g} is outside [{low:g}, {high:g}]")
         return value
 
+    def whole(self, low: int, high: int) -> int:
+        """The value as a whole number within [low, high]."""
+        value = self.number(low, high)
+        if value != int(value):
+            self.fail(f"a whole number is expected, not {value:g}")
+        return int(value)
+
     def text(self) -> str:
         """The value as text."""
         if not isinstance(self.value, str):
-            self.fail(f"text is expected, not {self.value!r}")
+            self.fail(f"text is expected, not {self.plain!r}")
         return self.value
 
     def choice(self, choices: Iterable[str]) -> str:
         """The value as one of `choices`."""
         if self.value not in (choices := list(choices)):
-            self.fail(f"{self.value!r} is none of {', '.join(choices)}")
+            self.fail(f"{self.plain!r} is none of {', '.join(choices)}")
         return self.value
 
 
-def _node(raw: yaml.Node | None, name: str, path: str, loader: yaml.SafeLoader) -> Node:
+def _node(raw: yaml.Node | None, name: str, path: str, loader: yaml.SafeLoader, line: int | None = None) -> Node:
+    """`line` is where the key of this value stands: the value itself may begin further down."""
     if raw is None:
         return Node(None, name, path)
-    place = f"{name}:{raw.start_mark.line + 1}"
+    place = f"{name}:{(raw.start_mark.line if line is None else line) + 1}"
     if isinstance(raw, yaml.MappingNode):
         found: dict[str, Node] = {}
         for key_node, value_node in raw.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise InputError(f"{name}:{key_node.start_mark.line + 1}: a key is a single word")
             key = str(key_node.value)
-            inner = _node(value_node, name, f"{path}.{key}" if path else key, loader)
+            inner = _node(value_node, name, f"{path}.{key}" if path else key, loader, key_node.start_mark.line)
             if key in found:
                 inner.fail("is given twice")
             found[key] = inner
         return Node(found, place, path)
     if isinstance(raw, yaml.SequenceNode):
         return Node([_node(item, name, f"{path}[{i}]", loader) for i, item in enumerate(raw.value)], place, path)
-    return Node(loader.construct_object(raw), place, path)
+    try:
+        return Node(loader.construct_object(raw), place, path)
+    except ValueError as error:  # a date that does not exist, say
+        raise InputError(f"{place}: {path}: {error}") from None
 
 
 def parse(text: str, name: str) -> Node:
     """The document in `text`; `name` stands for it in messages. Raises InputError when it is not YAML."""
-    loader = yaml.SafeLoader(text)
     try:
-        return _node(loader.get_single_node(), name, "", loader)
+        loader = yaml.SafeLoader(text)
+        try:
+            return _node(loader.get_single_node(), name, "", loader)
+        finally:
+            loader.dispose()
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f":{mark.line + 1}" if mark else ""
-        raise InputError(f"{name}{line}: is not valid YAML: {getattr(error, 'problem', error)}") from None
-    finally:
-        loader.dispose()
+        reason = getattr(error, "problem", None) or getattr(error, "reason", None) or error
+        raise InputError(f"{name}{line}: is not valid YAML: {reason}") from None
+    except RecursionError:
+        raise InputError(f"{name}: is nested too deeply") from None
 
 
 def read(path: str | Path) -> Node:

@@ -219,7 +219,7 @@ def _value(node: Node, parameter: Parameter, units: Units) -> Value:
             fixed = keys["fixed"].value
         bounds = parameter.bounds
         if "bounds" in keys:
-            ends = [end.number() for end in keys["bounds"].items()]
+            ends = [end.number(finite=False) for end in keys["bounds"].items()]
             if len(ends) != 2 or not ends[0] < ends[1]:
                 keys["bounds"].fail("two numbers [low, high] are expected, low < high")
             bounds = (max(ends[0], parameter.bounds[0]), min(ends[1], parameter.bounds[1]))
@@ -231,8 +231,6 @@ def _value(node: Node, parameter: Parameter, units: Units) -> Value:
             prior = Prior(inner["mean"].number(), inner["std"].number(low=1e-300))
     if not bounds[0] <= value <= bounds[1]:
         node.fail(f"{value:g} {unit} is outside [{bounds[0]:g}, {bounds[1]:g}] ({parameter.description})")
-    if not math.isfinite(value):
-        node.fail("must be finite")
     return Value(value, unit, fixed, bounds, prior)
 
 

@@ -19,7 +19,8 @@ def _registry():
 
 
 def _plain(unit: str) -> str:
-    unit = unit.replace("·", "*").replace("**", "^").replace("²", "^2").replace("³", "^3").replace(" ", "")
+    unit = unit.strip().replace("·", "*").replace("**", "^").replace("²", "^2").replace("³", "^3")
+    unit = re.sub(r"(?<=[\w)]) +(?=[\w(])", "*", unit).replace(" ", "")  # N s/m is N*s/m
     return "1" if unit in ("", "-", "1") else unit
 
 
@@ -36,11 +37,12 @@ class Units:
         swap = {"N": self.force, "m": self.position, "kg": self.mass}
 
         def one(match: re.Match[str]) -> str:
-            name = match.group(0)
+            divided, name, power = match.groups()
             given = swap.get(name, name)
-            return f"({given})" if given != name and re.search(r"[*/^]", given) else given
+            whole = f"({given})" if (divided or power) and re.search(r"[*/^]", given) else given
+            return divided + whole + power
 
-        return re.sub(r"[A-Za-z]+", one, unit)
+        return re.sub(r"(/?)([A-Za-z]+)(\^?)", one, unit)
 
     def check(self, given: str, expected: str, where: str) -> None:
         """Raise InputError unless `given` is the unit that this machine uses for `expected`."""
@@ -50,14 +52,12 @@ class Units:
         problem = f"{where}: unit {given!r} where {wanted!r} is expected"
         if not {self.force, self.position, self.mass} <= {"N", "m", "kg", "N*m", "rad", "kg*m^2"}:
             raise InputError(problem)
-        import pint
-
-        registry = _registry()
         try:
-            ratio = registry.Quantity(1.0, _plain(given)) / registry.Quantity(1.0, _plain(wanted))
-            factor = ratio.to("dimensionless").magnitude if ratio.dimensionless else None
-        except (pint.errors.PintError, AttributeError, TypeError, ValueError) as error:
-            raise InputError(f"{problem} (it is not a unit that is known: {error})") from None
+            given_unit, wanted_unit = (_registry().Quantity(1.0, _plain(unit)) for unit in (given, wanted))
+            ratio = given_unit / wanted_unit
+            factor = float(ratio.to("dimensionless").magnitude) if ratio.dimensionless else None
+        except Exception:  # text that is no unit makes the parser fail in many ways
+            raise InputError(f"{problem} (it is not a unit that is known)") from None
         if factor is None:
             raise InputError(f"{problem}: they measure different things")
         if abs(factor - 1.0) > 1e-12:

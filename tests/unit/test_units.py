@@ -1,0 +1,59 @@
+"""Units: read in many spellings, never converted silently, refused with what to do."""
+
+import pytest
+from hypothesis import given, strategies
+
+from rhythmid.errors import InputError
+from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
+
+
+@pytest.mark.parametrize("spelling", ["N*s/m", "N s/m", "N·s/m", " N * s / m ", "kg/s", "N*s*m^-1"])
+def test_a_unit_may_be_spelled_in_several_ways(spelling):
+    TRANSLATIONAL.check(spelling, "N*s/m", "here")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "expected", "advice"),
+    [
+        ("mm", "m", "write the value in m (multiply it by 0.001)"),
+        ("ms", "s", "write the value in s (multiply it by 0.001)"),
+        ("lbf/inch", "N/m", "multiply it by 175.127"),
+        ("N", "N/m", "they measure different things"),
+        ("", "m", "they measure different things"),
+        ("bananas", "m", "not a unit that is known"),
+        ("degC", "m", "not a unit that is known"),
+    ],
+)
+def test_another_unit_is_refused_with_place_and_advice(wrong, expected, advice):
+    with pytest.raises(InputError) as refused:
+        TRANSLATIONAL.check(wrong, expected, "model.yaml:3: force[0].linear_spring.stiffness")
+    message = str(refused.value)
+    assert message.startswith("model.yaml:3: force[0].linear_spring.stiffness: ")
+    assert repr(wrong) in message and advice in message and "\n" not in message
+
+
+def test_a_rotational_machine_has_its_own_units():
+    assert ROTATIONAL.of("kg") == "kg*m^2"
+    assert ROTATIONAL.of("N/m") == "N*m/rad"
+    assert ROTATIONAL.of("N*s^2/m^2") == "N*m*s^2/rad^2"
+    assert ROTATIONAL.of("1/N") == "1/(N*m)"
+    assert ROTATIONAL.of("Hz") == "Hz"
+    ROTATIONAL.check("N*m*s/rad", "N*s/m", "here")
+    with pytest.raises(InputError, match="different things"):
+        ROTATIONAL.check("N*s/m", "N*s/m", "here")
+
+
+def test_units_declared_by_a_table_are_taken_at_their_word():
+    electric = Units(force="V", position="px", mass="V*s^2/px")
+    assert electric.of("N/m") == "V/px"
+    electric.check("V/px", "N/m", "here")
+    with pytest.raises(InputError, match=r"unit 'mV/px' where 'V/px' is expected"):
+        electric.check("mV/px", "N/m", "here")
+
+
+@given(strategies.one_of(strategies.text(max_size=10), strategies.text("mNkgs/*^012()-. ", max_size=10)))
+def test_no_text_at_all_gets_more_than_one_line_of_refusal(text):
+    try:
+        TRANSLATIONAL.check(text, "N/m", "here")
+    except InputError as refused:
+        assert "\n" not in str(refused)
