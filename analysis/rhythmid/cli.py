@@ -98,17 +98,11 @@ def simulate(
     elements: Elements = None,
 ) -> None:
     """Run an experiment without ROS: writes the bag that the graph would record."""
-    from dataclasses import replace
-
-    from rhythmid.elements.catalogue import load_catalogue
     from rhythmid.experiment import Experiment, perform
-    from rhythmid.model import Model
     from rhythmid.record.bag_writer import write_bag
 
     require_new(out)
-    folders = tuple(elements or ())
-    described = Experiment.load(experiment, folders)
-    described = replace(described, model=Model.load(model, load_catalogue(folders)), model_path=model)
+    described = Experiment.load(experiment, tuple(elements or ()), model)
     messages = perform(described)
     wanted = list(messages) if all_topics else [topic for topic in described.record.topics if topic in messages]
     write_bag(

@@ -21,6 +21,7 @@ from rhythmid.excitation.sequence import build
 from rhythmid.model import Model
 from rhythmid.plant import Plant
 from rhythmid.record.messages import Messages
+from rhythmid.time_table import read_time_table
 
 TOPICS = ("excitation", "command", "forcing", "plant/joint_states", "joint_states", "run", "diagnostics")
 
@@ -45,16 +46,10 @@ class Delay:
         """Corner times and delays of the profile. Raises InputError when the file is not such a table."""
         if self.profile is None:
             return np.zeros(1), np.array([self.constant])
-        try:
-            table = np.atleast_2d(np.genfromtxt(self.profile, delimiter=",", comments="#"))
-        except (OSError, ValueError) as error:
-            raise InputError(f"{self.profile}: the delay profile cannot be read: {error}") from None
-        table = table[1:] if np.isnan(table[0]).any() else table  # a header line
-        if table.shape[1] != 2 or len(table) == 0 or not np.isfinite(table).all():
-            raise InputError(f"{self.profile}: two columns of numbers are expected: seconds since start, delay [s]")
-        if np.any(np.diff(table[:, 0]) <= 0) or np.any(table[:, 1] < 0):
-            raise InputError(f"{self.profile}: times must increase and delays must not be negative")
-        return table[:, 0], table[:, 1]
+        times, delays = read_time_table(self.profile, "delay [s]")
+        if np.any(delays < 0.0):
+            raise InputError(f"{self.profile}: a delay cannot be negative ({delays.min():g} s)")
+        return times, delays
 
     def release(self, stamp_ns: NDArray[np.int64]) -> NDArray[np.int64]:
         """Stamps [ns] on release: stamp + delay, in order (nothing overtakes). Shapes (n,) -> (n,)."""
@@ -157,10 +152,13 @@ class Experiment:
     elements: tuple[Path, ...] = ()
 
     @classmethod
-    def load(cls, path: str | Path, elements: tuple[Path, ...] = ()) -> "Experiment":
+    def load(
+        cls, path: str | Path, elements: tuple[Path, ...] = (), model: str | Path | None = None
+    ) -> "Experiment":
         """The experiment in a YAML file; paths in it are relative to it, except the bag's, which is relative to
-        where the command is run. Raises InputError naming the line and key of what is wrong."""
-        return _experiment(read(path), Path(path).resolve().parent, elements)
+        where the command is run. `model` is a model file that takes the place of the one named there. Raises InputError
+        naming the line and key of what is wrong."""
+        return _experiment(read(path), Path(path).resolve().parent, elements, model)
 
     @classmethod
     def from_text(cls, text: str, folder: str | Path = ".") -> "Experiment":
@@ -294,7 +292,8 @@ def perform(experiment: Experiment) -> dict[str, Messages]:
     """
     period = experiment.time.period_ns
     stamps = np.arange(experiment.count, dtype=np.int64) * period
-    effort = ramped(experiment.excitation, experiment.safety, stamps * 1e-9, experiment.count * period * 1e-9)
+    time = (stamps * 1e-9).astype(np.float64)
+    effort = ramped(experiment.excitation, experiment.safety, time, experiment.count * period * 1e-9)
     arrival = experiment.input_delay.release(stamps)
     plant = Plant(experiment.plant_model, period, experiment.seed, experiment.initial)
     plant.push_many(arrival, effort)
@@ -327,28 +326,33 @@ def _delay(node: Node | None, folder: Path) -> Delay:
     return Delay(value)
 
 
-def _numbers(node: Node | None, defaults: Any, **limits: tuple[float, float]) -> dict[str, float]:
-    """Keys of `node` as numbers within their limits; the keys are the fields of the dataclass `defaults`."""
+def _numbers(node: Node | None, **limits: tuple[float, float]) -> dict[str, float]:
+    """Keys of `node` as numbers within their limits; no other keys are allowed."""
     if node is None:
         return {}
     keys = node.mapping(list(limits))
     return {name: child.number(*limits[name]) for name, child in keys.items()}
 
 
-def _experiment(document: Node, folder: Path, elements: tuple[Path, ...]) -> Experiment:
+def _experiment(
+    document: Node, folder: Path, elements: tuple[Path, ...], instead: str | Path | None = None
+) -> Experiment:
     keys = document.mapping(
         ["model", "excitation", "forcing", "delays", "noise", "time", "duration", "seed", "initial", "safety",
          "record", "namespace", "joint", "elements"]
     )  # fmt: skip
     for name in ("model", "excitation"):
-        if name not in keys:
+        if name not in keys and not (name == "model" and instead):
             document.fail(f"'{name}:' is missing")
     if "elements" in keys:
         elements = (*elements, *(folder / item.text() for item in keys["elements"].items()))
     catalogue = load_catalogue(elements)
-    model_path = folder / keys["model"].text()
-    if not model_path.is_file():
-        keys["model"].fail(f"no such file: {model_path}")
+    if instead is not None:
+        model_path = Path(instead)
+    else:
+        model_path = folder / keys["model"].text()
+        if not model_path.is_file():
+            keys["model"].fail(f"no such file: {model_path}")
     model = Model.load(model_path, catalogue)
     spec = keys["excitation"].plain
     if not isinstance(spec, dict):
@@ -358,7 +362,7 @@ def _experiment(document: Node, folder: Path, elements: tuple[Path, ...]) -> Exp
     except InputError as error:
         raise InputError(f"{keys['excitation'].place}: {error}") from None
     far = (-math.inf, math.inf)
-    forcing = Forcing(**_numbers(keys.get("forcing"), Forcing, amplitude=far, frequency=(1e-6, 1e6), phase=far))
+    forcing = Forcing(**_numbers(keys.get("forcing"), amplitude=far, frequency=(1e-6, 1e6), phase=far))
     if "forcing" not in keys and model.term("periodic_forcing") is not None:
         term = model.term("periodic_forcing")
         assert term is not None
@@ -371,7 +375,7 @@ def _experiment(document: Node, folder: Path, elements: tuple[Path, ...]) -> Exp
         if name not in delays and (term := model.term(label)) is not None:
             nodes_delay[name] = Delay(term.values["delay"].value)
     noise = Noise(
-        **_numbers(keys.get("noise"), Noise, measurement_std=(0, math.inf), correlation=(0, 0.9999),
+        **_numbers(keys.get("noise"), measurement_std=(0, math.inf), correlation=(0, 0.9999),
                    quantisation=(0, math.inf))
     )  # fmt: skip
     time = _time(keys.get("time"))
@@ -383,7 +387,7 @@ def _experiment(document: Node, folder: Path, elements: tuple[Path, ...]) -> Exp
             given["position"].number() if "position" in given else 0.0,
             given["velocity"].number() if "velocity" in given else 0.0,
         )
-    seed = int(keys["seed"].number(0, 2**31)) if "seed" in keys else 0
+    seed = keys["seed"].whole(0, 2**31 - 1) if "seed" in keys else 0
     namespace = keys["namespace"].text() if "namespace" in keys else "/hopper"
     if not namespace.startswith("/"):
         keys["namespace"].fail("a namespace starts with '/'")
@@ -409,9 +413,9 @@ def _time(node: Node | None) -> TimeMode:
     if "layout" in keys:
         made["layout"] = keys["layout"].choice(["composed", "processes"])
     if "rate" in keys:
-        made["rate"] = int(keys["rate"].number(1, 100_000))
+        made["rate"] = keys["rate"].whole(1, 100_000)
     if "window" in keys:
-        made["window"] = int(keys["window"].number(1, 100))
+        made["window"] = keys["window"].whole(1, 100)
     return TimeMode(**made)
 
 
@@ -420,12 +424,12 @@ def _safety(node: Node | None) -> Safety:
         return Safety()
     keys = node.mapping(["max_effort", "ramp", "stale_after", "envelope"])
     made: dict[str, Any] = {
-        name: keys[name].number(low, math.inf)
+        name: keys[name].number(low=low)
         for name, low in (("max_effort", 0.0), ("ramp", 0.0), ("stale_after", 1e-3))
         if name in keys
     }
     if "envelope" in keys:
-        ends = [end.number() for end in keys["envelope"].items()]
+        ends = [end.number(finite=False) for end in keys["envelope"].items()]
         if len(ends) != 2 or not ends[0] < ends[1]:
             keys["envelope"].fail("two positions [low, high] in m are expected, low < high")
         made["envelope"] = (ends[0], ends[1])

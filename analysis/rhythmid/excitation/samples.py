@@ -6,25 +6,13 @@ from typing import Literal
 
 import numpy as np
 
-from rhythmid.errors import InputError
 from rhythmid.excitation.excitation import Array, Excitation
+from rhythmid.time_table import read_time_table
 
 
 @lru_cache(maxsize=8)
 def _table(file: str) -> tuple[Array, Array]:
-    try:
-        table = np.genfromtxt(file, delimiter=",", comments="#", invalid_raise=False)
-    except OSError as error:
-        raise InputError(f"{file}: the excitation cannot be read: {error}") from None
-    table = np.atleast_2d(table)
-    if table.shape[1] < 2:
-        raise InputError(f"{file}: two columns are expected: time [s], force [N]")
-    table = table[1:] if np.isnan(table[0]).any() else table  # a header line
-    if len(table) == 0 or not np.isfinite(table[:, :2]).all():
-        raise InputError(f"{file}: holds a value that is not a finite number")
-    if np.any(np.diff(table[:, 0]) <= 0):
-        raise InputError(f"{file}: the times must increase")
-    return table[:, 0], table[:, 1]
+    return read_time_table(file, "force [N]")
 
 
 class Samples(Excitation):
