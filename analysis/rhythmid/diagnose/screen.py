@@ -1,0 +1,253 @@
+"""Score tests: which elements of the catalogue would explain the residual of the nominal fit?
+
+For each first guess of each element the change of the free run is found by adding the element's force along the fitted
+trajectory as a disturbance (its change of the output, for sensors; the changed stamps, for timing). Projected off what
+the nominal parameters and initial states can do, its correlation with the residual is Rao's score statistic,
+asymptotically chi-squared with one degree of freedom when the element is absent
+(C. R. Rao, Math. Proc. Camb. Phil. Soc. 44 (1948) 50). One simulation a guess, and nothing is compiled for a model.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2 as chi2_distribution
+
+from rhythmid.effect import Path, effect_along
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.elements.element import Element, Scales
+from rhythmid.errors import InputError
+from rhythmid.identify.free_run import FreeRun, prepare_run
+from rhythmid.identify.noise import NoiseModel, runs
+from rhythmid.identify.output_error import Fit, minimise
+from rhythmid.model import Model
+from rhythmid.signal import first_order_hold
+from rhythmid.simulate import delayed_command
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Change:
+    """What one first guess of one element does to the free run: `outputs`, block averages of each series."""
+
+    key: int
+    element: Element
+    values: Mapping[str, float]
+    outputs: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
+class Score:
+    """How well one first guess of one element explains the residual.
+
+    `statistic` is the score test's chi-squared; `size` the factor on the guess that fits best (an element whose sign is
+    physics scores 0 when that is negative).
+    """
+
+    key: int
+    element: Element
+    values: Mapping[str, float]
+    statistic: float
+    size: float
+
+    @property
+    def start(self) -> dict[str, float]:
+        """First guess for a refit: the size scaled to what the score suggests."""
+        if not self.element.size:
+            return dict(self.values)
+        scaled = dict(self.values)
+        name = self.element.size
+        low, high = self.element.parameter(name).bounds
+        factor = float(np.clip(self.size, -30.0, 30.0))
+        if abs(factor) < 0.05:
+            factor = math.copysign(0.05, factor)
+        value = self.element.absent + factor * (scaled[name] - self.element.absent)
+        margin = 1e-3 * abs(scaled[name])
+        scaled[name] = float(np.clip(value, low + margin if low > -math.inf else low, high))
+        return scaled
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """The fitted free run: paths of all series and the structure that takes disturbances."""
+
+    fit: Fit
+    disturbed: FreeRun
+    paths: tuple[Path, ...]
+    outputs: tuple[Array, ...]  # samples (n,) of each series, as the sensor says
+    commands: tuple[Array, ...]
+
+
+def trajectories(fit: Fit) -> Trajectories:
+    """Run the fitted model once and keep all that elements may depend on."""
+    run = fit.run
+    disturbed = replace(prepare_run(fit.model, run.series, run.max_step, disturbed=True), max_step=run.max_step)
+    paths, outputs, commands = [], [], []
+    q = run.states
+    for index, (one, start) in enumerate(zip(run.series, fit.starts)):
+        rows = disturbed.rows(fit.model, index, start)
+        if rows is None:
+            raise InputError(f"{one.name}: the fitted model diverges")
+        acceleration = np.gradient(rows[:, 1], one.time)
+        body = _body_force(fit.model, one.time, rows[:, 0], rows[:, 1], rows[:, q + 1])
+        leg = fit.model.mass.value * acceleration - rows[:, q + 1] - body
+        command = delayed_command(fit.model, one.command)
+        signal = np.zeros(len(one.time)) if command is None else _evaluate(command, one.time)
+        paths.append(Path(one.time, rows[:, 0], rows[:, 1], rows[:, q + 1], leg, rows[:, q]))
+        outputs.append(rows[:, q].copy())
+        commands.append(signal)
+    return Trajectories(fit, disturbed, tuple(paths), tuple(outputs), tuple(commands))
+
+
+def _evaluate(signal, time: Array) -> Array:
+    value = np.asarray(signal(np.maximum(time, signal.x[0])))
+    return np.where(time < signal.x[0], 0.0 if signal.c.shape[0] == 1 else value, value)
+
+
+def _body_force(model: Model, time: Array, x: Array, v: Array, f: Array) -> Array:
+    total = np.zeros(len(time))
+    for term in model.terms:
+        element = term.element
+        if element.slot == "force" and element.acts == "body" and element.kernel is not None and not element.states:
+            values = {name: value.value for name, value in term.values.items()}
+            total += effect_along(element, values, model, Path(time, x, v, f, total, x))
+    return total
+
+
+def change_of_output(known: Trajectories, element: Element, values: Mapping[str, float]) -> list[Array] | None:
+    """Change of each series' block-averaged output when the element with these values joins the fitted model.
+
+    None when the model diverges with it.
+    """
+    fit, run = known.fit, known.disturbed
+    changes: list[Array] = []
+    if element.delay is not None:
+        model = fit.model.with_element(element, values, fixed=True)
+        outputs = fit.run.outputs(model, fit.starts)
+        if outputs is None:
+            return None
+        return [new - one.average(old) for new, one, old in zip(outputs, run.series, known.outputs)]
+    for index, (one, path) in enumerate(zip(run.series, known.paths)):
+        if element.slot == "sensor":
+            path = replace(path, signal=known.outputs[index])
+            changes.append(one.average(effect_along(element, values, fit.model, path)))
+            continue
+        if element.slot == "actuator":
+            path = replace(path, signal=path.effort)
+        elif element.slot == "command":
+            path = replace(path, signal=known.commands[index])
+        force = effect_along(element, values, fit.model, path)
+        if not np.isfinite(force).all():
+            return None
+        if not np.any(force):
+            changes.append(np.zeros(one.blocks))
+            continue
+        rows = run.rows(fit.model, index, fit.starts[index], first_order_hold(path.time, force))
+        if rows is None:
+            return None
+        changes.append(one.average(rows[:, run.states]) - one.average(known.outputs[index]))
+    return changes
+
+
+def whitened(fit: Fit, samples: Sequence[Array], noise: NoiseModel) -> list[Array]:
+    """Used stretches of each series, whitened and joined."""
+    found = []
+    for one, given in zip(fit.run.series, samples):
+        parts = [noise.whiten(given[s]) for s in runs(one.used) if s.stop - s.start > noise.order + 1]
+        found.append(np.concatenate(parts) if parts else given[:0])
+    return found
+
+
+def parameter_basis(fit: Fit) -> Array:
+    """Orthonormal basis (n, r) of what small changes of the free parameters do."""
+    jacobian = fit.linearisation.jacobian
+    norms = np.linalg.norm(jacobian, axis=0)
+    if not (norms > 0).any():
+        return np.zeros((len(fit.linearisation.residual), 0))
+    left, singular, _ = np.linalg.svd(jacobian[:, norms > 0] / norms[norms > 0], full_matrices=False)
+    return left[:, singular > 1e-9 * singular[0]]
+
+
+def guesses(catalogue: Catalogue, model: Model, sizes: Scales) -> list[tuple[Element, dict[str, float]]]:
+    """First guesses of every element that could be missing from the model."""
+    found: list[tuple[Element, dict[str, float]]] = []
+    present = {term.element.name for term in model.terms}
+    for element in catalogue.values():
+        if not element.candidate or element.starts is None or element.name in present:
+            continue
+        if element.rotational and model.units.position != "rad":
+            continue
+        if any(model.borrowed(source, default) is None for source, default in element.borrows.values()):
+            continue
+        found += [(element, dict(start)) for start in element.starts(sizes)]
+    return found
+
+
+def changes_of(
+    known: Trajectories,
+    candidates: Sequence[tuple[Element, dict[str, float]]],
+    pool: ThreadPoolExecutor | None = None,
+) -> list[Change]:
+    """Changes that all guesses make; those that make the model diverge, or change nothing, are left out."""
+
+    def one(case: tuple[int, tuple[Element, dict[str, float]]]) -> Change | None:
+        key, (element, values) = case
+        outputs = change_of_output(known, element, values)
+        if outputs is None or not all(np.isfinite(o).all() for o in outputs) or not any(np.any(o) for o in outputs):
+            return None
+        return Change(key, element, values, tuple(outputs))
+
+    cases = list(enumerate(candidates))
+    return [change for change in (pool.map(one, cases) if pool else map(one, cases)) if change is not None]
+
+
+def score(fit: Fit, changes: Sequence[Change]) -> list[Score]:
+    """Scores of all changes under the fit's noise model, best first."""
+    left = parameter_basis(fit)
+    residual = fit.linearisation.residual
+    residual = residual - left @ (left.T @ residual)
+    found: list[Score] = []
+    for one in changes:
+        white = whitened(fit, one.outputs, fit.noise)
+        raw = math.sqrt(sum(float(w @ w) for w in white))
+        joined = np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])
+        change = joined - left @ (left.T @ joined)
+        strength = float(change @ change)
+        if not math.isfinite(strength) or raw == 0.0 or strength <= (1e-6 * raw) ** 2:
+            continue  # the nominal parameters do the same
+        size = -float(change @ residual) / strength
+        statistic = size**2 * strength
+        element = one.element
+        if element.size:
+            low, high = element.parameter(element.size).bounds
+            signed = element.absent + size * (one.values[element.size] - element.absent)
+            if (signed < low and low >= element.absent) or (signed > high and high <= element.absent):
+                statistic = 0.0
+        found.append(Score(one.key, element, one.values, statistic, size))
+    return sorted(found, key=lambda s: -s.statistic)
+
+
+def under(fit: Fit, noise: NoiseModel, pool: ThreadPoolExecutor | None = None) -> Fit:
+    """The fit repeated under another noise model, from where it is."""
+    return minimise(fit.model, fit.run, fit.names, noise, fit.starts, 10, pool)
+
+
+def residual_line(fit: Fit) -> float:
+    """Frequency [Hz] of the strongest line in the residuals of the longest series."""
+    index = max(range(len(fit.run.series)), key=lambda i: fit.run.series[i].blocks)
+    one, residual = fit.run.series[index], fit.residuals[index][fit.run.series[index].used]
+    power = np.abs(np.fft.rfft((residual - residual.mean()) * np.hanning(len(residual)))) ** 2
+    power[:2] = 0.0
+    return float(np.argmax(power) / (len(residual) * one.period * one.block))
+
+
+def p_value(scores: Sequence[Score], inflation: float = 1.0) -> float:
+    """Probability of a best score as high as this where nothing is missing (Bonferroni over all guesses)."""
+    if not scores:
+        return 1.0
+    best = scores[0].statistic / max(inflation, 1.0)
+    return float(min(1.0, len(scores) * chi2_distribution.sf(best, 1)))

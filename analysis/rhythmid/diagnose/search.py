@@ -1,0 +1,262 @@
+"""Forward search for missing elements, then pruning: the model that explains the records with the fewest effects.
+
+Each round scores the whole catalogue (cheap), refits the most promising elements with everything free (dear), and keeps
+the best if it is worth its parameters. Afterwards every element must defend its place: against being left out, against
+a simpler member of its family, and, where there are several, against the other candidates.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.compiled import compile_model
+from rhythmid.diagnose.refit import Proposal, Trial, propose, run_trials, under_noise, whole_fit
+from rhythmid.diagnose.screen import (
+    Change,
+    Score,
+    changes_of,
+    guesses,
+    p_value,
+    residual_line,
+    score,
+    trajectories,
+    under,
+)
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
+from rhythmid.identify.output_error import Fit, noise_of
+from rhythmid.identify.series import Series, scales
+from rhythmid.model import Model
+
+Array = NDArray[np.float64]
+Tell = Callable[[str], None]
+
+WORTH = 10.0  # difference of the information criterion below which two models are told apart by nothing but hope
+LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
+REFITTED = 6  # elements of a round that are refitted; the right one was among the first five in all of 234 trials
+MOST = 4  # effects at once
+
+
+@dataclass(frozen=True)
+class Round:
+    """One round of the search: the scores, best first, and the probability of such a best score by chance."""
+
+    scores: tuple[Score, ...]
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Search:
+    """What the search found.
+
+    `nominal` is the refitted nominal model, `best` the chosen one (the nominal one when nothing is missing) and `fit` its
+    full fit, all under the same `noise`. `trials` are all models that were refitted, by information criterion;
+    `excluded` those that could not be simulated, with the reason.
+    """
+
+    nominal: Fit
+    best: Trial
+    fit: Fit
+    noise: NoiseModel
+    trials: tuple[Trial, ...]
+    rounds: tuple[Round, ...]
+    excluded: tuple[tuple[tuple[str, ...], str], ...]
+
+
+def noise_without(fit: Fit, changes: Sequence[Change], count: int = 3) -> NoiseModel:
+    """Noise model of the residual less what the best few guesses explain of it.
+
+    The residual of a model that lacks something is not noise; taking the strongest suspects out first keeps their
+    effect from passing for colour, and changes next to nothing where nothing is missing.
+    """
+    ranked = score(fit, changes)[:count]
+    residuals = [r.copy() for r in fit.residuals]
+    if ranked:
+        picked = [next(c for c in changes if c.key == s.key) for s in ranked]
+        used = [one.used for one in fit.run.series]
+        design = np.concatenate(
+            [np.column_stack([c.outputs[i][u] for c in picked]) for i, u in enumerate(used)]
+        )
+        norms = np.linalg.norm(design, axis=0)
+        norms[norms == 0.0] = 1.0
+        target = np.concatenate([r[u] for r, u in zip(residuals, used)])
+        solution = np.linalg.lstsq(design / norms, -target, rcond=1e-6)[0] / norms
+        for i, r in enumerate(residuals):
+            r += np.column_stack([c.outputs[i] for c in picked]) @ solution
+    stretches = [r[s] for r, one in zip(residuals, fit.run.series) for s in runs(one.used)]
+    return estimate_noise(stretches, floor=fit.noise.std * 1e-6)
+
+
+def _one_round(
+    fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None, colour: bool
+) -> tuple[Round, Fit]:
+    """Score the catalogue at a fit; with `colour` the noise model is settled first, and the fit returned under it."""
+    sizes = replace(scales(fit.run.series, fit.model), residual_frequency=residual_line(fit))
+    changes = changes_of(trajectories(fit), guesses(catalogue, fit.model, sizes), pool)
+    if colour:
+        fit = under(fit, noise_without(fit, changes), pool)
+    scores = score(fit, changes)
+    return Round(tuple(scores), p_value(scores)), fit
+
+
+def _distinct(scores: Sequence[Score], count: int) -> list[tuple[Score, list[Score]]]:
+    """The best score of each of the first `count` elements, with all scores of that element."""
+    found: dict[str, list[Score]] = {}
+    for one in scores:
+        if one.statistic <= 0.0:
+            continue
+        found.setdefault(one.element.name, []).append(one)
+    return [(group[0], group) for group in list(found.values())[:count]]
+
+
+def _proposals(
+    base: Model, added: tuple[str, ...], scores: Sequence[Score], count: int, chi2: float
+) -> tuple[list[Proposal], list[float]]:
+    """Structures worth a refit, with chi2 below which one start of each is enough."""
+    chosen = _distinct(scores, count)
+    made, enough = [], []
+    for best, group in chosen:
+        starts = [one.start for one in group[:3]]
+        if best.element.size:
+            starts.append(dict(group[0].values))
+        made.append(propose(base, best.element, starts[:4], added))
+        enough.append(chi2 - 0.9 * best.statistic)
+    return made, enough
+
+
+def search(
+    series: Sequence[Series],
+    nominal: Fit,
+    catalogue: Catalogue,
+    pool: ThreadPoolExecutor | None,
+    tell: Tell = lambda _: None,
+    most: int = MOST,
+) -> Search:
+    """Search the catalogue for what the nominal model lacks; `nominal` is its fit to the same series."""
+    step = nominal.run.max_step
+    tell("scoring the catalogue")
+    first, nominal = _one_round(nominal, catalogue, pool, colour=True)
+    current, noise = nominal, nominal.noise
+    base = Trial((), nominal.model, nominal.starts, nominal.chi2, nominal.samples, len(nominal.names), nominal.converged)
+    trials: dict[tuple[str, ...], Trial] = {(): base}
+    best = base
+    rounds, excluded = [first], []
+    now = first
+    while now.p_value < LEVEL and len(best.added) < most:
+        proposals, enough = _proposals(best.model, best.added, now.scores, REFITTED, best.chi2)
+        tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
+        found, failed = run_trials(
+            proposals, series, best.starts, current.run.compiled.layout.states, noise, step, enough
+        )
+        excluded += failed
+        if not found:
+            break
+        trials |= {tuple(sorted(t.added)): t for t in found}
+        top = found[0]
+        fit = whole_fit(top, series, noise, step, pool=pool)
+        settled = noise_of(fit, floor=1e-9 * float(np.std(series[0].averaged)))
+        compared = under_noise(
+            [t for t in found if t.bic() - top.bic() < 60.0] + [best], series, settled, step
+        )
+        trials |= {tuple(sorted(t.added)): t for t in compared}
+        winner = compared[0]
+        before = next((t for t in compared if t.added == best.added), best)
+        if winner.added == best.added or before.bic() - winner.bic() < WORTH:
+            break
+        noise = settled
+        best = winner
+        tell(f"{best.added[-1]} explains it better by {before.bic() - winner.bic():.0f}; looking for more")
+        current = whole_fit(best, series, noise, step, pool=pool)
+        if len(best.added) >= most:
+            break
+        now, _ = _one_round(current, catalogue, pool, colour=False)
+        rounds.append(now)
+    if best.added:
+        best, more = _defend(best, series, catalogue, trials, noise, step, rounds, tell)
+        trials |= more
+        noise = noise_of(whole_fit(best, series, noise, step, pool=pool), floor=1e-9)
+    ranked = under_noise(_contenders(trials, best), series, noise, step)
+    best = next(t for t in ranked if set(t.added) == set(best.added))
+    fit = whole_fit(best, series, noise, step, pool=pool)
+    return Search(under(nominal, noise, pool), best, fit, noise, tuple(ranked), tuple(rounds), tuple(excluded))
+
+
+def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial, count: int = 10) -> list[Trial]:
+    """The models worth comparing at the end: the nominal one, the chosen one and its nearest rivals."""
+    rivals = sorted(trials.values(), key=lambda t: t.bic())[:count]
+    kept = {tuple(sorted(t.added)): t for t in [trials[()], *rivals]}
+    kept[tuple(sorted(best.added))] = best
+    return list(kept.values())
+
+
+def _defend(
+    best: Trial,
+    series: Sequence[Series],
+    catalogue: Catalogue,
+    trials: dict[tuple[str, ...], Trial],
+    noise: NoiseModel,
+    step: float,
+    rounds: Sequence[Round],
+    tell: Tell,
+) -> tuple[Trial, dict[tuple[str, ...], Trial]]:
+    """Let every added element defend its place; returns the survivor and the models that were tried on the way."""
+    tried: dict[tuple[str, ...], Trial] = {}
+    known = _states(best)
+    for _ in range(3):
+        proposals: list[Proposal] = []
+        for label in best.added:
+            rest = tuple(name for name in best.added if name != label)
+            slim = best.model.without(label)
+            if len(best.added) > 1:
+                proposals.append(Proposal(rest, slim, ({},)))
+            term = best.model.term(label)
+            assert term is not None
+            names = {e.name for e in catalogue.values() if term.element.name in e.special_case_of and e.candidate}
+            if len(best.added) > 1:
+                names |= {s.element.name for r in rounds for s, _ in _distinct(r.scores, 4)}
+            for name in sorted(names - {best.model.term(x).element.name for x in best.added}):  # type: ignore[union-attr]
+                starts = _starts_for(catalogue, name, series, slim, rounds)
+                if starts and tuple(sorted((*rest, name))) not in trials:
+                    proposals.append(propose(slim, catalogue[name], starts, rest))
+        proposals = [p for p in proposals if tuple(sorted(p.added)) not in tried]
+        if not proposals:
+            break
+        tell(f"testing {len(proposals)} simpler or other models")
+        found, _ = run_trials(proposals, series, best.starts, known, noise, step)
+        tried |= {tuple(sorted(t.added)): t for t in found}
+        simpler = [t for t in [*found, *trials.values()] if t.added and _simpler(t, best)]
+        better = [t for t in found if t.bic() < best.bic() - (0.0 if len(t.added) <= len(best.added) else WORTH)]
+        options = sorted(simpler + better, key=lambda t: (len(t.added), t.free, t.bic()))
+        if not options:
+            break
+        best = min(better, key=lambda t: t.bic()) if better else options[0]
+        known = _states(best)
+    return best, tried
+
+
+def _simpler(trial: Trial, best: Trial) -> bool:
+    """A model with fewer parameters that the information criterion does not reject, of the same family."""
+    if trial.free >= best.free or trial.bic() > best.bic() + WORTH:
+        return False
+    if set(trial.added) < set(best.added):
+        return trial.bic() < best.bic() + WORTH
+    extra = [trial.model.term(label) for label in trial.added if label not in best.added]
+    gone = [best.model.term(label) for label in best.added if label not in trial.added]
+    return len(extra) == len(gone) == 1 and gone[0].element.name in extra[0].element.special_case_of  # type: ignore[union-attr]
+
+
+def _states(trial: Trial) -> tuple[str, ...]:
+    return compile_model(trial.model).layout.states
+
+
+def _starts_for(
+    catalogue: Catalogue, name: str, series: Sequence[Series], model: Model, rounds: Sequence[Round]
+) -> list[dict[str, float]]:
+    scored = [s for r in rounds for s in r.scores if s.element.name == name and s.statistic > 0.0]
+    if scored:
+        return [max(scored, key=lambda s: s.statistic).start]
+    element = catalogue[name]
+    return [dict(s) for s in element.starts(scales(series, model))][:2] if element.starts else []
