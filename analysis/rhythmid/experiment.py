@@ -116,7 +116,7 @@ class NodeSpec:
 
 def plant_model(model: Model, forcing: Forcing, noise: Noise, catalogue: Catalogue | None = None) -> Model:
     """The model that the plant runs: with forcing and noise of the experiment added."""
-    known = catalogue or load_catalogue()
+    known = load_catalogue() if catalogue is None else catalogue
     if forcing.amplitude != 0.0 and not any(term.element.acts == "drive" for term in model.terms):
         values = {"amplitude": forcing.amplitude, "frequency": forcing.frequency, "phase": forcing.phase}
         model = model.with_element(known["periodic_forcing"], values, fixed=True)

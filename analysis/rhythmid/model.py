@@ -59,12 +59,12 @@ class Model:
     @classmethod
     def load(cls, path: str | Path, catalogue: Catalogue | None = None) -> "Model":
         """The model in a YAML file. Raises InputError naming line, parameter and unit of what is wrong."""
-        return _model(read(path), catalogue or load_catalogue())
+        return _model(read(path), load_catalogue() if catalogue is None else catalogue)
 
     @classmethod
     def from_text(cls, text: str, name: str = "model", catalogue: Catalogue | None = None) -> "Model":
         """The model in a YAML text; `name` stands for it in messages."""
-        return _model(parse(text, name), catalogue or load_catalogue())
+        return _model(parse(text, name), load_catalogue() if catalogue is None else catalogue)
 
     @property
     def parameters(self) -> dict[str, Value]:
@@ -130,8 +130,10 @@ class Model:
         return extended
 
     def without(self, label: str) -> "Model":
-        """A copy without the term called `label`."""
-        return replace(self, terms=tuple(term for term in self.terms if term.label != label))
+        """A copy without the term called `label`. Raises InputError when another element needs it."""
+        reduced = replace(self, terms=tuple(term for term in self.terms if term.label != label))
+        reduced.check_borrowed()
+        return reduced
 
     def term(self, name: str) -> Term | None:
         """The first term whose label is `name`, None where there is none."""
@@ -145,11 +147,15 @@ class Model:
     def check_borrowed(self) -> None:
         """Raise InputError when an element needs another one that the model lacks."""
         for term in self.terms:
-            for source, default in term.element.borrows.values():
-                if self.borrowed(source, default) is None:
-                    raise InputError(
-                        f"element {term.label!r} changes {source.split('.')[0]!r}, which the model does not have"
-                    )
+            if (lacking := self.lacking(term)) is not None:
+                raise InputError(f"element {term.label!r} needs {lacking!r}, which the model does not have")
+
+    def lacking(self, term: Term) -> str | None:
+        """Name of an element that `term` needs and the model lacks; None where nothing is lacking."""
+        for source, default in term.element.borrows.values():
+            if self.borrowed(source, default) is None:
+                return source.split(".")[0]
+        return None
 
     def to_yaml(self) -> str:
         """The model as YAML text that `load` reads back."""
@@ -291,15 +297,9 @@ def _model(document: Node, catalogue: Catalogue) -> Model:
     if mass.value <= 0.0:
         inertia["mass"].fail("must be greater than 0")
     taken: set[str] = set()
-    terms = [
-        _term(item, slot, catalogue, units, taken)
-        for slot in SLOTS
-        if slot in sections
-        for item in sections[slot].items()
-    ]
-    model = Model(mass, tuple(terms), units)
-    try:
-        model.check_borrowed()
-    except InputError as error:
-        raise InputError(f"{document.place.rsplit(':', 1)[0]}: {error}") from None
+    places = [(item, slot) for slot in SLOTS if slot in sections for item in sections[slot].items()]
+    model = Model(mass, tuple(_term(item, slot, catalogue, units, taken) for item, slot in places), units)
+    for (item, _), term in zip(places, model.terms):
+        if (lacking := model.lacking(term)) is not None:
+            item.fail(f"{term.label} needs {lacking!r}, which the model does not have")
     return model
