@@ -74,20 +74,27 @@ class Worker:
 class Grid(Worker):
     """Calls `tick(stamp_ns)` at every multiple of `period_ns` of the clock, without drift and without skipping.
 
-    After an overrun the missed ticks follow at once, each with its own grid stamp; how late each came is in `lateness`.
+    After an overrun the missed ticks follow at once, each with its own grid stamp; how late they came is in `figures`.
     """
 
-    def __init__(
-        self, clock: Clock, period_ns: int, tick: Callable[[int], None], lateness: Lateness, priority: int = 0
-    ) -> None:
+    def __init__(self, clock: Clock, period_ns: int, tick: Callable[[int], None], priority: int = 0) -> None:
         super().__init__("grid", self._loop, priority)
-        self._clock, self._period_ns, self._tick, self._lateness = clock, period_ns, tick, lateness
+        self._clock, self._period_ns, self._tick = clock, period_ns, tick
+        self._lateness = Lateness()
+        self._first_ns = self._last_ns = 0
+
+    def figures(self) -> dict[str, str]:
+        """Ticks per second so far, and how late they came, for /diagnostics."""
+        elapsed = (self._last_ns - self._first_ns) * 1e-9
+        rate = (self._lateness.count - 1) / elapsed if elapsed > 0.0 else 0.0
+        return {"rate_hz": f"{rate:.3f}", **self._lateness.summary("lateness")}
 
     def _loop(self) -> None:
-        due = (self._clock.now() // self._period_ns + 2) * self._period_ns
+        self._first_ns = due = (self._clock.now() // self._period_ns + 2) * self._period_ns
         while not self.stopping.is_set():
             self._clock.sleep_until(due)
-            self._lateness.add(max(0, self._clock.now() - due))
+            self._last_ns = self._clock.now()
+            self._lateness.add(max(0, self._last_ns - due))
             self._tick(due)
             due += self._period_ns
 

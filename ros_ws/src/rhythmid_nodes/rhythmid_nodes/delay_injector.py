@@ -82,14 +82,15 @@ class DelayInjector(GraphNode):
 
     def figures(self) -> dict[str, str]:
         applied = self._applied_ns / self._relayed * 1e-6 if self._relayed else 0.0
-        return {
+        figures = {
             "relayed": str(self._relayed),
-            "dropped": str(self._dropped),
-            "queued": str(len(self._queue)),
             "delay_ms": f"{self._delay_ns * 1e-6:.6f}" if self._profile is None else "profile",
             "applied_delay_mean_ms": f"{applied:.6f}",
-            **self._error.summary("delay_error"),
         }
+        if self.lockstep:
+            return figures
+        queue = {"queued": str(len(self._queue)), "dropped": str(self._dropped)}
+        return {**figures, **queue, **self._error.summary("delay_error")}
 
     def obstacles(self) -> list[str]:
         found = [] if self._input.matched else [f"no publisher of {self._input.topic}"]

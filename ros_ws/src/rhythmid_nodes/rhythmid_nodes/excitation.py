@@ -24,7 +24,6 @@ from rhythmid.experiment import Safety, ramped
 
 from .clock import Clock, Grid
 from .joint_state import JointStateReader, JointStateWriter
-from .lateness import Lateness
 from .lockstep import Credit
 from .node import COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
 from .parameters import Parameter
@@ -65,8 +64,8 @@ class ExcitationNode(GraphNode):
         self._fade_length = round(self.values["ramp"] * self.values["rate"])
         self._seen_ns: int | None = None
         self._ended_at: float | None = None
+        self._grid: Grid | None = None
         self._position = float("nan")
-        self._lateness = Lateness()
         self._lock = threading.Lock()  # measurements and services come on another thread than ticks
         self._reader = JointStateReader(self.values["joint"])
         self._writer = JointStateWriter(self.values["joint"], "effort")
@@ -83,8 +82,8 @@ class ExcitationNode(GraphNode):
             self.create_subscription(
                 JointState, "joint_states", self._on_measurement, qos_profile_sensor_data, raw=True
             )
-            grid = Grid(self._wall, self.period_ns, self._tick, self._lateness, self.values["priority"])
-            self.workers.append(grid)
+            self._grid = Grid(self._wall, self.period_ns, self._tick, self.values["priority"])
+            self.workers.append(self._grid)
         if self.values["unattended"]:
             self.create_timer(0.05, self._attend)
 
@@ -115,7 +114,7 @@ class ExcitationNode(GraphNode):
             "sent": str(self._sent),
             "of": str(len(self._effort)),
             "peak_effort": f"{np.max(np.abs(self._effort), initial=0.0):g}",
-            **self._lateness.summary("lateness"),
+            **(self._grid.figures() if self._grid else {}),
         }
 
     def obstacles(self) -> list[str]:

@@ -7,6 +7,7 @@ import gc
 import os
 import signal
 import sys
+import time
 import traceback
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -103,38 +104,49 @@ def serve(build: Sequence[Callable[[], GraphNode]], arguments: list[str]) -> int
     sys.setswitchinterval(2e-4)  # a waiting clock thread gets the interpreter within 0.2 ms
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     nodes: list[GraphNode] = []
-    code = 0
+    problems: list[BaseException] = []
     try:
         nodes.extend(make() for make in build)
-        executor = EventsExecutor()
-        for node in nodes:
-            executor.add_node(node)
-        gc.collect()
-        gc.freeze()  # later collections look at young objects only, which takes microseconds
-        for node in nodes:
-            node.begin()
-        while not asked and not any(node.done for node in nodes):
-            executor.spin_once(timeout_sec=0.1)  # EventsExecutor.spin() never returns on a signal
-            for node in nodes:
-                if node.failure is not None:
-                    raise node.failure
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        code = 2
-    except Exception:
-        traceback.print_exc()
-        code = 1
-    finally:
-        for node in nodes:
-            try:
-                node.close()
-            except Exception:
-                traceback.print_exc()
-                code = code or 1
-        for node in nodes:
-            node.destroy_node()
-        try_shutdown()
-    return code
+        _spin(nodes, asked)
+    except Exception as problem:
+        problems.append(problem)
+    for node in nodes:
+        try:
+            node.close()
+        except Exception as problem:
+            problems.append(problem)
+        if node.failure is not None and node.failure not in problems:
+            problems.append(node.failure)
+    for node in nodes:
+        node.destroy_node()
+    try_shutdown()
+    for problem in problems:
+        if isinstance(problem, InputError):
+            print(f"error: {problem}", file=sys.stderr)
+        else:
+            traceback.print_exception(problem)
+    return 0 if not problems else 2 if isinstance(problems[0], InputError) else 1
+
+
+def _spin(nodes: Sequence[GraphNode], asked: list[int]) -> None:
+    """Serve callbacks until `asked` is filled by a signal or a node is done; raises what a worker died of."""
+    executor = EventsExecutor()
+    for node in nodes:
+        executor.add_node(node)
+    gc.collect()
+    gc.freeze()  # later collections look at young objects only, which takes microseconds
+    for node in nodes:
+        node.begin()
+    look_at = 0.0
+    while not asked:
+        executor.spin_once(timeout_sec=0.1)  # EventsExecutor.spin() never returns on a signal
+        if time.monotonic() > look_at:
+            look_at = time.monotonic() + 0.1
+            failure = next((node.failure for node in nodes if node.failure is not None), None)
+            if failure is not None:
+                raise failure
+            if any(node.done for node in nodes):
+                return
 
 
 def run(build: Callable[[], GraphNode]) -> None:

@@ -6,6 +6,7 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from sensor_msgs.msg import JointState
 
 from rhythmid.elements.catalogue import load_catalogue
@@ -16,7 +17,6 @@ from rhythmid.plant import Plant
 
 from .clock import Clock, Grid
 from .joint_state import JointStateReader, JointStateWriter
-from .lateness import Lateness
 from .lockstep import Acknowledger, Credit, block
 from .node import COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
 from .parameters import Parameter
@@ -60,10 +60,12 @@ class PlantNode(GraphNode):
         self._forcing = self.create_publisher(JointState, "forcing", profile)
         self._command_topic = self.resolve_topic_name("command")
         self._commands = self._late = self._foreign = self._samples = 0
-        self._lateness = Lateness()
         self._newest_ns = -1
+        self._grid: Grid | None = None
         if self.lockstep:
             self._block = block(self.values["window"])
+            self._block_stamps: list[int] = []
+            self._block_efforts: list[float] = []
             self._count = self.values["count"]
             if self._count == 0:
                 raise InputError("parameter count = 0: in lockstep the number of samples must be known")
@@ -82,8 +84,8 @@ class PlantNode(GraphNode):
             self._done_ns = 0  # time since the origin up to which the plant has been integrated
             self._arrived: deque[tuple[int, int, float]] = deque()
             self.create_subscription(JointState, "command", self._on_realtime, profile, raw=True)
-            grid = Grid(self._wall, self.period_ns, self._tick, self._lateness, self.values["priority"])
-            self.workers.append(grid)
+            self._grid = Grid(self._wall, self.period_ns, self._tick, self.values["priority"])
+            self.workers.append(self._grid)
 
     def _build(self) -> Plant:
         values = self.values
@@ -107,13 +109,11 @@ class PlantNode(GraphNode):
         return plant()
 
     def figures(self) -> dict[str, str]:
-        return {
-            "samples": str(self._samples),
-            "commands": str(self._commands),
-            "late_commands": str(self._late),
-            "foreign_commands": str(self._foreign),
-            **self._lateness.summary("lateness"),
-        }
+        figures = {"samples": str(self._samples), "commands": str(self._commands)}
+        if self._grid is None:
+            return figures
+        late = {"late_commands": str(self._late), "foreign_commands": str(self._foreign)}
+        return {**figures, **late, **self._grid.figures()}
 
     def obstacles(self) -> list[str]:
         found = []
@@ -141,17 +141,21 @@ class PlantNode(GraphNode):
         sample = self._reader.read(data)
         if sample is None:
             raise InputError(f"a command does not name the joint {self.values['joint']!r}")
-        self._plant.push(sample.stamp_ns, sample.effort)
-        self._newest_ns = sample.stamp_ns
+        self._block_stamps.append(sample.stamp_ns)
+        self._block_efforts.append(sample.effort)
         self._commands += 1
-        self._ack.taken(self._commands)
-        if self._commands % self._block == 0 or self._commands >= self._count:
+        if len(self._block_stamps) == self._block or self._commands >= self._count:
+            self._plant.push_many(np.array(self._block_stamps, dtype=np.int64), np.array(self._block_efforts))
+            self._newest_ns = sample.stamp_ns
+            self._block_stamps.clear()
+            self._block_efforts.clear()
+            self._ack.taken(self._commands)
             self._advance_lockstep()
 
     def _advance_lockstep(self) -> None:
         last = min(self._credit.limit, self._count) - 1
         until_ns = min(self._newest_ns, last * self.period_ns)
-        if until_ns >= 0:
+        if until_ns >= self._samples * self.period_ns:
             self._publish(until_ns, origin_ns=0)
 
     # Real time: a command acts from its stamp on, which is when it was released, even between two ticks; one that

@@ -53,11 +53,12 @@ class Track:
         return self.type_name == _STREAM
 
     def check(self, period_ns: int) -> str:
-        """Duplicates, steps back and longest interval; missing samples where the stamps lie on a grid."""
+        """Rate, duplicates, steps back, longest interval; missing samples where the stamps lie on a grid."""
         if len(self.stamps) < 2:
             return ""
         steps = np.diff(np.array(self.stamps))
-        found = f", {np.sum(steps == 0)} duplicates, {np.sum(steps < 0)} backwards"
+        rate = len(steps) / max(np.sum(steps) * 1e-9, 1e-9)
+        found = f", {rate:.3f} Hz, {np.sum(steps == 0)} duplicates, {np.sum(steps < 0)} backwards"
         if self.is_stream and not np.any(steps % period_ns):
             found += f", {np.sum(steps) // period_ns - len(steps)} missing"
         return f"{found}, longest interval {np.max(steps) * 1e-6:.3f} ms"
@@ -77,6 +78,7 @@ class Recorder(GraphNode):
         self._skipped = 0
         self._wall = Clock()
         self._simulated_ns = 0
+        self._streams: list[Track] = []  # filled when every topic has been found
         self._ack = (
             Acknowledger(self, values["window"], self.period_ns, values["count"]) if self.lockstep else None
         )
@@ -119,6 +121,8 @@ class Recorder(GraphNode):
             track.type_name = type_name
             track.has_header = next(iter(fields.values()), "") == "std_msgs/Header"
             self._bag.add_topic(topic, type_name, publishers)
+            if all(known.type_name for known in self._tracks.values()):
+                self._streams = [known for known in self._tracks.values() if known.is_stream]
 
         def receive(data: bytes) -> None:
             self._receive(topic, track, data)
@@ -134,12 +138,8 @@ class Recorder(GraphNode):
             if track.has_header:
                 track.stamps.append(stamp_ns)
             self._bag.put(topic, self._receive_time(track, stamp_ns), data)
-        if (
-            self._ack is not None
-            and track.is_stream
-            and all(sub.subscription for sub in self._inputs.values())
-        ):
-            self._ack.taken(min(other.received for other in self._tracks.values() if other.is_stream))
+        if self._ack is not None and self._streams:
+            self._ack.taken(min([stream.received for stream in self._streams]))
 
     def _receive_time(self, track: Track, stamp_ns: int) -> int:
         """The machine's time, or in lockstep the simulated one: the newest stamp of any stream."""
