@@ -148,12 +148,13 @@ def _indent(lines: list[str], depth: int) -> str:
 
 
 def generate(
-    terms: tuple[Term, ...], disturbed: bool = False, excited: InputKind = "force"
+    terms: tuple[Term, ...], disturbed: bool = False, excited: InputKind = "force", smooth: bool = False
 ) -> tuple[str, Layout]:
     """Source text of the module for this list of terms, and the layout of its arrays.
 
     `excited` says what the command is: a force on the mass; the displacement of the base that the leg stands on; or
-    the base's acceleration, where position and velocity are relative to the base.
+    the base's acceleration, where position and velocity are relative to the base. Steps end at the command's knots,
+    where a held command jumps, unless it is `smooth`.
     """
     writer = _right_hand_side(terms, excited)
     n = len(writer.states)
@@ -189,6 +190,8 @@ def generate(
     piece_w = "tw = kw[j]; e0 = cw[0, j]; e1 = cw[1, j]; e2 = cw[2, j]; e3 = cw[3, j]"
     piece_d = "td = kd[l]; g0 = cd[0, l]; g1 = cd[1, l]; g2 = cd[2, l]; g3 = cd[3, l]"
     following = ["while kw[j + 1] <= t:", "    j += 1", piece_w]  # smooth signals: no step ends at their knots
+    if smooth:
+        following += ["while ku[i + 1] <= t:", "    i += 1", piece_u]
     if disturbed:
         following += ["while kd[l + 1] <= t:", "    l += 1", piece_d]
     find = ["while ku[i + 1] <= t:", "    i += 1", piece_u, *following]
@@ -243,7 +246,7 @@ def run(times, ku, cu, kw, cw, kd, cd, parameters, start, max_step, out):
         end = times[k]
         while t < end:
 {_indent(find, 3)}
-            until = min(end, ku[i + 1])
+            until = {"end" if smooth else "min(end, ku[i + 1])"}
             substeps = int(math.ceil((until - t) / max_step * (1.0 - 1e-9)))
             if substeps < 1:
                 substeps = 1
@@ -290,9 +293,9 @@ def load_module(text: str) -> Callable[..., int]:
 
 @lru_cache(maxsize=512)
 def _structure(
-    key: tuple[tuple[str, str, str], ...], terms: "_Terms", disturbed: bool, excited: InputKind
+    key: tuple[tuple[str, str, str], ...], terms: "_Terms", disturbed: bool, excited: InputKind, smooth: bool
 ) -> Compiled:
-    text, layout = generate(terms.terms, disturbed, excited)
+    text, layout = generate(terms.terms, disturbed, excited, smooth)
     return Compiled(layout, load_module(text))
 
 
@@ -309,14 +312,17 @@ class _Terms:
         return isinstance(other, _Terms)
 
 
-def compile_model(model: Model, disturbed: bool = False, excited: InputKind = "force") -> Compiled:
+def compile_model(
+    model: Model, disturbed: bool = False, excited: InputKind = "force", smooth: bool = False
+) -> Compiled:
     """The compiled structure of a model; parameter values play no part.
 
-    With `disturbed` the structure takes a further, arbitrary force on the mass as a signal; `excited` as in `generate`.
+    With `disturbed` the structure takes a further, arbitrary force on the mass as a signal; `excited` and `smooth` as in
+    `generate`.
     """
     terms = tuple(term for term in model.terms if term.element.kernel is not None)
     key = tuple((term.label, term.element.name, term.element.source) for term in terms)
-    return _structure(key, _Terms(terms), disturbed, excited)
+    return _structure(key, _Terms(terms), disturbed, excited, smooth)
 
 
 def generate_rates(terms: tuple[Term, ...], excited: InputKind = "force") -> tuple[str, Layout]:

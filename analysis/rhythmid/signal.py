@@ -69,6 +69,22 @@ def continuous(time: Array, value: Array, hold: Hold) -> PPoly:
     return {"zero": zero_order_hold, "linear": first_order_hold, "band_limited": band_limited}[hold](time, value)
 
 
+def impulse_preserving(held: PPoly) -> PPoly:
+    """Smooth stand-in for a zero-order-held command that is sampled far above the machine's dynamics.
+
+    The derivative of a cubic spline through the command's integral at its knots: between any two knots it has the same
+    impulse, so a mass cannot tell the two apart, and an integrator need not stop at every knot.
+    """
+    knots, values = held.x[:-1], held.c[-1]
+    step = float(np.median(np.diff(knots)))
+    padding = step * np.arange(-8, 0)
+    grid = np.concatenate([knots[0] + padding, knots, [knots[-1] + step]])
+    level = np.concatenate([np.zeros(len(padding)), values])
+    impulse = np.concatenate([[0.0], np.cumsum(level * np.diff(grid))])
+    slopes = CubicSpline(grid, impulse, bc_type=((1, 0.0), (1, float(values[-1])))).derivative()
+    return PPoly(slopes.c, slopes.x, extrapolate=True)
+
+
 def pieces(signal: PPoly | None) -> tuple[Array, Array]:
     """Knots (K+1,) and cubic coefficients (4, K), lowest power first, extended over all time.
 

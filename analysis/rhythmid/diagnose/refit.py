@@ -22,6 +22,8 @@ from rhythmid.parallel import fork_map
 from rhythmid.simulate import start_states
 
 Array = NDArray[np.float64]
+BRIEF, THOROUGH = 8, 25  # iterations
+PROMISING = 0.5  # share of the spread of chi2 within which a model is carried to convergence
 
 
 @dataclass(frozen=True)
@@ -86,8 +88,8 @@ def _fit_proposal(
     known: Sequence[str],
     noise: NoiseModel,
     max_step: float,
-    enough: float = -math.inf,
-    iterations: int = 25,
+    enough: float,
+    iterations: int,
 ) -> _Outcome:
     """Fit a proposal from its guesses, starting in `starts` (whose states are `known` by name), stopping early once chi2 falls below `enough`.
 
@@ -132,11 +134,14 @@ def run_trials(
     max_step: float,
     enough: Sequence[float] | None = None,
 ) -> tuple[list[Trial], list[tuple[tuple[str, ...], str]]]:
-    """Fit all proposals in parallel. Returns the trials, best first, and those excluded with the reason."""
+    """Fit all proposals in parallel. Returns the trials, best first, and those excluded with the reason.
+
+    A few iterations from each guess first, until chi2 is `enough`; then the promising ones are carried to convergence.
+    """
     goals = list(enough) if enough is not None else [-math.inf] * len(proposals)
 
     def one(case: tuple[Proposal, float]) -> _Outcome:
-        return _fit_proposal(case[0], series, starts, known, noise, max_step, case[1])
+        return _fit_proposal(case[0], series, starts, known, noise, max_step, case[1], BRIEF)
 
     trials: list[Trial] = []
     excluded: list[tuple[tuple[str, ...], str]] = []
@@ -145,7 +150,14 @@ def run_trials(
             excluded.append((proposals[index].added, str(result)))
         else:
             trials.append(_trial(proposals[index].added, proposals[index].model, result))
-    return sorted(trials, key=lambda trial: trial.bic()), excluded
+    if not trials:
+        return [], excluded
+    best = min(trial.chi2 for trial in trials)
+    worst = max(trial.chi2 for trial in trials)
+    open_ones = [t for t in trials if not t.converged and t.chi2 - best <= PROMISING * max(worst - best, t.samples)]
+    finished = under_noise(open_ones, series, noise, max_step, THOROUGH)
+    done = {t.added for t in finished}
+    return sorted([*finished, *(t for t in trials if t.added not in done)], key=lambda t: t.bic()), excluded
 
 
 def whole_fit(
@@ -157,12 +169,12 @@ def whole_fit(
 
 
 def under_noise(
-    trials: Sequence[Trial], series: Sequence[Series], noise: NoiseModel, max_step: float
+    trials: Sequence[Trial], series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int = 15
 ) -> list[Trial]:
     """The trials fitted again under another noise model, best first."""
 
     def one(trial: Trial) -> _Outcome:
-        return _outcome(whole_fit(trial, series, noise, max_step))
+        return _outcome(whole_fit(trial, series, noise, max_step, iterations))
 
     again = [
         _trial(trials[index].added, trials[index].model, result)

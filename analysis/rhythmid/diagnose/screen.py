@@ -78,7 +78,7 @@ class Trajectories:
     fit: Fit
     disturbed: FreeRun
     paths: tuple[Path, ...]
-    outputs: tuple[Array, ...]  # samples (n,) of each series, as the sensor says
+    outputs: tuple[Array, ...]  # of each series at its block centres, as the sensor says
     commands: tuple[Array, ...]
 
 
@@ -92,12 +92,12 @@ def trajectories(fit: Fit) -> Trajectories:
         rows = disturbed.rows(fit.model, index, start)
         if rows is None:
             raise InputError(f"{one.name}: the fitted model diverges")
-        acceleration = np.gradient(rows[:, 1], one.time)
-        body = _body_force(fit.model, one.time, rows[:, 0], rows[:, 1], rows[:, q + 1])
+        acceleration = np.gradient(rows[:, 1], one.centres)
+        body = _body_force(fit.model, one.centres, rows[:, 0], rows[:, 1], rows[:, q + 1])
         leg = fit.model.mass.value * acceleration - rows[:, q + 1] - body
         command = delayed_command(fit.model, one.command)
-        signal = np.zeros(len(one.time)) if command is None else _evaluate(command, one.time)
-        paths.append(Path(one.time, rows[:, 0], rows[:, 1], rows[:, q + 1], leg, rows[:, q]))
+        signal = np.zeros(one.blocks) if command is None else _evaluate(command, one.centres)
+        paths.append(Path(one.centres, rows[:, 0], rows[:, 1], rows[:, q + 1], leg, rows[:, q]))
         outputs.append(rows[:, q].copy())
         commands.append(signal)
     return Trajectories(fit, disturbed, tuple(paths), tuple(outputs), tuple(commands))
@@ -130,11 +130,11 @@ def change_of_output(known: Trajectories, element: Element, values: Mapping[str,
         outputs = fit.run.outputs(model, fit.starts)
         if outputs is None:
             return None
-        return [new - one.average(old) for new, one, old in zip(outputs, run.series, known.outputs)]
+        return [new - one.of_block(old) for new, one, old in zip(outputs, run.series, known.outputs)]
     for index, (one, path) in enumerate(zip(run.series, known.paths)):
         if element.slot == "sensor":
             path = replace(path, signal=known.outputs[index])
-            changes.append(one.average(effect_along(element, values, fit.model, path)))
+            changes.append(one.of_block(effect_along(element, values, fit.model, path)))
             continue
         if element.slot == "actuator":
             path = replace(path, signal=path.effort)
@@ -149,7 +149,7 @@ def change_of_output(known: Trajectories, element: Element, values: Mapping[str,
         rows = run.rows(fit.model, index, fit.starts[index], first_order_hold(path.time, force))
         if rows is None:
             return None
-        changes.append(one.average(rows[:, run.states]) - one.average(known.outputs[index]))
+        changes.append(one.of_block(rows[:, run.states] - known.outputs[index]))
     return changes
 
 

@@ -42,7 +42,7 @@ class Fit:
     """A fitted model.
 
     `values` (p,) of the parameters `names` with `covariance` (p, p); `starts` the state of each series at its first
-    sample; `residuals` simulated less measured block averages; `chi2` the whitened sum of squares over `samples`
+    block; `residuals` simulated less measured block averages; `chi2` the whitened sum of squares over `samples`
     averages that were used. `converged` is False where the search stopped for another reason, told by `message`.
     """
 
@@ -80,7 +80,7 @@ class Fit:
 
 
 def first_guess(model: Model, run: FreeRun) -> list[Array]:
-    """Starting states from the first samples of each series: position and slope of a straight line through them."""
+    """State at the first block of each series: position and slope of a straight line through its first samples."""
     found: list[Array] = []
     for one in run.series:
         span = 0.05 / max(dominant_frequency(one), 1e-9)
@@ -335,7 +335,8 @@ def _covariance(jacobian: Array, priors: Sequence) -> Array:
             information[i, i] += 1.0 / (prior.std * norms[i]) ** 2
     eigenvalues, vectors = np.linalg.eigh(information)
     inverse = np.where(eigenvalues > 1e-11 * max(eigenvalues[-1], 1e-300), 1.0 / np.maximum(eigenvalues, 1e-300), 1e24)
-    return (vectors * inverse) @ vectors.T / np.outer(norms, norms)
+    with np.errstate(over="ignore"):
+        return (vectors * inverse) @ vectors.T / np.outer(norms, norms)
 
 
 def noise_of(fit: Fit, floor: float = 0.0) -> NoiseModel:
@@ -370,7 +371,7 @@ def estimate(
     fit = minimise(model, run, chosen, scaled, guess, iterations, pool)
     rms = math.sqrt(fit.chi2 / max(fit.samples, 1)) * scaled.std
     if max_step is None:
-        finer = accurate(run, fit.model, fit.starts, max(0.02 * rms, 1e-8 * spread))
+        finer = accurate(run, fit.model, fit.starts, max(0.1 * rms, 1e-7 * spread))
         run = finer
     for _ in range(2):
         noise = noise_of(fit, floor=1e-9 * spread)
