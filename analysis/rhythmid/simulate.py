@@ -90,7 +90,7 @@ def simulate(
     """
     times = np.ascontiguousarray(times, dtype=float)
     physical = np.ascontiguousarray(physical_times(model, times))
-    if len(times) < 1 or np.any(np.diff(physical) < 0):
+    if len(times) < 1 or not np.isfinite(physical).all() or np.any(np.diff(physical) < 0):
         raise InputError("simulation times must increase")
     compiled = compile_model(model)
     start = np.asarray(initial, dtype=float)

@@ -1,0 +1,82 @@
+"""Signals between their samples: held, joined, or band-limited."""
+
+import numpy as np
+import pytest
+
+from rhythmid.signal import (
+    FAR,
+    band_limited,
+    continuous,
+    first_order_hold,
+    pieces,
+    shifted,
+    spline,
+    zero_order_hold,
+)
+
+TIME = np.arange(2000) * 1e-3
+
+
+def evaluate(signal, at):
+    """What the compiled simulator makes of a signal: its pieces at any times."""
+    knots, coefficients = pieces(signal)
+    index = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2)
+    local = np.where(np.abs(knots[index]) < FAR / 2, at - knots[index], 0.0)
+    c = coefficients[:, index]
+    return c[0] + local * (c[1] + local * (c[2] + local * c[3]))
+
+
+def test_a_held_command_keeps_each_value_until_the_next():
+    held = zero_order_hold(np.array([1.0, 2.0, 4.0]), np.array([5.0, -1.0, 3.0]))
+    at = np.array([-10.0, 0.999, 1.0, 1.999, 2.0, 3.9, 4.0, 1e6])
+    np.testing.assert_array_equal(evaluate(held, at), [0, 0, 5, 5, -1, -1, 3, 3])
+
+
+def test_straight_lines_join_the_samples_and_keep_the_ends():
+    joined = first_order_hold(np.array([0.0, 1.0, 3.0]), np.array([0.0, 2.0, -2.0]))
+    np.testing.assert_allclose(evaluate(joined, np.array([-5, 0.5, 1, 2, 3, 99.0])), [0, 1, 2, 0, -2, -2])
+
+
+def test_a_spline_follows_a_well_sampled_forcing():
+    time = np.arange(0, 3, 1e-3)
+    signal = spline(time, np.cos(2 * np.pi * time))
+    at = np.linspace(0, 2.9, 977)
+    np.testing.assert_allclose(evaluate(signal, at), np.cos(2 * np.pi * at), atol=1e-11)
+
+
+def test_a_spline_of_two_samples_is_a_straight_line():
+    np.testing.assert_allclose(
+        evaluate(spline(np.array([0.0, 1.0]), np.array([1.0, 3.0])), np.array([0.5])), [2.0]
+    )
+
+
+@pytest.mark.parametrize(("share", "error"), [(0.02, 1e-8), (0.1, 3e-6), (0.25, 1e-4), (0.4, 6e-4)])
+def test_a_band_limited_signal_is_found_between_its_samples(share, error):
+    """`share` is the frequency over the sample rate; a straight line between samples errs by 2e-3 at a share of 0.02."""
+    omega = 2 * np.pi * share / 1e-3
+    signal = band_limited(TIME, np.sin(omega * TIME + 0.3))
+    at = np.linspace(0.5, 1.5, 4567)  # away from the ends
+    np.testing.assert_allclose(evaluate(signal, at), np.sin(omega * at + 0.3), atol=error)
+
+
+def test_a_band_limited_signal_passes_through_its_samples_up_to_the_ends():
+    values = np.random.default_rng(1).standard_normal(len(TIME))
+    np.testing.assert_allclose(evaluate(band_limited(TIME, values), TIME), values, atol=1e-10)
+
+
+def test_a_band_limited_ramp_stays_a_ramp():
+    at = np.linspace(0.0, TIME[-1], 999)
+    np.testing.assert_allclose(evaluate(band_limited(TIME, 3 * TIME - 1), at), 3 * at - 1, atol=1e-12)
+
+
+@pytest.mark.parametrize("hold", ["zero", "linear", "band_limited"])
+def test_a_shifted_signal_is_the_same_later(hold):
+    signal = continuous(TIME, np.sin(9 * TIME), hold)
+    at = np.linspace(-1, 3, 1234) + 1.7e-5  # off the jumps
+    np.testing.assert_allclose(
+        evaluate(shifted(signal, 0.0403), at + 0.0403), evaluate(signal, at), atol=1e-9
+    )
+
+
+def test_no_signal_is_zero():
+    np.testing.assert_array_equal(evaluate(None, np.array([-1e9, 0.0, 1e9])), 0.0)
