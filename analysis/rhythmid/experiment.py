@@ -124,7 +124,7 @@ def plant_model(model: Model, forcing: Forcing, noise: Noise, catalogue: Catalog
         values = {"std": noise.measurement_std, "correlation": noise.correlation}
         model = model.with_element(known["measurement_noise"], values, fixed=True)
     if noise.quantisation > 0.0:
-        model = model.with_element(known["sensor_quantisation"], {"step": noise.quantisation}, fixed=True)
+        model = model.with_element(known["sensor_quantisation"], {"resolution": noise.quantisation}, fixed=True)
     return model
 
 
