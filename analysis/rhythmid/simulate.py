@@ -33,12 +33,15 @@ class Trajectory:
 
 
 def physical_times(model: Model, stamps: Array) -> Array:
-    """When the measurements stamped `stamps` [s] were taken: stamps less delay, skew and jitter of the model."""
+    """When the measurements stamped `stamps` [s] were taken: stamps less delay, skew and jitter of the model.
+
+    A measurement cannot overtake an earlier one.
+    """
     times = np.asarray(stamps, dtype=float)
     for term in model.terms:
         if term.element.slot in ("sensor", "timing") and term.element.delay is not None:
             times = times - term.element.delay(stamps, **{n: v.value for n, v in term.values.items()})
-    return times
+    return np.maximum.accumulate(times)
 
 
 def delayed_command(model: Model, command: PPoly | None) -> PPoly | None:
@@ -90,7 +93,7 @@ def simulate(
     """
     times = np.ascontiguousarray(times, dtype=float)
     physical = np.ascontiguousarray(physical_times(model, times))
-    if len(times) < 1 or not np.isfinite(physical).all() or np.any(np.diff(physical) < 0):
+    if len(times) < 1 or not np.isfinite(physical).all() or np.any(np.diff(times) < 0):
         raise InputError("simulation times must increase")
     compiled = compile_model(model)
     start = np.asarray(initial, dtype=float)

@@ -1,6 +1,6 @@
 """Measurement jitter: every sample is older than its stamp by its own random delay, uniform on [0, sqrt(12) sigma].
 
-The draw is a function of the stamp and the seed alone, so that a run can be repeated; samples keep their order. The
+The draw is a function of the stamp and the seed alone, so that a run can be repeated; samples keep their order (the simulator sees to it). The
 mean, sqrt(3) sigma, acts as measurement delay. What remains is noise of standard deviation sigma |v|. A simulation
 with another seed does not repeat the real draw: sigma is estimated from the residual's variance against v^2, and from
 the roll-off of |H_m| with w, not by output error.
@@ -8,16 +8,8 @@ the roll-off of |H_m| with w, not by output error.
 
 import math
 
-import numpy as np
-
 from rhythmid.elements.element import Element, Parameter
 from rhythmid.elements.random_delay import uniform_delay
-
-
-def delay_of(stamps, std, seed):
-    taken = stamps - uniform_delay(stamps, std, seed)
-    return stamps - np.maximum.accumulate(taken)  # a sample is never older than the one before it
-
 
 ELEMENT = Element(
     name="measurement_jitter",
@@ -28,7 +20,7 @@ ELEMENT = Element(
         Parameter("std", "s", "standard deviation σ of the delay", bounds=(0.0, math.inf)),
         Parameter("seed", "1", "seed of the random draw", default=0.0, fixed=True),
     ),
-    delay=delay_of,
+    delay=uniform_delay,
     size="std",
     candidate=False,
     starts=lambda s: [{"std": 0.2 * s.period}],
