@@ -1,8 +1,9 @@
 """Elastoplastic hysteresis: a spring that yields, F = -k_h z, with dz/dt = v (1 - (z / z_y)^2) while loading, else v.
 
 The smooth Jenkins element (Bouc-Wen with exponent 2 and no degradation): stiff at reversals, sliding at the force
-k_h z_y; the loop does not depend on speed. Coulomb friction is its limit for z_y -> 0 with k_h z_y kept. A yield
-displacement shorter than the way travelled in one integration step is lengthened to it, at the same sliding force.
+k_h z_y; the loop does not depend on speed. Coulomb friction is its limit for z_y -> 0 with k_h z_y kept. The state is
+the share z / z_y; where the mass travels more than z_y in one integration step, it changes over that travel instead,
+at the same sliding force.
 """
 
 from math import inf
@@ -10,11 +11,11 @@ from math import inf
 from rhythmid.elements.element import STEP, Element, Parameter
 
 
-def kernel(x, v, t, f, stiffness, yield_displacement, step, deflection):
-    reach = max(yield_displacement, abs(v) * step, 1e-300)
-    share = max(-1.0, min(1.0, deflection / reach))
-    loading = v * deflection > 0.0
-    return -stiffness * yield_displacement * share, v * (1.0 - share * share) if loading else v
+def kernel(x, v, t, f, stiffness, yield_displacement, step, share):
+    rate = v / max(yield_displacement, abs(v) * step, 1e-300)
+    if v * share > 0.0:
+        rate *= 1.0 - share * share
+    return -stiffness * yield_displacement * share, rate
 
 
 ELEMENT = Element(
@@ -28,7 +29,7 @@ ELEMENT = Element(
     ),
     borrows={"step": (STEP, 1e-3)},
     kernel=kernel,
-    states=("deflection",),
+    states=("share",),
     size="stiffness",
     starts=lambda s: [
         {"stiffness": 0.02 * s.stiffness / w, "yield_displacement": w * s.position} for w in (0.1, 0.4, 1.5)

@@ -1,9 +1,9 @@
 """LuGre friction: bristles that bend before they slide, with the Stribeck curve as their steady state.
 
 F = -(sigma_0 z + sigma_1 dz/dt), dz/dt = v - sigma_0 |v| z / g(v), g(v) = F_c [1 + (r - 1) exp(-(v / v_s)^2)], written
-with the presliding displacement z_c = F_c / sigma_0 and the bristle's damping time T = sigma_1 / sigma_0. A viscous
-part is a `viscous_damper` of its own. Bristles shorter than the way travelled in one integration step are lengthened
-to it, which leaves the steady state as it is.
+with the presliding displacement z_c = F_c / sigma_0, the bristle's damping time T = sigma_1 / sigma_0 and the state
+z / z_c. A viscous part is a `viscous_damper` of its own. Where the mass travels more than z_c in one integration step,
+the bristles bend over that travel instead, which leaves the steady state as it is.
 
 Five parameters are too many to search for: it is a plant's friction, or the refinement to try by hand where both
 `stribeck_friction` and `elastoplastic_hysteresis` have been named.
@@ -14,13 +14,11 @@ import math
 from rhythmid.elements.element import STEP, Element, Parameter
 
 
-def kernel(x, v, t, f, force, static_ratio, stribeck_speed, presliding, damping_time, step, deflection):
+def kernel(x, v, t, f, force, static_ratio, stribeck_speed, presliding, damping_time, step, share):
     falling = v / max(stribeck_speed, 1e-300)
     level = 1.0 + (static_ratio - 1.0) * math.exp(-falling * falling)
-    reach = max(presliding * level, abs(v) * step, 1e-300)
-    rate = v - abs(v) * deflection / reach
-    bent = max(-1.0, min(1.0, deflection / reach))
-    return -force * level * (bent + damping_time * rate / reach), rate
+    rate = (v - abs(v) * share / level) / max(presliding, abs(v) * step, 1e-300)
+    return -force * (share + damping_time * rate), rate
 
 
 ELEMENT = Element(
@@ -37,7 +35,7 @@ ELEMENT = Element(
     ),
     borrows={"step": (STEP, 1e-3)},
     kernel=kernel,
-    states=("deflection",),
+    states=("share",),
     size="force",
     candidate=False,
     starts=lambda s: [
