@@ -8,9 +8,10 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from importlib.machinery import SourceFileLoader
 from importlib.metadata import entry_points
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 
 from rhythmid.elements.element import SLOTS, Element
 from rhythmid.errors import InputError
@@ -19,12 +20,22 @@ ENTRY_POINT_GROUP = "rhythmid.elements"
 BUILT_IN = Path(__file__).parent
 
 
+class _Source(SourceFileLoader):
+    """Loads a user's file from its source alone: leaves nothing beside it and never misses a change."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        return self.source_to_code(self.get_data(self.path), self.path)
+
+
 def _module(path: Path) -> ModuleType:
-    name = f"rhythmid.elements.{path.parent.name}.{path.stem}" if BUILT_IN in path.parents else f"_element_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
+    if BUILT_IN in path.parents:
+        spec = importlib.util.spec_from_file_location(f"rhythmid.elements.{path.parent.name}.{path.stem}", path)
+    else:
+        name = f"_element_{path.stem}"
+        spec = importlib.util.spec_from_file_location(name, path, loader=_Source(name, str(path)))
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # inspect.getsource needs to find it
+    sys.modules[spec.name] = module  # inspect.getsource needs to find it
     try:
         spec.loader.exec_module(module)
     except Exception as error:  # whatever a user's file raises is bad input, not a failure of ours

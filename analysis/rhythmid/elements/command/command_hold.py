@@ -1,8 +1,8 @@
 """Command hold: the drive takes a new command only every P seconds and holds it (zero-order hold at its own rate).
 
-A command waits for the next tick t = k P; of those that wait together the last one counts. On average this is a delay of P/2
-with the roll-off of the hold. It is meant for commands that are themselves held from stamp to stamp. Ticks are counted from the
-record's start; another phase of the ticks acts like another delay of up to P.
+A command waits for the next tick t = k P; of those that wait together the last one counts. On average this is a delay
+of P/2 with the roll-off of the hold. It is meant for commands that are themselves held from stamp to stamp. Ticks are
+counted from the record's start; another phase of the ticks acts like another delay of up to P.
 """
 
 import math

@@ -1,0 +1,149 @@
+"""Promises that every element of the catalogue keeps."""
+
+from dataclasses import replace
+from math import isfinite
+
+import numpy as np
+import pytest
+
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.model import Model
+from rhythmid.signal import spline, zero_order_hold
+from rhythmid.simulate import simulate
+
+CATALOGUE = load_catalogue()
+NOMINAL = ("gravity", "linear_spring", "switched_damper", "input_delay", "measurement_delay")
+ADDABLE = [name for name in CATALOGUE if name not in NOMINAL]
+WITHOUT_STARTS = {
+    "periodic_forcing": {"amplitude": 0.5, "frequency": 1.3},
+    "constant_force": {"force": 0.1},
+    "measurement_noise": {"std": 1e-3, "correlation": 0.5},
+}
+# the contract: names that model files and other programs rely on
+CONTRACT = [
+    "input_delay", "periodic_forcing", "gravity", "linear_spring", "switched_damper", "viscous_damper",
+    "constant_force", "measurement_delay", "measurement_noise", "coulomb_friction",
+    "asymmetric_coulomb_friction", "stribeck_friction", "quadratic_drag", "flight_damping",
+    "switching_threshold", "position_dependent_damping", "cubic_stiffness", "quadratic_stiffness",
+    "bilinear_stiffness", "ground_contact_loss", "end_stop_contact", "position_ripple",
+    "elastoplastic_hysteresis", "viscoelastic_relaxation", "second_mode", "stiffness_drift", "stiffness_jump",
+    "periodic_disturbance", "actuator_lag", "command_lag", "actuator_saturation", "actuator_deadband",
+    "actuator_nonlinearity", "backlash", "actuator_gain", "actuator_fade", "command_hold", "command_jitter",
+    "sensor_lag", "sensor_nonlinearity", "sensor_gain", "sensor_offset", "sensor_drift", "sensor_quantisation",
+    "measurement_jitter", "clock_skew", "delay_drift",
+]  # fmt: skip
+
+STAMPS = np.arange(3001, dtype=np.float64) * 1e-3
+CHIRP = zero_order_hold(STAMPS, 1.5 * np.sin(2 * np.pi * (0.5 * STAMPS + 0.4 * STAMPS**2)))
+FORCING = spline(STAMPS, np.cos(2 * np.pi * STAMPS))
+RELEASE = (0.25, 0.0)  # above the rest length, so that the hopper lifts off
+
+
+def starts_of(name, scales):
+    element = CATALOGUE[name]
+    return element.starts(scales) if element.starts else [WITHOUT_STARTS[name]]
+
+
+def output(model: Model, max_step: float = 1e-3) -> np.ndarray:
+    return simulate(model, STAMPS, CHIRP, FORCING, RELEASE, max_step, seed=1).output
+
+
+@pytest.fixture(scope="module")
+def without(rig):
+    return output(rig.hopper)
+
+
+def test_the_catalogue_holds_every_name_of_the_contract():
+    assert set(CONTRACT) <= set(CATALOGUE)
+
+
+@pytest.mark.parametrize("name", list(CATALOGUE))
+def test_says_what_it_is_in_all_its_fields(name):
+    element = CATALOGUE[name]
+    assert element.name == name
+    assert element.title and element.equation and element.reference
+    assert element.size in [parameter.name for parameter in element.parameters] or name == "gravity"
+    assert set(element.confusable) <= set(CATALOGUE), "confusable with an element that does not exist"
+    assert set(element.special_case_of) <= set(CATALOGUE)
+    assert name not in element.confusable and all(element.confusable.values())
+    if element.candidate:
+        assert element.starts is not None, "a candidate needs first guesses"
+        assert element.confusable
+    for parameter in element.parameters:
+        assert parameter.description and parameter.unit
+        assert parameter.bounds[0] < parameter.bounds[1]
+        if parameter.default is not None:
+            assert parameter.bounds[0] <= parameter.default <= parameter.bounds[1]
+    for source, _ in element.borrows.values():
+        owner, _, parameter = source.partition(".")
+        assert owner in ("inertia", "simulation") or CATALOGUE[owner].parameter(parameter)
+
+
+@pytest.mark.parametrize("name", [name for name in CATALOGUE if CATALOGUE[name].starts])
+def test_first_guesses_are_complete_and_within_bounds(name, scales):
+    element = CATALOGUE[name]
+    assert element.starts is not None
+    for known in (scales, replace(scales, residual_frequency=3.3), replace(scales, position=1e-5, stiffness=1e6)):
+        guesses = element.starts(known)
+        assert guesses
+        for guess in guesses:
+            assert {p.name for p in element.parameters if p.default is None} <= set(guess)
+            for key, value in guess.items():
+                low, high = element.parameter(key).bounds
+                assert isfinite(value) and low <= value <= high
+            assert guess[element.size] != element.absent
+    element.starts(replace(scales, effort=0.0, forcing_frequency=0.0))  # a free decay
+
+
+@pytest.mark.parametrize("name", ADDABLE)
+def test_acts_and_vanishes_when_its_size_is_absent(name, rig, scales, without):
+    element = CATALOGUE[name]
+    for guess in starts_of(name, scales)[:2]:
+        model = rig.hopper.with_element(element, guess)
+        with_it = output(model)
+        effect = np.abs(with_it - without).max()
+        assert effect > 1e-6 or (name == "actuator_saturation" and guess["limit"] > 2.4)
+        absent = model.with_values({f"{name}.{element.size}": element.absent})
+        assert np.abs(output(absent) - without).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", [name for name in ADDABLE if CATALOGUE[name].kernel is not None])
+def test_one_step_a_millisecond_is_enough(name, rig, scales, without):
+    model = rig.hopper.with_element(CATALOGUE[name], starts_of(name, scales)[0])
+    coarse, fine = output(model), output(model, max_step=1.25e-4)
+    assert np.abs(coarse - fine).max() < 0.015 * np.abs(fine - without).max() + 1e-6
+
+
+@pytest.mark.parametrize("name", [name for name in ADDABLE if CATALOGUE[name].candidate])
+def test_can_be_differentiated_by_finite_differences(name, rig, scales):
+    element = CATALOGUE[name]
+    guess = starts_of(name, scales)[0]
+    model = rig.hopper.with_element(element, guess)
+    for parameter in element.parameters:
+        if parameter.fixed or name == "command_hold":  # ticks move in whole steps of the stamps
+            continue
+        scale = abs(guess[parameter.name]) or 1.0
+
+        def slope(step, key=f"{name}.{parameter.name}", value=guess[parameter.name], scale=scale):
+            up, down = (output(model.with_values({key: value + sign * step * scale})) for sign in (1, -1))
+            return (up - down) / (2 * step * scale)
+
+        fine, coarse = slope(0.002), slope(0.02)
+        assert np.linalg.norm(fine - coarse) < 0.25 * np.linalg.norm(coarse), parameter.name
+
+
+@pytest.mark.parametrize("name", ADDABLE)
+def test_comes_back_from_its_model_file(name, rig, scales):
+    model = rig.hopper.with_element(CATALOGUE[name], starts_of(name, scales)[0])
+    again = Model.from_text(model.to_yaml(), catalogue=CATALOGUE)
+    assert again.parameters == model.parameters
+    assert [term.label for term in again.terms] != [] and again.term(name) is not None
+
+
+def test_what_is_never_estimated_stays_so_through_a_model_file(rig):
+    seed = "command_jitter.seed"
+    model = rig.hopper.with_element(CATALOGUE["command_jitter"], {"std": 1e-3, "seed": 3.0})
+    assert model.parameters[seed].fixed and not model.parameters["command_jitter.std"].fixed
+    freed = model.with_parameters({seed: replace(model.parameters[seed], fixed=False)})
+    for given in (model, freed):
+        assert Model.from_text(given.to_yaml(), catalogue=CATALOGUE).parameters == given.parameters
