@@ -13,16 +13,18 @@ import hashlib
 import importlib.util
 import inspect
 import os
+import re
 import sys
 import textwrap
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from rhythmid.elements.element import STEP, Element
@@ -287,13 +289,37 @@ def load_module(text: str) -> Callable[..., int]:
         assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)
         sys.modules[name] = module
-        spec.loader.exec_module(module)
+        try:
+            spec.loader.exec_module(module)
+        except NumbaError as error:
+            raise InputError(_complaint(text, str(error))) from None
     return module.run
+
+
+def _complaint(text: str, complaint: str) -> str:
+    """One line of the compiler's page of complaint, with the elements that it mentions."""
+    kernels = set(re.findall(r"^def (\w+)\(", text, re.MULTILINE)) - {"rhs", "run"}
+    named = sorted(kernel for kernel in kernels if re.search(rf"\b{kernel}\(", complaint))
+    lines = [line.strip() for line in complaint.splitlines()]
+    lines = [line for line in lines if line and not line.startswith(("Failed in", "There are", "- Of which", "During"))]
+    return f"element {' or '.join(named) or '?'}: its kernel does not compile: {' '.join(lines[:2])[:200]}"
+
+
+def _key(terms: tuple[Term, ...]) -> Hashable:
+    """Equal for terms that compile to the same code, whatever their values; a kernel's code compares by content."""
+    return tuple(
+        (
+            term.label, term.element.name, term.element.slot, term.element.acts, term.element.states,
+            tuple(term.element.borrows.items()), tuple(parameter.name for parameter in term.element.parameters),
+            getattr(term.element.kernel, "__code__", None),
+        )
+        for term in terms
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=512)
 def _structure(
-    key: tuple[tuple[str, str, str], ...], terms: "_Terms", disturbed: bool, excited: InputKind, smooth: bool
+    key: Hashable, terms: "_Terms", disturbed: bool, excited: InputKind, smooth: bool
 ) -> Compiled:
     text, layout = generate(terms.terms, disturbed, excited, smooth)
     return Compiled(layout, load_module(text))
@@ -321,8 +347,7 @@ def compile_model(
     `generate`.
     """
     terms = tuple(term for term in model.terms if term.element.kernel is not None)
-    key = tuple((term.label, term.element.name, term.element.source) for term in terms)
-    return _structure(key, _Terms(terms), disturbed, excited, smooth)
+    return _structure(_key(terms), _Terms(terms), disturbed, excited, smooth)
 
 
 def generate_rates(terms: tuple[Term, ...], excited: InputKind = "force") -> tuple[str, Layout]:
@@ -352,7 +377,7 @@ def run(times, command, forcing, states, parameters, out):
 
 
 @lru_cache(maxsize=256)
-def _rates(key: tuple[tuple[str, str, str], ...], terms: "_Terms", excited: InputKind) -> Compiled:
+def _rates(key: Hashable, terms: "_Terms", excited: InputKind) -> Compiled:
     text, layout = generate_rates(terms.terms, excited)
     return Compiled(layout, load_module(text))
 
@@ -364,5 +389,4 @@ def compile_rates(model: Model, excited: InputKind = "force") -> Compiled:
     sensor output and total actuator force. Signals in the command path are taken as they are, without its delays.
     """
     terms = tuple(term for term in model.terms if term.element.kernel is not None)
-    key = tuple((term.label, term.element.name, term.element.source) for term in terms)
-    return _rates(key, _Terms(terms), excited)
+    return _rates(_key(terms), _Terms(terms), excited)
