@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.elements.element import Element
+from rhythmid.elements.element import STEP, Element
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import FreeRun, prepare_run
 from rhythmid.identify.noise import NoiseModel
@@ -81,6 +81,12 @@ def propose(base: Model, element: Element, guesses: Sequence[dict[str, float]], 
     return Proposal((*added, label), extended, named)
 
 
+def fine_enough(model: Model, step: float) -> float:
+    """Integration step [s] for a model: shorter where an element asks for the step because it may be stiff."""
+    stiff = any(source == STEP for term in model.terms for source, _ in term.element.borrows.values())
+    return min(step, 1e-3 if stiff else step)
+
+
 def _fit_proposal(
     proposal: Proposal,
     series: Sequence[Series],
@@ -95,7 +101,7 @@ def _fit_proposal(
 
     Raises InputError when the model diverges from every guess.
     """
-    run = prepare_run(proposal.model, series, max_step)
+    run = prepare_run(proposal.model, series, fine_enough(proposal.model, max_step))
     best: Fit | None = None
     failure: InputError | None = None
     for guess in proposal.guesses:
@@ -164,7 +170,7 @@ def whole_fit(
     trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int = 15, pool=None
 ) -> Fit:
     """The full fit of a trial under a noise model."""
-    run = prepare_run(trial.model, series, max_step)
+    run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
     return minimise(trial.model, run, tuple(trial.model.free), noise, trial.starts, iterations, pool)
 
 

@@ -119,26 +119,72 @@ class _Problem:
                 total += ((value.value - value.prior.mean) / value.prior.std) ** 2
         return total if math.isfinite(total) else math.inf
 
-    def linearise(
-        self, model: Model, starts: Sequence[Array], residuals: Sequence[Array], steps: Array, state_steps: Array
-    ) -> tuple[Linearisation, list[Array], Array, Array]:
-        """Sensitivities by forward differences whose steps settle at a ten-thousandth of the motion.
-
-        Returns the linearisation, the whitened state sensitivities of each series, and the next steps.
-        """
-        parameters = model.parameters
+    def _perturbed(
+        self, model: Model, starts: Sequence[Array], signed: Array, state_steps: Array, columns: Sequence[int]
+    ) -> list[list[Array] | None]:
+        """Outputs with parameter or (from p on) initial state of each of the `columns` moved by its step."""
         cases: list[tuple[Model, Sequence[Array]]] = []
+        for c in columns:
+            if c < len(self.names):
+                name = self.names[c]
+                cases.append((model.with_values({name: model.value(name) + signed[c]}), starts))
+            else:
+                shift = np.zeros(self.run.states)
+                shift[c - len(self.names)] = state_steps[c - len(self.names)]
+                cases.append((model, [start + shift for start in starts]))
+        return self.run.many(cases, self.pool)
+
+    def settle_steps(
+        self, model: Model, starts: Sequence[Array], residuals: Sequence[Array], steps: Array, state_steps: Array
+    ) -> tuple[Array, Array]:
+        """Difference steps under which every parameter and state moves the outputs by about the same small amount.
+
+        Their natural sizes span many powers of ten (a stiffness, a delay, a hidden state of an actuator).
+        """
+        base = [residual + one.averaged for residual, one in zip(residuals, self.run.series)]
+        joint = np.concatenate([steps, state_steps])
+        p = len(self.names)
+        todo = list(range(len(joint)))
+        for _ in range(4):
+            signed = self._signed(model, joint[:p])
+            outputs = self._perturbed(model, starts, signed, joint[p:], todo)
+            again = []
+            for c, case in zip(todo, outputs):
+                if case is None:
+                    joint[c] *= 1e-2
+                    again.append(c)
+                    continue
+                moved = max(float(np.sqrt(np.mean((new - old) ** 2))) for new, old in zip(case, base))
+                ratio = float(np.clip(1e-4 * self.spread / max(moved, 1e-30), 1e-4, 1e4))
+                joint[c] *= ratio
+                if not 0.1 < ratio < 10.0:
+                    again.append(c)
+            todo = again
+            if not todo:
+                break
+        return joint[:p], joint[p:]
+
+    def _signed(self, model: Model, steps: Array) -> Array:
+        """Steps that stay within the parameters' bounds."""
         signed = steps.copy()
         for i, name in enumerate(self.names):
-            value = parameters[name]
-            if value.value + signed[i] > value.bounds[1]:
+            value = model.parameters[name]
+            low, high = value.bounds
+            signed[i] = min(signed[i], 0.1 * (high - low))
+            if value.value + signed[i] > high:
                 signed[i] = -signed[i]
-            cases.append((model.with_values({name: value.value + signed[i]}), starts))
-        for j in range(self.run.states):
-            shift = np.zeros(self.run.states)
-            shift[j] = state_steps[j]
-            cases.append((model, [start + shift for start in starts]))
-        outputs = self.run.many(cases, self.pool)
+        return signed
+
+    def linearise(
+        self, model: Model, starts: Sequence[Array], residuals: Sequence[Array], steps: Array, state_steps: Array
+    ) -> tuple[Linearisation, list[tuple[Array, Array, Array]], Array, Array]:
+        """Sensitivities by forward differences whose steps settle at a ten-thousandth of the motion.
+
+        Returns the linearisation, each series' whitened residual and sensitivities to parameters and initial state, and the
+        next steps.
+        """
+        signed = self._signed(model, steps)
+        outputs = self._perturbed(model, starts, signed, state_steps, range(len(self.names) + self.run.states))
         base = [residual + one.averaged for residual, one in zip(residuals, self.run.series)]
         p, q = len(self.names), self.run.states
         rows, columns, bases, states, places = [], [], [], [], []
@@ -157,7 +203,7 @@ class _Problem:
             rows.append(projected[:, 0])
             columns.append(projected[:, 1:])
             bases.append(basis)
-            states.append(kept)
+            states.append((white[:, 0], white[:, 1 : 1 + p], kept))
             places.append(slice(place, place + len(white)))
             place += len(white)
         target = 1e-4 * self.spread
@@ -167,15 +213,15 @@ class _Problem:
         )
         return linearisation, states, steps * ratio[:p], state_steps * ratio[p:]
 
-    def state_update(self, index: int, white_state: Array, target: Array) -> Array:
-        """Least-squares change of a series' initial state (in units of its difference steps)."""
-        norms = np.linalg.norm(white_state, axis=0)
-        live = norms > 1e-9 * max(norms.max(initial=0.0), 1e-300)
-        change = np.zeros(white_state.shape[1])
-        if live.any():
-            scaled = white_state[:, live] / norms[live]
-            change[live] = np.linalg.lstsq(scaled, -target, rcond=1e-8)[0] / norms[live]
-        return change
+
+def _state_update(sensitivity: Array, target: Array) -> Array:
+    """Least-squares change of a series' initial state (in units of its difference steps)."""
+    norms = np.linalg.norm(sensitivity, axis=0)
+    live = norms > 1e-9 * max(norms.max(initial=0.0), 1e-300)
+    change = np.zeros(sensitivity.shape[1])
+    if live.any():
+        change[live] = np.linalg.lstsq(sensitivity[:, live] / norms[live], -target, rcond=1e-4)[0] / norms[live]
+    return change
 
 
 def _basis(columns: Array) -> tuple[Array, Array]:
@@ -185,7 +231,7 @@ def _basis(columns: Array) -> tuple[Array, Array]:
     if not live.any():
         return np.zeros((len(columns), 0)), columns
     left, singular, _ = np.linalg.svd(columns[:, live] / norms[live], full_matrices=False)
-    return left[:, singular > 1e-8 * singular[0]], columns
+    return left[:, singular > 1e-4 * singular[0]], columns
 
 
 def _first_steps(model: Model, names: Sequence[str], run: FreeRun) -> Array:
@@ -245,7 +291,8 @@ def minimise(
     steps = _first_steps(model, names, run)
     velocity = 2 * np.pi * max(dominant_frequency(one) for one in run.series) * problem.spread
     state_steps = 1e-4 * np.array([problem.spread, velocity, *([problem.spread] * (run.states - 2))])
-    damping, converged, message = 1e-3, False, f"no convergence in {iterations} iterations"
+    steps, state_steps = problem.settle_steps(model, current, residuals, steps, state_steps)
+    damping, converged, message = 1e-6, False, f"no convergence in {iterations} iterations"
     low = np.array([model.parameters[name].bounds[0] for name in names])
     high = np.array([model.parameters[name].bounds[1] for name in names])
     priors = [model.parameters[name].prior for name in names]
@@ -273,23 +320,20 @@ def minimise(
             step = proposed - values
             trial = model.with_values(dict(zip(names, proposed)))
             moved = []
-            for index, (start, state) in enumerate(zip(current, states)):
-                here = linearisation.pieces[index]
-                white = problem.whitened(index, residuals[index])
-                full = white + linearisation.jacobian[here] @ step
-                moved.append(start + problem.state_update(index, state, full) * state_steps)
+            for start, (error, slope, state) in zip(current, states):
+                moved.append(start + _state_update(state, error + slope @ step) * state_steps)
             trial_residuals = problem.residuals(trial, moved)
             trial_cost = problem.cost(trial, trial_residuals)
             if trial_cost < cost:
                 gain = cost - trial_cost
                 model, current, cost = trial, moved, trial_cost
                 residuals = trial_residuals
-                damping = max(damping * 0.2, 1e-12)
+                damping = max(damping * 0.1, 1e-12)
                 improved = True
                 if gain < tolerance or gain < 1e-7 * cost:
                     converged, message = True, "converged"
                 break
-            damping = max(damping * 6.0, 1e-6)
+            damping = max(damping * 10.0, 1e-6)
             if damping > 1e8:
                 break
         state_steps = state_steps_next
