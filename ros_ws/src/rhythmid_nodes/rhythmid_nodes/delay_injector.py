@@ -103,10 +103,14 @@ class DelayInjector(GraphNode):
     def _on_set(self, parameters: list[RosParameter]) -> SetParametersResult:
         for parameter in parameters:
             if parameter.name == DELAY.name:
+                try:
+                    delay = DELAY.check(parameter.value)  # ROS's own range check lets NaN pass
+                except InputError as error:
+                    return SetParametersResult(successful=False, reason=str(error))
                 if self._profile is not None:
                     return SetParametersResult(successful=False, reason="the delay follows a profile")
-                before, self._delay_ns = self._delay_ns, round(float(parameter.value or 0.0) * 1e9)
-                self.get_logger().info(f"delay {before * 1e-9:g} s -> {self._delay_ns * 1e-9:g} s")
+                self.get_logger().info(f"delay {self._delay_ns * 1e-9:g} s -> {delay:g} s")
+                self._delay_ns = round(delay * 1e9)
         return SetParametersResult(successful=True)
 
     def _on_run(self, message: String) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rclpy.duration import Duration
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -145,6 +146,7 @@ class ExcitationNode(GraphNode):
         with self._lock:
             if not self.lockstep and self._state in ("running", "ramping"):
                 self._halt(self._wall.now(), "the node was ended")
+                self._output.wait_for_all_acked(Duration(seconds=0.5))
         super().close()
 
     # Start and stop

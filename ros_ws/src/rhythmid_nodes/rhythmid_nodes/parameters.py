@@ -64,7 +64,7 @@ class Parameter:
                 descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=int(high))]
         return descriptor
 
-    def check(self, value: Any) -> Value:
+    def check(self, value: Any) -> Any:
         """`value` as the parameter's type; raises InputError if it is of another type or outside its range."""
         if self.items is not None or isinstance(self.default, list):
             wanted = type(self.default[0]) if isinstance(self.default, list) else self.items

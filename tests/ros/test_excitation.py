@@ -1,0 +1,185 @@
+"""Excitation over real topics: plays what the experiment says, and stops by itself when the machine is not safe."""
+
+import json
+import time
+
+import numpy as np
+import pytest
+from rclpy.qos import qos_profile_sensor_data
+from std_msgs.msg import String
+
+from rhythmid.errors import InputError
+from rhythmid.excitation.sequence import build
+from rhythmid.experiment import Safety, ramped
+from rhythmid_nodes.excitation import ExcitationNode
+from rhythmid_nodes.qos import latched
+
+CHIRP = {"type": "chirp", "amplitude": 0.5, "band": [1, 7], "sweep": 2.0}
+CONSTANT = {"type": "profile", "points": [[0.0, 0.5]], "length": 5.0}
+PERIOD_NS = 1_000_000
+
+
+def stamp_ns(message):
+    return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+
+
+class Robot:
+    """Publishes measurements at 200 Hz, best effort as robots do, for as long as it is asked to."""
+
+    def __init__(self, graph, qos=qos_profile_sensor_data):
+        self.position = 0.15
+        self._graph = graph
+        self._send = graph.talk("joint_states", qos=qos)
+        self._timer = graph.probe.create_timer(0.005, self._measure)
+
+    def _measure(self):
+        self._send(self._graph.joint_state(time.time_ns(), position=self.position))
+
+    def die(self):
+        self._timer.cancel()
+
+
+@pytest.fixture
+def excite(graph):
+    """An excitation with given parameters, what it publishes, what `run` says, and a robot."""
+
+    def make(spec=CONSTANT, **parameters):
+        parameters = {"max_effort": 1.0, "excitation": json.dumps(spec), **parameters}
+        node = graph.add(ExcitationNode, **parameters)
+        return node, graph.listen("excitation"), graph.listen("run", String, latched()), Robot(graph)
+
+    return make
+
+
+def start(graph):
+    def started():
+        return graph.call("excitation/start").success
+
+    graph.until(started, "start")
+
+
+def last_state(run):
+    return json.loads(run[-1].data) if run else {}
+
+
+def test_it_plays_the_experiments_samples_on_a_grid_without_gaps(graph, excite):
+    _, heard, run, _ = excite(CHIRP, ramp=0.1, count=500)
+    start(graph)
+    graph.until(lambda: last_state(run).get("state") == "finished", "the end")
+    graph.until(lambda: len(heard) == 501, "501 samples")
+    stamps = np.array([stamp_ns(message) for message in heard])
+    assert np.all(np.diff(stamps) == PERIOD_NS) and stamps[0] % PERIOD_NS == 0
+    assert stamps[0] == last_state(run)["start_ns"]
+    grid = np.arange(500, dtype=np.int64) * PERIOD_NS * np.float64(1e-9)
+    expected = ramped(build(CHIRP), Safety(max_effort=1.0, ramp=0.1), grid, 0.5)
+    assert np.array_equal([message.effort[0] for message in heard[:-1]], expected)
+    assert heard[-1].effort[0] == 0.0
+
+
+def test_it_does_not_start_before_there_is_a_measurement(graph):
+    graph.add(ExcitationNode, max_effort=1.0, excitation=json.dumps(CONSTANT))
+    heard = graph.listen("excitation")
+    graph.until(lambda: graph.nodes[0]._output.get_subscription_count() == 1, "a subscriber")
+    answer = graph.call("excitation/start")
+    assert not answer.success and answer.message == "no measurement on joint_states yet"
+    graph.spin(0.1)
+    assert not heard
+
+
+def test_it_does_not_start_before_everybody_listens(graph, excite):
+    excite(subscribers=2)
+    graph.spin(0.2)
+    answer = graph.call("excitation/start")
+    assert not answer.success and "1 of 2 subscribers" in answer.message
+
+
+def test_it_does_not_start_outside_the_envelope(graph, excite):
+    *_, robot = excite(envelope=[0.0, 0.1])
+    graph.spin(0.2)
+    answer = graph.call("excitation/start")
+    assert not answer.success and "outside the envelope" in answer.message
+    robot.position = 0.05
+    start(graph)
+
+
+def test_stale_measurements_stop_it(graph, excite):
+    _, heard, run, robot = excite(stale_after=0.2)
+    start(graph)
+    graph.until(lambda: len(heard) > 50, "samples")
+    robot.die()
+    died = time.monotonic()
+    graph.until(lambda: last_state(run).get("state") == "stopped", "the stop")
+    assert time.monotonic() - died > 0.15
+    assert "0.2 s" in last_state(run)["reason"]
+    number = len(heard)
+    graph.spin(0.1)
+    assert heard[-1].effort[0] == 0.0 and len(heard) <= number + 1
+    assert heard[-2].effort[0] == 0.5  # no fading: it stops at once
+
+
+@pytest.mark.parametrize("position", [0.5, -0.1, float("nan")])
+def test_leaving_the_envelope_stops_it(graph, excite, position):
+    _, heard, run, robot = excite(envelope=[0.0, 0.4])
+    start(graph)
+    graph.until(lambda: len(heard) > 50, "samples")
+    robot.position = position
+    graph.until(lambda: last_state(run).get("state") == "stopped", "the stop")
+    assert "envelope" in last_state(run)["reason"]
+    graph.spin(0.1)
+    assert heard[-1].effort[0] == 0.0
+
+
+def test_the_stop_service_fades_out_and_start_plays_anew(graph, excite):
+    _, heard, run, _ = excite(ramp=0.1)
+    start(graph)
+    graph.until(lambda: len(heard) > 150, "samples")
+    assert not graph.call("excitation/start").success
+    assert graph.call("excitation/stop").success
+    graph.until(lambda: last_state(run).get("state") == "stopped", "the stop")
+    graph.spin(0.05)
+    effort = np.array([message.effort[0] for message in heard])
+    assert last_state(run)["reason"] == "asked to stop" and effort[-1] == 0.0
+    fading = effort[-101:-1]
+    assert np.all(np.diff(fading) <= 0.0) and 0.49 <= fading[0] <= 0.5
+    assert not graph.call("excitation/stop").success
+    number = len(heard)
+    start(graph)
+    graph.until(lambda: len(heard) > number + 50, "samples of the second run")
+    assert last_state(run)["state"] == "running"
+
+
+def test_the_effort_is_clamped(graph, excite):
+    _, heard, _, _ = excite(max_effort=0.2)
+    start(graph)
+    graph.until(lambda: len(heard) > 50, "samples")
+    assert {message.effort[0] for message in heard} == {0.2}
+
+
+def test_a_node_that_is_ended_leaves_a_zero_behind(graph, excite):
+    node, heard, run, _ = excite()
+    start(graph)
+    graph.until(lambda: len(heard) > 50, "samples")
+    graph.nodes.remove(node)
+    node.close()
+    graph.until(lambda: heard[-1].effort[0] == 0.0, "the last command")
+    graph.until(lambda: "ended" in last_state(run).get("reason", ""), "the reason")
+    graph.executor.remove_node(node)
+    node.destroy_node()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({"excitation": "no json"}, "not JSON"),
+        ({"excitation": "[1]"}, "JSON object"),
+        ({"excitation": '{"type": "chirps"}'}, "chirps"),
+        ({"excitation": json.dumps(CHIRP), "max_effort": -1.0}, r"max_effort = -1.0 must lie in \[0, inf\] N"),
+        ({"excitation": json.dumps(CHIRP), "envelope": [0.4, 0.0]}, "low < high"),
+        ({"excitation": json.dumps(CHIRP), "rate": 0}, "rate = 0"),
+        ({"excitation": json.dumps(CHIRP), "ramp": "long"}, "ramp = 'long' must be a number"),
+        ({"excitation": json.dumps(CHIRP), "max_efort": 1.0}, "unknown parameter max_efort"),
+    ],
+)
+def test_what_cannot_work_is_refused(graph, parameters, said):
+    with pytest.raises(InputError, match=said):
+        graph.add(ExcitationNode, **parameters)

@@ -1,0 +1,116 @@
+"""Plant over real topics: grid stamps without gaps, commands at their stamps, and nothing lost in lockstep."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from std_msgs.msg import Header
+
+from rhythmid.errors import InputError
+from rhythmid.experiment import Forcing, Noise, plant_model
+from rhythmid.model import Model
+from rhythmid.plant import Plant
+from rhythmid_nodes.lockstep import ACK_TOPIC
+from rhythmid_nodes.plant import PlantNode
+from rhythmid_nodes.qos import latched, stream
+
+MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"
+PERIOD_NS = 1_000_000
+
+
+def stamp_ns(message):
+    return message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+
+
+def reference(initial=(0.15, 0.0)):
+    return Plant(plant_model(Model.load(MODEL), Forcing(), Noise()), PERIOD_NS, 0, initial)
+
+
+def test_real_time_samples_lie_on_the_grid_without_gaps_and_follow_the_physics(graph):
+    node = graph.add(PlantNode, model=str(MODEL), initial=[0.15, 0.0])
+    states, forcing = graph.listen("plant/joint_states"), graph.listen("forcing")
+    graph.until(lambda: len(states) > 300 and len(forcing) > 300, "300 samples")
+    stamps = np.array([stamp_ns(message) for message in states])
+    assert np.all(np.diff(stamps) == PERIOD_NS) and stamps[0] % PERIOD_NS == 0
+    skipped = (stamps[0] - node._origin_ns) // PERIOD_NS
+    expected = reference().advance((skipped + 299) * PERIOD_NS)
+    for field in ("position", "velocity", "effort"):
+        heard = [getattr(message, field)[0] for message in states[:300]]
+        np.testing.assert_allclose(heard, getattr(expected, field)[skipped:], rtol=1e-12, atol=1e-12)
+
+
+def test_a_command_acts_at_its_stamp_and_a_late_one_at_once(graph):
+    node = graph.add(PlantNode, model=str(MODEL))
+    states, forcing = graph.listen("plant/joint_states"), graph.listen("forcing")
+    send = graph.talk("command")
+    graph.until(lambda: len(states) > 50, "samples")
+    now = time.time_ns()
+    send(graph.joint_state(now, effort=0.3))
+    graph.until(lambda: node.figures()["commands"] == "1", "the command")
+    send(graph.joint_state(now - 1_000_000_000, effort=0.7))
+    graph.until(lambda: node.figures()["commands"] == "2", "the late command")
+    assert int(node.figures()["late_commands"]) >= 1
+    graph.spin(0.1)
+    count = min(len(states), len(forcing))
+    given = np.array([s.effort[0] - f.effort[0] for s, f in zip(states[:count], forcing[:count], strict=True)])
+    levels = given[np.concatenate([[True], np.abs(np.diff(given)) > 1e-9])]
+    np.testing.assert_allclose(levels, [0.0, 0.3, 0.7], atol=1e-9)
+    first = stamp_ns(states[int(np.argmax(given > 1e-9))])
+    assert first >= now
+
+
+def test_a_command_for_another_joint_is_counted_and_ignored(graph):
+    node = graph.add(PlantNode, model=str(MODEL), joint="arm")
+    send = graph.talk("command")
+    send(graph.joint_state(time.time_ns(), effort=0.3))
+    graph.until(lambda: node.figures()["foreign_commands"] == "1", "the command")
+    assert node.figures()["commands"] == "0"
+
+
+def test_in_lockstep_it_goes_as_far_as_the_newest_command_and_the_credit_allow(graph):
+    graph.add(
+        PlantNode, model=str(MODEL), initial=[0.15, 0.0], time_mode="lockstep", window=5, count=40,
+        consumers=["recorder"],
+    )  # fmt: skip
+    states = graph.listen("plant/joint_states", qos=stream(lockstep=True))
+    acks = graph.listen(ACK_TOPIC, Header, latched())
+    send = graph.talk("command", qos=stream(lockstep=True))
+    acknowledge = graph.talk(ACK_TOPIC, Header, latched())
+    graph.spin(0.1)
+    assert not states  # no command is known yet
+    send(graph.joint_state(20 * PERIOD_NS + 300_000, effort=0.1))
+    graph.until(lambda: len(states) == 5, "the first window")
+    graph.spin(0.1)
+    assert len(states) == 5  # commands are known up to 20.3 ms, but nobody has taken the samples in
+    for done in range(5, 45, 5):
+        header = Header(frame_id="recorder")
+        header.stamp.nanosec = done * PERIOD_NS
+        acknowledge(header)
+    graph.until(lambda: len(states) == 21, "samples 0 to 20")
+    for k in range(21, 60):
+        send(graph.joint_state(k * PERIOD_NS, effort=0.1))
+    graph.until(lambda: len(states) == 40, "all samples")
+    graph.spin(0.1)
+    assert [stamp_ns(message) for message in states] == [k * PERIOD_NS for k in range(40)]
+    plant = reference()
+    plant.push(20 * PERIOD_NS + 300_000, 0.1)
+    expected = plant.advance(39 * PERIOD_NS)
+    assert [message.position[0] for message in states] == expected.position.tolist()
+    assert {ack.frame_id for ack in acks} >= {"plant"}
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({}, "model is missing"),
+        ({"model": "missing.yaml"}, "missing.yaml"),
+        ({"model": str(MODEL), "initial": [0.1]}, "position .* velocity"),
+        ({"model": str(MODEL), "noise_std": -1.0}, "noise_std = -1.0 must lie in"),
+        ({"model": str(MODEL), "time_mode": "warp"}, "one of realtime, lockstep"),
+        ({"model": str(MODEL), "time_mode": "lockstep"}, "count = 0"),
+    ],
+)
+def test_what_cannot_work_is_refused(graph, parameters, said):
+    with pytest.raises(InputError, match=said):
+        graph.add(PlantNode, **parameters)
