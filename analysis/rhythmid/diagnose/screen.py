@@ -57,8 +57,8 @@ class Score:
     @property
     def start(self) -> dict[str, float]:
         """First guess for a refit: the size scaled to what the score suggests."""
-        if not self.element.size:
-            return dict(self.values)
+        if not self.element.size or math.isinf(self.element.absent):
+            return dict(self.values)  # a limit: its effect is not in proportion to it
         scaled = dict(self.values)
         name = self.element.size
         low, high = self.element.parameter(name).bounds
@@ -205,6 +205,17 @@ def changes_of(
     return [change for change in (pool.map(one, cases) if pool else map(one, cases)) if change is not None]
 
 
+def _impossible(element: Element, values: Mapping[str, float], factor: float) -> bool:
+    """Whether `factor` times the guessed effect has a sign that physics forbids."""
+    if not element.size:
+        return False
+    if math.isinf(element.absent):
+        return factor < 0.0
+    low, high = element.parameter(element.size).bounds
+    size = element.absent + factor * (values[element.size] - element.absent)
+    return (size < low and low >= element.absent) or (size > high and high <= element.absent)
+
+
 def score(fit: Fit, changes: Sequence[Change]) -> list[Score]:
     """Scores of all changes under the fit's noise model, best first."""
     left = parameter_basis(fit)
@@ -221,13 +232,9 @@ def score(fit: Fit, changes: Sequence[Change]) -> list[Score]:
             continue  # the nominal parameters do the same
         size = -float(change @ residual) / strength
         statistic = size**2 * strength
-        element = one.element
-        if element.size:
-            low, high = element.parameter(element.size).bounds
-            signed = element.absent + size * (one.values[element.size] - element.absent)
-            if (signed < low and low >= element.absent) or (signed > high and high <= element.absent):
-                statistic = 0.0
-        found.append(Score(one.key, element, one.values, statistic, size))
+        if _impossible(one.element, one.values, size):
+            statistic = 0.0
+        found.append(Score(one.key, one.element, one.values, statistic, size))
     return sorted(found, key=lambda s: -s.statistic)
 
 
