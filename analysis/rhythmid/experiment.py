@@ -5,6 +5,7 @@ function that turns it into nodes with parameters; `perform` is the same run wit
 """
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,6 +25,7 @@ from rhythmid.record.messages import Messages
 from rhythmid.time_table import read_time_table
 
 TOPICS = ("excitation", "command", "forcing", "plant/joint_states", "joint_states", "run", "diagnostics")
+LONGEST = 50_000_000  # samples of an offline run: 14 hours at 1 kHz, a few gigabytes
 
 
 @dataclass(frozen=True)
@@ -288,8 +290,10 @@ def ramped(excitation: Excitation, safety: Safety, time: NDArray[np.float64], du
 def perform(experiment: Experiment) -> dict[str, Messages]:
     """Run the experiment without ROS: what each topic of the graph carries, by topic name within the namespace.
 
-    Equals the graph's lockstep run, sample by sample and stamp by stamp.
+    Equals the graph's lockstep run, sample by sample and stamp by stamp. Raises InputError for a run too long to keep.
     """
+    if experiment.count > LONGEST:
+        raise InputError(f"{experiment.count} samples are too many to simulate at once; the limit is {LONGEST}")
     period = experiment.time.period_ns
     stamps = np.arange(experiment.count, dtype=np.int64) * period
     time = (stamps * 1e-9).astype(np.float64)
@@ -382,6 +386,8 @@ def _experiment(
     duration = keys["duration"].number(1e-6, 1e6) if "duration" in keys else excitation.duration
     initial = None
     if "initial" in keys and keys["initial"].value != "limit_cycle":
+        if not isinstance(keys["initial"].value, dict):
+            keys["initial"].fail("limit_cycle or {position: …, velocity: …} is expected")
         given = keys["initial"].mapping(["position", "velocity"])
         initial = (
             given["position"].number() if "position" in given else 0.0,
@@ -389,8 +395,8 @@ def _experiment(
         )
     seed = keys["seed"].whole(0, 2**31 - 1) if "seed" in keys else 0
     namespace = keys["namespace"].text() if "namespace" in keys else "/hopper"
-    if not namespace.startswith("/"):
-        keys["namespace"].fail("a namespace starts with '/'")
+    if not re.fullmatch(r"(/[A-Za-z_]\w*)+", namespace, re.ASCII):
+        keys["namespace"].fail(f"{namespace!r} is no namespace; write one like /hopper or /lab/hopper")
     experiment = Experiment(
         model, model_path, excitation, spec, forcing, nodes_delay["input"], nodes_delay["measurement"], noise, time,
         duration, seed, initial, _safety(keys.get("safety")), _recording(keys.get("record")), namespace,
