@@ -1,0 +1,150 @@
+"""`rhythmid simulate` and what all commands promise: exit codes, one line of refusal, nothing overwritten."""
+
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+
+import rhythmid as package
+from rhythmid.experiment import Experiment, perform
+
+PAPER = Path(package.__file__).parent / "models" / "paper_hopper.yaml"
+EXPERIMENT = """\
+model: hopper.yaml
+excitation: {type: chirp, amplitude: 0.004, sweep: 0.5}
+delays: {input: 0.0403, measurement: 0.05}
+noise: {measurement_std: 1.0e-5}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path) -> Path:
+    shutil.copy(PAPER, tmp_path / "hopper.yaml")
+    (tmp_path / "run.yaml").write_text(EXPERIMENT, encoding="utf-8")
+    return tmp_path
+
+
+def recorded(bag: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Header stamps [ns] and the first field present, by topic, as rosbags itself reads them."""
+    found: dict[str, list[tuple[int, float]]] = {}
+    with AnyReader([bag]) as reader:
+        for connection, _, raw in reader.messages():
+            if connection.msgtype != "sensor_msgs/msg/JointState":
+                continue
+            message = reader.deserialize(raw, connection.msgtype)
+            stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+            value = message.position[0] if len(message.position) else message.effort[0]
+            found.setdefault(connection.topic, []).append((stamp, value))
+    return {
+        topic: (np.array([stamp for stamp, _ in rows]), np.array([value for _, value in rows]))
+        for topic, rows in found.items()
+    }
+
+
+def test_a_bag_is_written_that_holds_the_offline_run(folder, rhythmid):
+    done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == "bag: 500 samples at 1000 Hz of excitation, joint_states, forcing\n"
+    expected = perform(Experiment.load(folder / "run.yaml"))
+    found = recorded(folder / "bag")
+    assert sorted(found) == ["/hopper/excitation", "/hopper/forcing", "/hopper/joint_states"]
+    for topic, (stamps, values) in found.items():
+        messages = expected[topic.removeprefix("/hopper/")]
+        np.testing.assert_array_equal(stamps, messages.stamp_ns)
+        first = messages.effort if messages.position is None else messages.position
+        np.testing.assert_array_equal(values, first)
+
+
+def test_the_truth_is_recorded_only_on_request(folder, rhythmid):
+    done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag", "--all-topics")
+    assert done.returncode == 0
+    assert {"/hopper/command", "/hopper/plant/joint_states"} <= set(recorded(folder / "bag"))
+
+
+def test_a_result_is_never_written_over(folder, rhythmid):
+    (folder / "bag").mkdir()
+    (folder / "bag" / "precious").write_text("data", encoding="utf-8")
+    done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "error: bag: exists already; name another file or remove it\n"
+    assert [path.name for path in (folder / "bag").iterdir()] == ["precious"]
+
+
+def test_a_refused_run_leaves_nothing_behind(folder, rhythmid):
+    (folder / "hopper.yaml").write_text("inertia: {mass: {value: 1000, unit: g}}", encoding="utf-8")
+    before = sorted(path.name for path in folder.iterdir())
+    done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag")
+    assert done.returncode == 2
+    assert done.stderr == (
+        "error: hopper.yaml:1: inertia.mass: unit 'g' where 'kg' is expected: write the value in kg (multiply it by 0.001)\n"
+    )
+    assert sorted(path.name for path in folder.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (
+            ["simulate", "missing.yaml", "--experiment", "run.yaml", "--out", "bag"],
+            "missing.yaml: cannot be read",
+        ),
+        (
+            ["simulate", "hopper.yaml", "--experiment", "missing.yaml", "--out", "bag"],
+            "missing.yaml: cannot be read",
+        ),
+        (["simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "no/bag"], "does not exist"),
+        (["simulate", "hopper.yaml", "--experiment", "run.yaml"], "Missing option"),
+        (
+            ["simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag", "--elements", "no"],
+            "no such folder",
+        ),
+        (["simulate", "hopper.yaml", "--experiment", "run.yaml", "--oot", "bag"], "No such option"),
+        (["simulate"], "Missing"),
+        (["simulato"], "No such command 'simulato'"),
+    ],
+)
+def test_bad_usage_is_one_line_and_exit_code_2(arguments, words, folder, rhythmid):
+    done = rhythmid(*arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("error: ") and done.stderr.count("\n") == 1, done.stderr
+    assert words in done.stderr
+    assert not (folder / "bag").exists()
+
+
+def test_a_place_that_is_not_writable_is_refused_before_any_work(folder, rhythmid):
+    closed = folder / "closed"
+    closed.mkdir(mode=0o500)
+    try:
+        (closed / "probe").touch()
+    except OSError:
+        done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "closed/bag")
+        assert done.returncode == 2 and "is not writable" in done.stderr
+    else:
+        pytest.skip("this user may write everywhere")
+
+
+def test_square_brackets_in_a_message_are_printed_as_they_are(folder, rhythmid):
+    (folder / "run.yaml").write_text(EXPERIMENT + "safety: {envelope: [1]}\n", encoding="utf-8")
+    done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag")
+    assert "two positions [low, high] in m are expected" in done.stderr
+
+
+def test_help_and_version_are_answers(rhythmid):
+    assert rhythmid("--help").returncode == 0
+    version = rhythmid("--version")
+    assert (version.returncode, version.stdout) == (0, f"rhythmid {package.__version__}\n")
+    nothing = rhythmid()
+    assert nothing.returncode == 2 and "simulate" in nothing.stdout + nothing.stderr
+
+
+def test_compiled_models_that_cannot_be_kept_are_refused_with_what_to_do(folder, rhythmid):
+    (folder / "file").touch()
+    done = rhythmid(
+        "simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag",
+        env={**os.environ, "RHYTHMID_CACHE": str(folder / "file" / "cache")},
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "set RHYTHMID_CACHE to a writable folder" in done.stderr and done.stderr.count("\n") == 1
