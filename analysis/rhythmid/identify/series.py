@@ -16,10 +16,7 @@ from rhythmid.compiled import InputKind
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
 from rhythmid.model import Model
-try:
-    from rhythmid.record.record import Record
-except ImportError:
-    Record = object
+from rhythmid.record.record import Record
 from rhythmid.signal import continuous, spline
 
 Array = NDArray[np.float64]
@@ -127,7 +124,16 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
         )
     if block is None:
         block = min(block_length(s.value, s.period) for s in made)
-    return [replace(s, block=block, used=np.ones(len(s.time) // block, bool)) for s in made]
+    return [replace(s, block=block, used=_whole_blocks(s, block)) for s in made]
+
+
+def _whole_blocks(series: Series, block: int) -> Mask:
+    """Blocks that no gap runs through."""
+    n = len(series.time) // block
+    if block == 1:
+        return np.ones(n, bool)
+    times = series.time[: n * block].reshape(n, block)
+    return times[:, -1] - times[:, 0] < 1.5 * block * series.period
 
 
 def split(series: Series, length: float) -> list[Series]:

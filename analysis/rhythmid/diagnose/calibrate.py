@@ -1,0 +1,135 @@
+"""Calibration: refit everything that the nominal model already has before asking what it lacks.
+
+Parameters that are wrong are not missing physics. Neither is a delay, nor an input that the recording reconstructs
+otherwise than by holding it: those are found here and told apart from effects.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.errors import InputError
+from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
+from rhythmid.identify.series import Series, dominant_frequency, split
+from rhythmid.model import Model
+from rhythmid.signal import band_limited
+
+INPUT_DELAY = "input_delay.delay"
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The refitted nominal model, its series (with the input as it turned out to be held), and what was noticed."""
+
+    fit: Fit
+    series: tuple[Series, ...]
+    notes: tuple[str, ...]
+    late_by: float | None  # [samples] how late a held input acts, where that shows it is not held
+
+
+def with_delays(model: Model, series: Sequence[Series], catalogue: Catalogue) -> Model:
+    """The model with the delay of every path that the records can show.
+
+    The input's delay may come out negative by up to a sample and a half: that is how an input that is not held, but
+    simulated as held, shows.
+    """
+    if any(one.command is not None for one in series):
+        if model.term("input_delay") is None:
+            model = model.with_element(catalogue["input_delay"], {"delay": 0.0})
+        period = max(one.period for one in series)
+        current = model.parameters[INPUT_DELAY]
+        if not current.fixed:
+            model = with_bounds(model, {INPUT_DELAY: (min(current.bounds[0], -1.5 * period), current.bounds[1])})
+    return model
+
+
+def _shooting_start(model: Model, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Model:
+    """Parameters from short windows with starts of their own: wrong values cannot drift far in a window."""
+    length = 2.0 / max(dominant_frequency(one) for one in series)
+    windows = [part for one in series for part in split(one, length)]
+    chosen = windows[:: max(1, len(windows) // 60)]
+    return estimate(model, chosen, iterations=12, pool=pool).model
+
+
+def calibrate(
+    model: Model,
+    series: Sequence[Series],
+    catalogue: Catalogue,
+    pool: ThreadPoolExecutor | None = None,
+    tell: Tell = lambda _: None,
+) -> Calibration:
+    """Refit the nominal model. Raises InputError when it has nothing to fit, or diverges whatever is tried."""
+    if not model.free:
+        raise InputError(
+            "every parameter of the nominal model is fixed, so a wrong value could not be told from missing physics; "
+            "free those that are not known exactly (drop 'fixed: true')"
+        )
+    model = with_delays(model, series, catalogue)
+    tell("refitting the nominal model")
+    best: Fit | None = None
+    failure: InputError | None = None
+    try:
+        best = estimate(model, series, pool=pool)
+    except InputError as error:
+        failure = error
+    if best is None or best.nrmse() > 0.1 or not best.converged:
+        try:
+            again = estimate(_shooting_start(model, series, pool), series, pool=pool)
+            if best is None or sum(float(r @ r) for r in again.residuals) < sum(float(r @ r) for r in best.residuals):
+                best = again
+        except InputError as error:
+            failure = failure or error
+    if best is None:
+        assert failure is not None
+        raise failure
+    if best.nrmse() > 0.3:
+        best = _scan_delays(best, series, pool)
+    return _hold(best, series, pool, tell)
+
+
+def _scan_delays(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Fit:
+    """Try delays that are far from the start: a delay beyond half a period of the motion is another local minimum."""
+    names = [name for name in (INPUT_DELAY, "measurement_delay.delay") if name in fit.names]
+    best = fit
+    for name in names:
+        for delay in (0.03, 0.08, 0.15, 0.25):
+            model = fit.model.with_values({name: delay})
+            try:
+                trial = minimise(model, fit.run, fit.names, fit.noise, fit.starts, 12, pool)
+            except InputError:
+                continue
+            if trial.chi2 < best.chi2:
+                best = trial
+    return best if best is fit else estimate(best.model, series, pool=pool)
+
+
+def _hold(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None, tell: Tell) -> Calibration:
+    """Notice an input that acts earlier than its samples: it was not held, and is reconstructed as band-limited."""
+    kept = tuple(series)
+    if INPUT_DELAY not in fit.names:
+        return Calibration(fit, kept, (), None)
+    delay, std = fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY]
+    held = [one for one in series if one.command is not None and one.command.c.shape[0] == 1]
+    if not held or delay > -max(4.0 * std, 0.05 * held[0].period) or not math.isfinite(std):
+        return Calibration(fit, kept, (), None)
+    period = held[0].period
+    late = -delay / period
+    tell(f"the held input is late by {late:.2f} sample; reconstructing it as band-limited")
+    smooth = []
+    for one in series:
+        if one.command is not None and one.command.c.shape[0] == 1 and len(one.command.x) > 8:
+            one = replace(one, command=band_limited(one.command.x[:-1], one.command.c[-1]))
+        smooth.append(one)
+    model = fit.model.with_values({INPUT_DELAY: 0.0})
+    again = estimate(model, smooth, pool=pool)
+    note = (
+        f"Input about {'half a' if 0.35 < late < 0.65 else f'{late:.2f}'} sample late when held: a free delay comes out "
+        f"at {delay * 1e3:.3f} ± {std * 1e3:.3f} ms ({-late:.2f} sample)."
+    )
+    if sum(float(r @ r) for r in again.residuals) < sum(float(r @ r) for r in fit.residuals) * (1 + 1e-3):
+        note += " The input is band-limited, not held; it is reconstructed so in all that follows."
+        return Calibration(again, tuple(smooth), (note,), late)
+    return Calibration(fit, kept, (note + " Holding it fits better all the same."), late)

@@ -1,0 +1,49 @@
+"""The two delays of a fit, their sum, and whether the records can tell them apart."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from rhythmid.identify.output_error import Fit
+
+NAMES = {"input": "input_delay.delay", "measurement": "measurement_delay.delay"}
+
+
+def delays_of(fit: Fit) -> dict[str, Any]:
+    """Delays with standard deviations [s] by the contract of the JSON output."""
+    found: dict[str, Any] = {}
+    places = {}
+    for key, name in NAMES.items():
+        if name in fit.model.parameters:
+            value = fit.model.value(name)
+            std = fit.std.get(name, 0.0)
+            found[key] = {"value": value, "std": std if math.isfinite(std) else None, "unit": "s"}
+            if name in fit.names:
+                places[key] = fit.names.index(name)
+        else:
+            found[key] = {}
+    if found["input"] and found["measurement"]:
+        pick = np.zeros(len(fit.names))
+        for place in places.values():
+            pick[place] = 1.0
+        variance = float(pick @ fit.covariance @ pick) if len(pick) else 0.0
+        total = found["input"]["value"] + found["measurement"]["value"]
+        found["sum"] = {"value": total, "std": math.sqrt(max(variance, 0.0)), "unit": "s"}
+    else:
+        found["sum"] = dict(found["input"] or found["measurement"])
+    separable = True
+    if len(places) == 2:
+        each = [found[key]["std"] for key in places]
+        scatter = found["sum"]["std"] or 0.0
+        separable = all(std is not None and std < max(20.0 * scatter, 2e-3) for std in each)
+    elif len(places) < 2 and not (found["input"] and found["measurement"]):
+        separable = False
+    found["separable"] = separable
+    forced = any(one.forcing is not None for one in fit.run.series)
+    found["assumption"] = (
+        "the recorded forcing acts on the machine at its stamps, without the command's delay"
+        if forced
+        else "no forcing is recorded: only the sum of the delays shows, and it is written to the one delay that is free"
+    )
+    return found

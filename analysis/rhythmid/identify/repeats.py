@@ -1,0 +1,63 @@
+"""Noise from repeats: what differs between two periods of the same excitation is not physics.
+
+The only noise estimate that no missing effect can reach. It needs stretches in which command and forcing repeat.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.identify.noise import NoiseModel, estimate_noise
+from rhythmid.identify.series import Series
+
+Array = NDArray[np.float64]
+ENOUGH = 400  # differences below which a noise level is not worth quoting
+
+
+def _sampled(series: Series, which: str) -> Array | None:
+    signal = getattr(series, which)
+    if signal is None:
+        return None
+    centres = series.centres
+    inside = np.clip(centres, signal.x[0], min(signal.x[-1], 1e200))
+    return np.asarray(signal(inside))
+
+
+def repeat_length(series: Series) -> int | None:
+    """Smallest number of blocks after which command and forcing repeat for at least half of the series; None if none."""
+    signals = [s for s in (_sampled(series, "command"), _sampled(series, "forcing")) if s is not None and np.ptp(s) > 0]
+    n = series.blocks
+    if not signals or n < 64:
+        return None
+    likely: set[int] | None = None
+    for signal in signals:
+        centred = signal - signal.mean()
+        spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
+        correlation = np.fft.irfft(spectrum)[:n] / np.maximum(np.arange(n, 0, -1), 1)
+        good = np.flatnonzero(correlation[: n // 2] > 0.99 * correlation[0])
+        likely = set(good.tolist()) if likely is None else likely & set(good.tolist())
+    for lag in sorted(likely or ()):
+        if lag < 8:
+            continue
+        if all(np.mean(np.abs(s[lag:] - s[:-lag]) < 1e-4 * np.ptp(s)) > 0.95 for s in signals):
+            return lag
+    return None
+
+
+def noise_from_repeats(series: list[Series], settle: float = 0.4) -> NoiseModel | None:
+    """Noise model from differences between periods, the first `settle` share of each series left to settle.
+
+    None where too little repeats.
+    """
+    stretches: list[Array] = []
+    for one in series:
+        lag = repeat_length(one)
+        if lag is None:
+            continue
+        begin = int(max(settle * one.blocks, lag))
+        value = one.averaged
+        if one.blocks - lag - begin < 64:
+            continue
+        stretches.append((value[begin + lag :] - value[begin:-lag]) / np.sqrt(2.0))
+    if sum(len(s) for s in stretches) < ENOUGH:
+        return None
+    return estimate_noise(stretches)
