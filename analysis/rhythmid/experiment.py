@@ -20,7 +20,6 @@ from rhythmid.errors import InputError
 from rhythmid.excitation.excitation import Excitation
 from rhythmid.excitation.sequence import build
 from rhythmid.model import Model
-from rhythmid.plant import Plant
 from rhythmid.record.messages import Messages
 from rhythmid.time_table import read_time_table
 
@@ -292,6 +291,8 @@ def perform(experiment: Experiment) -> dict[str, Messages]:
 
     Equals the graph's lockstep run, sample by sample and stamp by stamp. Raises InputError for a run too long to keep.
     """
+    from rhythmid.plant import Plant  # the compiler behind it is slow to load, and most nodes need no plant
+
     if experiment.count > LONGEST:
         raise InputError(f"{experiment.count} samples are too many to simulate at once; the limit is {LONGEST}")
     period = experiment.time.period_ns
