@@ -14,10 +14,9 @@ def kernel(x, v, t, f, amplitude, wavelength, phase):
 
 
 def starts(scales):
-    travel = scales.high - scales.low
     return [
-        {"amplitude": 0.01 * scales.force, "wavelength": travel / periods, "phase": phase}
-        for periods in (1.0, 1.5, 2.0, 2.5, 3.0, 4.0)
+        {"amplitude": 0.01 * scales.force, "wavelength": 4.0 * scales.position / 1.25**k, "phase": phase}
+        for k in range(12)  # from one period in the usual travel to a dozen
         for phase in (0.0, 0.5 * math.pi)
     ]
 
