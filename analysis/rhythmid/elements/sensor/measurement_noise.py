@@ -3,12 +3,13 @@
 import math
 
 import numpy as np
-from scipy.signal import lfilter
 
 from rhythmid.elements.element import Element, Parameter
 
 
 def sampler(rng, std, correlation):
+    from scipy.signal import lfilter  # slow to load, and every program loads the catalogue
+
     memory = np.array([std * rng.standard_normal() * correlation])
     innovation = std * math.sqrt(1.0 - correlation**2)
 
