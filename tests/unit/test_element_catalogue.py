@@ -8,6 +8,7 @@ import pytest
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.model import Model
+from rhythmid.plant import Plant
 from rhythmid.signal import spline, zero_order_hold
 from rhythmid.simulate import simulate
 
@@ -147,3 +148,20 @@ def test_what_is_never_estimated_stays_so_through_a_model_file(rig):
     freed = model.with_parameters({seed: replace(model.parameters[seed], fixed=False)})
     for given in (model, freed):
         assert Model.from_text(given.to_yaml(), catalogue=CATALOGUE).parameters == given.parameters
+
+
+@pytest.mark.parametrize("name", ADDABLE)
+def test_runs_in_the_plant_alike_in_whatever_chunks(name, rig, scales):
+    model = rig.hopper.with_element(CATALOGUE[name], starts_of(name, scales)[0])
+    stamps = np.arange(400, dtype=np.int64) * 1_000_000
+    runs = []
+    for chunk in (400, 37):
+        plant = Plant(model, 1_000_000, seed=1, initial=RELEASE)
+        parts = []
+        for first in range(0, 400, chunk):
+            now = slice(first, min(first + chunk, 400))
+            plant.push_many(stamps[now], 1.5 * np.sin(20.0 * stamps[now] * 1e-9))
+            parts.append(plant.advance(int(stamps[now][-1])).position)
+        runs.append(np.concatenate(parts))
+    assert len(runs[0]) == 400 and np.isfinite(runs[0]).all()
+    assert np.array_equal(runs[0], runs[1])

@@ -20,9 +20,11 @@ ELEMENT = Element(
     starts=lambda s: [{"damping": 0.02 * (s.stiffness * s.mass) ** 0.5}],
     also_known_as=("dashpot", "linear damper"),
     family="damping",
+    special_case_of=("viscoelastic_relaxation",),  # for τ_m → 0
     confusable={
         "coulomb_friction": "one amplitude only: Coulomb's apparent damping falls as 1/amplitude",
         "quadratic_drag": "one amplitude only: drag's apparent damping grows with amplitude",
+        "flight_damping": "the same model where a switched damper's stance damping is free",
     },
     reference="Any text on vibrations, e.g. D. J. Inman, Engineering Vibration",
 )
