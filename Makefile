@@ -2,7 +2,6 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
-DEMO   := out/demo
 
 PACKAGES := analysis $(patsubst %/setup.py,%,$(wildcard ros_ws/src/*/setup.py))
 METADATA := $(wildcard $(foreach package,$(PACKAGES),$(addprefix $(package)/,*.py *.cfg *.toml *.xml launch/* config/* layouts/*)))
@@ -41,6 +40,19 @@ lint: install ## Run ruff and pyright
 format: install ## Format the code
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+demo: install ## Run the real graph for a minute and identify it from its bag
+	$(BIN)/python docs/demo.py
+
+benchmark: install ## Compare the simulator with scipy and MuJoCo
+	$(BIN)/python -m pip install --quiet --constraint requirements.lock mujoco
+	$(BIN)/python benchmarks/simulator.py
+
+picture: install ## Draw the picture of the README
+	$(BIN)/python docs/signal_path.py
+
+docker: ## Build the image and run it, with docker, or with buildah where there is no engine
+	docker/build
 
 lock: install ## Resolve the requirements anew into requirements.lock
 	$(BIN)/python -m pip install --quiet uv

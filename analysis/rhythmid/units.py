@@ -55,7 +55,7 @@ class Units:
         try:
             given_unit, wanted_unit = (_registry().Quantity(1.0, _plain(unit)) for unit in (given, wanted))
             ratio = given_unit / wanted_unit
-            factor = float(ratio.to("dimensionless").magnitude) if ratio.dimensionless else None
+            factor = float(ratio.m_as("dimensionless")) if ratio.dimensionless else None
         except Exception:  # text that is no unit makes the parser fail in many ways
             raise InputError(f"{problem} (it is not a unit that is known)") from None
         if factor is None:
