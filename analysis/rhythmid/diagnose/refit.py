@@ -37,6 +37,7 @@ class Trial:
     samples: int
     free: int
     converged: bool
+    noise: NoiseModel  # under which chi2 was reached
 
     def bic(self, inflation: float = 1.0) -> float:
         """Bayesian information criterion (G. Schwarz, Ann. Stat. 6 (1978) 461); `inflation` >= 1 deflates chi2."""
@@ -59,9 +60,9 @@ def _outcome(fit: Fit) -> _Outcome:
     return _Outcome(values, fit.starts, fit.chi2, fit.samples, fit.converged)
 
 
-def _trial(added: tuple[str, ...], model: Model, done: _Outcome) -> Trial:
+def _trial(added: tuple[str, ...], model: Model, done: _Outcome, noise: NoiseModel) -> Trial:
     fitted = model.with_values(done.values)
-    return Trial(added, fitted, done.starts, done.chi2, done.samples, len(done.values), done.converged)
+    return Trial(added, fitted, done.starts, done.chi2, done.samples, len(done.values), done.converged, noise)
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,7 @@ def run_trials(
         if isinstance(result, Exception):
             excluded.append((proposals[index].added, str(result)))
         else:
-            trials.append(_trial(proposals[index].added, proposals[index].model, result))
+            trials.append(_trial(proposals[index].added, proposals[index].model, result, noise))
     if not trials:
         return [], excluded
     best = min(trial.chi2 for trial in trials)
@@ -169,7 +170,9 @@ def run_trials(
 def whole_fit(
     trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int = 15, pool=None
 ) -> Fit:
-    """The full fit of a trial under a noise model."""
+    """The full fit of a trial under a noise model; one that has converged under it is only evaluated."""
+    if trial.noise is noise and trial.converged:
+        iterations = 1
     run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
     return minimise(trial.model, run, tuple(trial.model.free), noise, trial.starts, iterations, pool)
 
@@ -177,14 +180,16 @@ def whole_fit(
 def under_noise(
     trials: Sequence[Trial], series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int = 15
 ) -> list[Trial]:
-    """The trials fitted again under another noise model, best first."""
+    """The trials, best first, all under one noise model: those that were fitted under another are fitted again."""
+    done = [trial for trial in trials if trial.noise is noise and trial.converged]
+    others = [trial for trial in trials if not (trial.noise is noise and trial.converged)]
 
     def one(trial: Trial) -> _Outcome:
         return _outcome(whole_fit(trial, series, noise, max_step, iterations))
 
     again = [
-        _trial(trials[index].added, trials[index].model, result)
-        for index, result in fork_map(one, list(trials))
+        _trial(others[index].added, others[index].model, result, noise)
+        for index, result in fork_map(one, others)
         if not isinstance(result, Exception)
     ]
-    return sorted(again, key=lambda trial: trial.bic())
+    return sorted([*done, *again], key=lambda trial: trial.bic())

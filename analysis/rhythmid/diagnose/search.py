@@ -137,10 +137,11 @@ def search(
 ) -> Search:
     """Search the catalogue for what the nominal model lacks; `nominal` is its fit to the same series."""
     step = nominal.run.max_step
+    floor = 1e-9 * max(float(np.std(one.averaged)) for one in series)
     tell("scoring the catalogue")
     first, nominal = _one_round(nominal, catalogue, pool, colour=True)
     current, noise = nominal, nominal.noise
-    base = Trial((), nominal.model, nominal.starts, nominal.chi2, nominal.samples, len(nominal.names), nominal.converged)
+    base = Trial((), nominal.model, nominal.starts, nominal.chi2, nominal.samples, len(nominal.names), nominal.converged, noise)
     trials: dict[tuple[str, ...], Trial] = {(): base}
     best = base
     rounds, excluded = [first], []
@@ -157,7 +158,7 @@ def search(
         trials |= {tuple(sorted(t.added)): t for t in found}
         top = found[0]
         fit = whole_fit(top, series, noise, step, pool=pool)
-        settled = noise_of(fit, floor=1e-9 * float(np.std(series[0].averaged)))
+        settled = noise_of(fit, floor=floor)
         compared = under_noise(
             [t for t in found if t.bic() - top.bic() < 60.0] + [best], series, settled, step
         )
@@ -175,9 +176,11 @@ def search(
         now, _ = _one_round(current, catalogue, pool, colour=False)
         rounds.append(now)
     if best.added:
-        best, more = _defend(best, series, catalogue, trials, noise, step, rounds, tell)
+        defended, more = _defend(best, series, catalogue, trials, noise, step, rounds, tell)
         trials |= more
-        noise = noise_of(whole_fit(best, series, noise, step, pool=pool), floor=1e-9)
+        if defended is not best:
+            best = defended
+            noise = noise_of(whole_fit(best, series, noise, step, pool=pool), floor=floor)
     ranked = under_noise(_contenders(trials, best), series, noise, step)
     best = next(t for t in ranked if set(t.added) == set(best.added))
     fit = whole_fit(best, series, noise, step, pool=pool)

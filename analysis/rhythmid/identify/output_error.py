@@ -95,6 +95,7 @@ class _Problem:
 
     def __init__(self, run: FreeRun, names: Sequence[str], noise: NoiseModel, pool: ThreadPoolExecutor | None) -> None:
         self.run, self.names, self.noise, self.pool = run, tuple(names), noise, pool
+        self.hidden: list[tuple[Array, Array]] = []  # mean and scatter of each series' element states
         self.spread = max(float(np.std(one.averaged)) for one in run.series) or 1.0
         self.stretches = [[s for s in runs(one.used) if s.stop - s.start > noise.order + 1] for one in run.series]
 
@@ -109,10 +110,28 @@ class _Problem:
             return None
         return [output - one.averaged for output, one in zip(outputs, self.run.series)]
 
-    def cost(self, model: Model, residuals: Sequence[Array] | None) -> float:
+    def learn_hidden(self, model: Model, starts: Sequence[Array]) -> None:
+        """Take the usual values of the elements' own states from a run.
+
+        A hidden state hardly differs from a kick to the velocity when its element is fast; knowing its usual range keeps
+        it from wandering off.
+        """
+        self.hidden = []
+        for index, start in enumerate(starts):
+            rows = self.run.rows(model, index, start)
+            states = rows[len(rows) // 4 :, 2 : self.run.states] if rows is not None else np.zeros((1, self.run.states - 2))
+            self.hidden.append((states.mean(axis=0), 3.0 * states.std(axis=0) + 1e-12))
+
+    def departure(self, index: int, start: Array) -> Array:
+        """Element states of a start, as multiples of their usual scatter from their usual mean."""
+        mean, scatter = self.hidden[index]
+        return (start[2:] - mean) / scatter
+
+    def cost(self, model: Model, residuals: Sequence[Array] | None, starts: Sequence[Array]) -> float:
         if residuals is None:
             return math.inf
         total = sum(float(np.sum(self.whitened(i, r) ** 2)) for i, r in enumerate(residuals))
+        total += sum(float(np.sum(self.departure(i, start) ** 2)) for i, start in enumerate(starts))
         for name in self.names:
             value = model.parameters[name]
             if value.prior is not None:
@@ -198,12 +217,16 @@ class _Problem:
             moved = np.maximum(moved, np.sqrt(np.mean(change**2, axis=0)))
             change[:, :p] /= signed
             white = self.whitened(index, np.column_stack([residuals[index], change]))
-            basis, kept = _basis(white[:, 1 + p :])
-            projected = white[:, : 1 + p] - basis @ (basis.T @ white[:, : 1 + p])
-            rows.append(projected[:, 0])
-            columns.append(projected[:, 1:])
-            bases.append(basis)
-            states.append((white[:, 0], white[:, 1 : 1 + p], kept))
+            known = np.zeros((q - 2, 1 + p + q))
+            known[:, 0] = self.departure(index, starts[index])
+            known[:, 1 + p + 2 :] = np.diag(state_steps[2:] / self.hidden[index][1])
+            joined = np.vstack([white, known])
+            basis = _basis(joined[:, 1 + p :])
+            projected = joined[:, : 1 + p] - basis @ (basis.T @ joined[:, : 1 + p])
+            rows.append(projected[: len(white), 0])
+            columns.append(projected[: len(white), 1:])
+            bases.append(basis[: len(white)])
+            states.append((joined[:, 0], joined[:, 1 : 1 + p], joined[:, 1 + p :]))
             places.append(slice(place, place + len(white)))
             place += len(white)
         target = 1e-4 * self.spread
@@ -220,18 +243,18 @@ def _state_update(sensitivity: Array, target: Array) -> Array:
     live = norms > 1e-9 * max(norms.max(initial=0.0), 1e-300)
     change = np.zeros(sensitivity.shape[1])
     if live.any():
-        change[live] = np.linalg.lstsq(sensitivity[:, live] / norms[live], -target, rcond=1e-4)[0] / norms[live]
+        change[live] = np.linalg.lstsq(sensitivity[:, live] / norms[live], -target, rcond=1e-7)[0] / norms[live]
     return change
 
 
-def _basis(columns: Array) -> tuple[Array, Array]:
-    """Orthonormal basis of the columns' span (dependent ones dropped), and the columns themselves."""
+def _basis(columns: Array) -> Array:
+    """Orthonormal basis of the columns' span; dependent ones are dropped."""
     norms = np.linalg.norm(columns, axis=0)
     live = norms > 1e-9 * max(norms.max(initial=0.0), 1e-300)
     if not live.any():
-        return np.zeros((len(columns), 0)), columns
+        return np.zeros((len(columns), 0))
     left, singular, _ = np.linalg.svd(columns[:, live] / norms[live], full_matrices=False)
-    return left[:, singular > 1e-4 * singular[0]], columns
+    return left[:, singular > 1e-7 * singular[0]]
 
 
 def _first_steps(model: Model, names: Sequence[str], run: FreeRun) -> Array:
@@ -282,8 +305,9 @@ def minimise(
     """
     problem = _Problem(run, names, noise, pool)
     current = [np.array(s) for s in (starts if starts is not None else first_guess(model, run))]
+    problem.learn_hidden(model, current)
     residuals = problem.residuals(model, current)
-    cost = problem.cost(model, residuals)
+    cost = problem.cost(model, residuals, current)
     if residuals is None or not math.isfinite(cost):
         raise InputError(
             "the model diverges when simulated over the records with its initial values; check its parameters and units"
@@ -323,7 +347,7 @@ def minimise(
             for start, (error, slope, state) in zip(current, states):
                 moved.append(start + _state_update(state, error + slope @ step) * state_steps)
             trial_residuals = problem.residuals(trial, moved)
-            trial_cost = problem.cost(trial, trial_residuals)
+            trial_cost = problem.cost(trial, trial_residuals, moved)
             if trial_cost < cost:
                 gain = cost - trial_cost
                 model, current, cost = trial, moved, trial_cost
