@@ -1,0 +1,169 @@
+"""HTFs from data by regularised least squares: the paper's equation (5).
+
+    Ĝ = (Uᴴ U + α (D²)ᵀ D²)⁻¹ Uᴴ Y
+
+In each frequency bin one equation, Y_l = Σ_m G_m(jω_l) U_{l−mP}, has 2M + 1 unknowns; the second difference D² along
+frequency ties neighbouring bins together (A. Siddiqi, Identification of the Harmonic Transfer Functions of a Helicopter
+Rotor, MSc thesis, MIT, 2001). With the unknowns ordered bin by bin the matrix is banded and is factorised once.
+
+**Choice of α.** The penalty acts as a window on the impulse response, ĝ(t) = g(t) / [1 + (t/t_c)⁴] with
+t_c = (⟨|U|²⟩/α)^{1/4} / (2πΔf), ⟨⟩ the mean over bins and Δf their width. So α is not a number to tune but a time t_c,
+which means the same in records of any length and excitations of any size. It is chosen as 12 ring-down times τ of the
+machine: the peak of a resonance then loses 24 (τ/t_c)⁴ ≈ 0.1 %, while noise from later than t_c, where there is no
+response, is kept out. What is lost is predicted by `smooth`, the same operator applied to a model.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_solve_banded, cholesky_banded
+
+from rhythmid.errors import InputError
+from rhythmid.ltp.htf import HarmonicTransferFunctions
+from rhythmid.ltp.spectra import Spectra
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+RING_DOWNS = 12.0  # t_c / τ
+HAT = np.pi / np.sqrt(2.0)  # ∫ dt / (1 + t⁴): effective length of the window, in t_c
+NOISE = 3.0 * np.pi / (4.0 * np.sqrt(2.0))  # ∫ dt / (1 + t⁴)²: of the window's noise, in t_c
+REACHED = 0.01  # of the greatest mean input power, below which nothing is known about a harmonic
+
+
+@dataclass(frozen=True, eq=False)
+class RegularisedLeastSquares:
+    """Equation (5) for one excitation: the matrix of its normal equations, factorised.
+
+    `harmonics` m (h,); `bins` l (n,) from −L to L; `shifted` U_{l−mP} (h, n), zero in the limit cycle's bins; `factor`
+    the banded Cholesky factor; `window` t_c [s]; `alpha` α in the units of |U|² [unit² s²].
+    """
+
+    spectra: Spectra
+    harmonics: NDArray[np.int64]
+    bins: NDArray[np.int64]
+    shifted: Complex
+    factor: Complex
+    window: float
+    alpha: float
+
+    def solve(self, output: Complex) -> Complex:
+        """Ĝ of equation (5) from Y in the bins (n,); shape (h, n)."""
+        right = self.shifted.conj() * output[None, :]
+        return cho_solve_banded((self.factor, True), right.T.ravel()).reshape(-1, len(self.harmonics)).T
+
+    def smooth(self, htf: Complex) -> Complex:
+        """What (5) would return if G_m (h, n) were the truth: its smoothing bias, exactly."""
+        return self.solve(np.einsum("hn,hn->n", self.shifted, htf))
+
+    @property
+    def frequency(self) -> Array:
+        """Frequencies of the bins [Hz], (n,)."""
+        return self.bins.astype(float) * self.spectra.resolution
+
+    @property
+    def positive(self) -> NDArray[np.bool_]:
+        """Bins of positive frequency, (n,)."""
+        return self.bins > 0
+
+    def model_htf(self, htf: Callable[[NDArray[np.int64], Array], Complex]) -> Complex:
+        """G_m (h, n) of a model in all bins from `htf(harmonics, frequency)`, evaluated at positive frequencies and
+        extended by G_−m(−jω) = conj G_m(jω)."""
+        right = htf(self.harmonics, self.frequency[self.bins >= 0])
+        return np.hstack([right[::-1, :0:-1].conj(), right])
+
+    @cached_property
+    def power(self) -> Array:
+        """Mean input power (h, n) around each bin, as far as the window ties bins together [unit² s²]."""
+        wide = max(1, round(1.0 / (2.0 * self.window * self.spectra.resolution)))
+        wide = max(wide, self._spacing)
+        kernel = np.ones(2 * wide + 1) / (2 * wide + 1)
+        return np.array([np.convolve(row, kernel, mode="same") for row in np.abs(self.shifted) ** 2])
+
+    @cached_property
+    def _spacing(self) -> int:
+        """Distance between bins that the input excites."""
+        live = np.abs(self.spectra.input) > 1e-3 * np.abs(self.spectra.input).max()
+        gaps = np.diff(np.flatnonzero(live))
+        return int(np.median(gaps)) if len(gaps) else 1
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """Where the input says something about harmonic m at bin l, (h, n)."""
+        return self.power > REACHED * np.median(self.power[self.power > REACHED * self.power.max()])
+
+
+def regularised_least_squares(
+    spectra: Spectra, harmonics: int = 3, window: float | None = None, ring_down: float = 1.0, alpha: float | None = None
+) -> RegularisedLeastSquares:
+    """Set up and factorise equation (5) for `harmonics` M, that is m = −M … M.
+
+    The smoothing is given as the time `window` t_c [s], else follows from the machine's `ring_down` [s], or is stated as
+    `alpha` outright. Raises InputError when the record excites nothing.
+    """
+    low, high = spectra.band
+    m = np.arange(-harmonics, harmonics + 1)
+    last = min(round((high + harmonics * spectra.pumping.frequency) / spectra.resolution), len(spectra.input) - 1)
+    bins = np.arange(-last, last + 1)
+    shifted = spectra.shifted_input(m, bins)
+    shifted[:, bins % spectra.window.periods == 0] = 0.0  # the limit cycle's own bins
+    mean = float(np.mean(np.abs(spectra.input[(spectra.frequency >= low) & (spectra.frequency <= high)]) ** 2))
+    if alpha is None:
+        t_c = window or RING_DOWNS * ring_down
+        alpha = mean / (2.0 * np.pi * spectra.resolution * t_c) ** 4
+    else:
+        t_c = (mean / alpha) ** 0.25 / (2.0 * np.pi * spectra.resolution)
+    h, n = shifted.shape
+    band = np.zeros((2 * h + 1, h * n), dtype=complex)  # lower form: band[i − j, j]
+    for row in range(h):
+        for column in range(row + 1):
+            band[row - column, column::h] += shifted[row].conj() * shifted[column]
+    diagonal = np.full(n, 6.0)
+    diagonal[[0, -1]], diagonal[[1, -2]] = 1.0, 5.0
+    first = np.full(n - 1, -4.0)
+    first[[0, -1]] = -2.0
+    tiny = 1e-12 * mean  # where the input reaches nothing, a straight line is still undetermined
+    band[0] += np.repeat(alpha * diagonal, h) + tiny
+    band[h, : h * (n - 1)] += np.repeat(alpha * first, h)
+    band[2 * h, : h * (n - 2)] += alpha
+    try:
+        factor = cholesky_banded(band, lower=True)
+    except np.linalg.LinAlgError:
+        raise InputError("the excitation does not determine the transfer functions; excite more frequencies") from None
+    return RegularisedLeastSquares(spectra, m, bins, shifted, factor, float(t_c), float(alpha))
+
+
+@dataclass(frozen=True, eq=False)
+class HtfEstimate:
+    """HTFs found by equation (5).
+
+    Attributes
+    ----------
+    htf : Ĥ_m at positive frequencies, with standard deviations from the residual.
+    reached : bool[h, n], where the input says something about them.
+    operator : the equation that was solved, for its smoothing bias.
+    noise : standard deviation of Y in a bin [unit s], as the residual shows it.
+    """
+
+    htf: HarmonicTransferFunctions
+    reached: NDArray[np.bool_]
+    operator: RegularisedLeastSquares
+    noise: float
+
+
+def estimate_htf(operator: RegularisedLeastSquares) -> HtfEstimate:
+    """Solve equation (5) for the record whose spectra the operator holds."""
+    output = operator.spectra.output_at(operator.bins)
+    found = operator.solve(output)
+    used = np.any(operator.shifted != 0.0, axis=0)
+    residual = np.where(used, output - np.einsum("hn,hn->n", operator.shifted, found), 0.0)
+    # each harmonic takes as many degrees of freedom as its window holds independent values
+    share = min(0.9, len(operator.harmonics) * HAT * operator.window * operator.spectra.resolution)
+    noise = float(np.sqrt(np.sum(np.abs(residual) ** 2) / max(1.0, used.sum() * (1.0 - share))))
+    keep = operator.positive
+    variance = noise**2 / np.maximum(operator.power[:, keep], 1e-300)
+    std = np.sqrt(variance * min(1.0, NOISE * operator.window * operator.spectra.resolution))
+    htf = HarmonicTransferFunctions(operator.harmonics, operator.frequency[keep], found[:, keep], std)
+    return HtfEstimate(htf, operator.reached[:, keep], operator, noise)
