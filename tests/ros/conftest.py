@@ -27,6 +27,7 @@ from rhythmid_bringup.processes import Supervised, end
 from rhythmid_nodes.node import GraphNode
 from rhythmid_nodes.qos import stream
 
+
 class Graph:
     """Nodes under test, and a probe that sees and sends messages; everything lives in one DDS domain."""
 
@@ -41,7 +42,9 @@ class Graph:
 
     # Nodes
 
-    def add(self, build: Callable[..., GraphNode], remap: dict[str, str] | None = None, **parameters: Any) -> Any:
+    def add(
+        self, build: Callable[..., GraphNode], remap: dict[str, str] | None = None, **parameters: Any
+    ) -> Any:
         """A node in this process."""
         arguments = ["--ros-args", "-r", "__ns:=/hopper"]
         for source, target in (remap or {}).items():
@@ -56,11 +59,20 @@ class Graph:
         node.begin()
         return node
 
-    def spawn(self, executable: str, name: str, remap: dict[str, str] | None = None, **parameters: Any) -> Supervised:
+    def spawn(
+        self, executable: str, name: str, remap: dict[str, str] | None = None, **parameters: Any
+    ) -> Supervised:
         """A node in a process of its own."""
         path = self.folder / f"{name}.yaml"
         path.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters}}, width=2**16))
-        command = [sys.executable, "-m", f"rhythmid_nodes.{executable}", "--ros-args", "--params-file", str(path)]
+        command = [
+            sys.executable,
+            "-m",
+            f"rhythmid_nodes.{executable}",
+            "--ros-args",
+            "--params-file",
+            str(path),
+        ]
         for source, target in {"__ns": "/hopper", "__node": name, **(remap or {})}.items():
             command += ["-r", f"{source}:={target}"]
         process = Supervised(name, command, os.environ, lambda _name, line: self.said.append(line))
@@ -82,7 +94,9 @@ class Graph:
         self.probe.create_subscription(message_type, topic, heard.append, qos or stream(lockstep=False))
         return heard
 
-    def talk(self, topic: str, message_type: type = JointState, qos: QoSProfile | None = None) -> Callable[[Any], None]:
+    def talk(
+        self, topic: str, message_type: type = JointState, qos: QoSProfile | None = None
+    ) -> Callable[[Any], None]:
         """A function that publishes on a topic, once somebody listens."""
         publisher = self.probe.create_publisher(message_type, topic, qos or stream(lockstep=False))
         self.until(lambda: publisher.get_subscription_count() > 0, f"a subscriber of {topic}")

@@ -173,7 +173,10 @@ def test_a_node_that_is_ended_leaves_a_zero_behind(graph, excite):
         ({"excitation": "no json"}, "not JSON"),
         ({"excitation": "[1]"}, "JSON object"),
         ({"excitation": '{"type": "chirps"}'}, "chirps"),
-        ({"excitation": json.dumps(CHIRP), "max_effort": -1.0}, r"max_effort = -1.0 must lie in \[0, inf\] N"),
+        (
+            {"excitation": json.dumps(CHIRP), "max_effort": -1.0},
+            r"max_effort = -1.0 must lie in \[0, inf\] N",
+        ),
         ({"excitation": json.dumps(CHIRP), "envelope": [0.4, 0.0]}, "low < high"),
         ({"excitation": json.dumps(CHIRP), "rate": 0}, "rate = 0"),
         ({"excitation": json.dumps(CHIRP), "ramp": "long"}, "ramp = 'long' must be a number"),

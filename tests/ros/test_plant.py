@@ -53,7 +53,9 @@ def test_a_command_acts_at_its_stamp_and_a_late_one_at_once(graph):
     assert int(node.figures()["late_commands"]) >= 1
     graph.spin(0.1)
     count = min(len(states), len(forcing))
-    given = np.array([s.effort[0] - f.effort[0] for s, f in zip(states[:count], forcing[:count], strict=True)])
+    given = np.array(
+        [s.effort[0] - f.effort[0] for s, f in zip(states[:count], forcing[:count], strict=True)]
+    )
     levels = given[np.concatenate([[True], np.abs(np.diff(given)) > 1e-9])]
     np.testing.assert_allclose(levels, [0.0, 0.3, 0.7], atol=1e-9)
     first = stamp_ns(states[int(np.argmax(given > 1e-9))])

@@ -1,6 +1,5 @@
 """Recorder over real topics: any type and quality of service, nothing lost unsaid, readable after a crash."""
 
-import json
 import signal
 import time
 
@@ -56,7 +55,9 @@ def test_messages_of_any_type_and_quality_of_service_are_recorded(graph, tmp_pat
     graph.until(lambda: sum(track.received for track in recorder._tracks.values()) == 201, "201 messages")
     figures = finish(graph, recorder)
     assert figures["lost"] == figures["dropped"] == "0"
-    assert "100 messages, 1000.000 Hz, 0 duplicates, 0 backwards, 0 missing" in figures["/hopper/joint_states"]
+    assert (
+        "100 messages, 1000.000 Hz, 0 duplicates, 0 backwards, 0 missing" in figures["/hopper/joint_states"]
+    )
     content = read(bag)
     assert [m.position[0] for m in content["/hopper/joint_states"]] == [k * 1e-3 for k in range(100)]
     assert len(content["/hopper/force"]) == 100

@@ -44,7 +44,9 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             DeclareLaunchArgument("experiment", description="experiment file"),
-            DeclareLaunchArgument("bag", default_value="", description="bag to write; empty: as the file says"),
+            DeclareLaunchArgument(
+                "bag", default_value="", description="bag to write; empty: as the file says"
+            ),
             OpaqueFunction(function=graph),
         ]
     )

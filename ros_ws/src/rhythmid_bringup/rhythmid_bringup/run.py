@@ -24,11 +24,14 @@ console = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def load(path: Path, out: Path | None) -> Experiment:
-    """The experiment with its bag's absolute path. Raises InputError when the bag's place is taken."""
+    """The experiment with its bag's absolute path. Raises InputError when the bag's place is taken or not writable."""
     experiment = Experiment.load(path)
     bag = (out or experiment.record.path).absolute()
     if os.path.lexists(bag):
         raise InputError(f"{bag}: exists already and is not overwritten; choose another path or remove it")
+    folder = next(parent for parent in bag.parents if parent.exists())
+    if not (folder.is_dir() and os.access(folder, os.W_OK)):
+        raise InputError(f"{bag}: {folder} is not a folder that can be written to")
     return experiment.with_record(path=bag)
 
 
@@ -46,11 +49,25 @@ def run_graph(path: Path, out: Path | None) -> int:
         supervisor = Supervisor(experiment, folder, environment, console, interrupted)
         outcome = supervisor.run()
     show(console, experiment, supervisor.observed, outcome)
+    mend(experiment.record.path)
     if outcome.code == 0:
         shutil.rmtree(folder, ignore_errors=True)
     else:
         console.print(f"parameters and logs of the nodes: {folder}")
     return outcome.code
+
+
+def mend(bag: Path) -> None:
+    """Say where the bag is; if its recorder died, bring back what it had written first."""
+    if bag.is_dir() and not (bag / "metadata.yaml").is_file():
+        broken = bag.with_name(f"{bag.name}.broken")
+        bag.rename(broken)
+        console.print(f"the recorder did not close the bag; what it left is in {broken}")
+        from rhythmid.record.recover import recover
+
+        recover(broken, bag)
+    if bag.is_dir():
+        console.print(f"bag: {bag}")
 
 
 def run_alone(path: Path, out: Path | None, name: str) -> int:

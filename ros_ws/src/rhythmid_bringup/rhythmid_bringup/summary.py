@@ -1,4 +1,4 @@
-"""What a run leaves on the screen: rates, lateness, losses, applied delays, and where the bag is."""
+"""What a run leaves on the screen: rates, lateness, losses, applied delays."""
 
 from __future__ import annotations
 
@@ -24,8 +24,3 @@ def show(console: Console, experiment: Experiment, observed: Observed, outcome: 
     console.print(
         f"[{colour}]{escape(outcome.sentence)}[/]: {observed.played:.3f} s played in {observed.elapsed:.1f} s"
     )
-    bag = experiment.record.path
-    if (bag / "metadata.yaml").is_file():
-        console.print(f"bag: {bag}")
-    elif bag.is_dir():
-        console.print(f"bag: {bag} was not closed; bring back what is in it with 'rhythmid recover'")

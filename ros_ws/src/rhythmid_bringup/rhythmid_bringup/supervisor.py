@@ -73,7 +73,8 @@ class Supervisor:
         try:
             self._launch()
             outcome = self._wait_until_ready(observer) or self._play(observer)
-            end(self._processes, self._listen)
+            end([process for process in self._processes if process.name != "recorder"], self._listen)
+            end(self._processes, self._listen)  # the recorder hears the others' last words
             for process in self._processes:
                 process.join_output()
             self.observed.figures = observer.figures
@@ -190,7 +191,7 @@ class Supervisor:
         """Go on recording until the last response has come through both delays."""
         until = time.monotonic() + longest(self._experiment.input_delay) + POST_ROLL
         until += longest(self._experiment.measurement_delay)
-        while time.monotonic() < until and self._trouble() is None:
+        while time.monotonic() < until:
             self._listen()
 
     def _fade_out(self, observer: Observer) -> None:
@@ -201,6 +202,7 @@ class Supervisor:
         patience = time.monotonic() + self._experiment.safety.ramp + 1.0
         while observer.state == "running" and time.monotonic() < patience:
             self._listen()
+        self._record_tail()
 
 
 def longest(delay: Delay) -> float:

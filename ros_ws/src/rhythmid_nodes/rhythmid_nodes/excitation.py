@@ -146,7 +146,8 @@ class ExcitationNode(GraphNode):
         with self._lock:
             if not self.lockstep and self._state in ("running", "ramping"):
                 self._halt(self._wall.now(), "the node was ended")
-                self._output.wait_for_all_acked(Duration(seconds=0.5))
+        for publisher in (self._output, self._run):
+            publisher.wait_for_all_acked(Duration(seconds=0.5))
         super().close()
 
     # Start and stop

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import math
 import os
 import signal
 import sys
@@ -25,6 +26,7 @@ from .diagnostics import Diagnostics
 from .parameters import Parameter, declare
 
 _PR_SET_PDEATHSIG = 1
+_LAST_WORDS = 0.1  # seconds
 
 RATE = Parameter("rate", 1000, "samples per second of the common grid", "Hz", (1, 100_000))
 TIME_MODE = Parameter(
@@ -129,7 +131,8 @@ def serve(build: Sequence[Callable[[], GraphNode]], arguments: list[str]) -> int
 
 
 def _spin(nodes: Sequence[GraphNode], asked: list[int]) -> None:
-    """Serve callbacks until `asked` is filled by a signal or a node is done; raises what a worker died of."""
+    """Serve callbacks until `asked` is filled by a signal or a node is done, and a moment more for what has been
+    delivered but not yet served; raises what a worker died of."""
     executor = EventsExecutor()
     for node in nodes:
         executor.add_node(node)
@@ -138,15 +141,16 @@ def _spin(nodes: Sequence[GraphNode], asked: list[int]) -> None:
     for node in nodes:
         node.begin()
     look_at = 0.0
-    while not asked:
+    end_at = math.inf
+    while time.monotonic() < end_at:
         executor.spin_once(timeout_sec=0.1)  # EventsExecutor.spin() never returns on a signal
-        if time.monotonic() > look_at:
+        if asked or time.monotonic() > look_at:
             look_at = time.monotonic() + 0.1
             failure = next((node.failure for node in nodes if node.failure is not None), None)
             if failure is not None:
                 raise failure
-            if any(node.done for node in nodes):
-                return
+            if end_at == math.inf and (asked or any(node.done for node in nodes)):
+                end_at = time.monotonic() + _LAST_WORDS
 
 
 def run(build: Callable[[], GraphNode]) -> None:

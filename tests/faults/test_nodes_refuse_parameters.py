@@ -1,0 +1,40 @@
+"""Node processes refuse wrong parameters with one line that names parameter, value and range, and exit code 2."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+FOLDER = Path(__file__).parents[2] / "ros_ws" / "src" / "rhythmid_bringup" / "config"
+
+
+def run_node(executable, *arguments):
+    return subprocess.run(
+        [sys.executable, "-m", f"rhythmid_nodes.{executable}", "--ros-args", *arguments],
+        capture_output=True, text=True, timeout=60, check=False, cwd=FOLDER,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("executable", "given", "said"),
+    [
+        ("delay_injector", "delay:=-0.04", "error: parameter delay = -0.04 must lie in [0, 10] s"),
+        ("delay_injector", "delay:=.nan", "error: parameter delay = nan must lie in [0, 10] s"),
+        ("delay_injector", "delai:=0.04", "error: unknown parameter delai; this node has delay, delay_from"),
+        (
+            "delay_injector",
+            "stamp_mode:=late",
+            "error: parameter stamp_mode = 'late' must be one of arrival, keep",
+        ),
+        ("excitation", "excitation:=chirp", "error: parameter excitation is not JSON"),
+        ("recorder", "topics:=excitation", "error: parameter topics = 'excitation' must be a list"),
+        ("plant", "model:=missing.yaml", "error: missing.yaml"),
+    ],
+)
+def test_a_wrong_parameter_is_refused_with_one_line_and_code_2(executable, given, said):
+    done = run_node(executable, "-p", given)
+    assert done.returncode == 2
+    assert done.stderr.startswith(said) and len(done.stderr.splitlines()) == 1

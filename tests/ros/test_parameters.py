@@ -1,0 +1,66 @@
+"""Parameters: described, with unit and range, and the shipped parameter file is accepted by all nodes."""
+
+import json
+from pathlib import Path
+
+import pytest
+from rcl_interfaces.srv import DescribeParameters
+
+from rhythmid_nodes.delay_injector import PARAMETERS as DELAY_PARAMETERS
+from rhythmid_nodes.delay_injector import DelayInjector
+from rhythmid_nodes.excitation import PARAMETERS as EXCITATION_PARAMETERS
+from rhythmid_nodes.excitation import ExcitationNode
+from rhythmid_nodes.plant import PARAMETERS as PLANT_PARAMETERS
+from rhythmid_nodes.plant import PlantNode
+from rhythmid_nodes.recorder import PARAMETERS as RECORDER_PARAMETERS
+from rhythmid_nodes.recorder import Recorder
+
+CONFIG = Path(__file__).parents[2] / "ros_ws" / "src" / "rhythmid_bringup" / "config"
+NODES = {
+    "plant": (PlantNode, PLANT_PARAMETERS),
+    "command_delay": (DelayInjector, DELAY_PARAMETERS),
+    "measurement_delay": (DelayInjector, DELAY_PARAMETERS),
+    "excitation": (ExcitationNode, EXCITATION_PARAMETERS),
+    "recorder": (Recorder, RECORDER_PARAMETERS),
+}
+
+
+def test_ros2_param_describe_shows_description_unit_and_range(graph):
+    graph.add(DelayInjector, {"input": "here", "output": "there"})
+    request = DescribeParameters.Request(names=["delay", "stamp_mode"])
+    delay, mode = graph.call("delay_injector/describe_parameters", DescribeParameters, request).descriptors
+    assert delay.description.endswith("[s]") and not delay.read_only
+    assert (delay.floating_point_range[0].from_value, delay.floating_point_range[0].to_value) == (0.0, 10.0)
+    assert "(arrival | keep)" in mode.description and mode.read_only
+
+
+def test_a_read_only_parameter_cannot_be_set(graph):
+    graph.add(DelayInjector, {"input": "here", "output": "there"})
+    assert not graph.set_parameter("delay_injector", "stamp_mode", "keep").successful
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_the_shipped_parameter_file_is_accepted(graph, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "paper_hopper.yaml").write_text((CONFIG / "paper_hopper.yaml").read_text())
+    build, _ = NODES[name]
+    file = CONFIG / "hopper_params.yaml"
+
+    def with_file(**options):
+        options["cli_args"] += ["-r", f"__node:={name}", "--params-file", str(file)]
+        return build(**options)
+
+    node = graph.add(with_file, {"input": f"{name}_in", "output": f"{name}_out"})
+    assert node.get_name() == name
+    expected = {"command_delay": 0.040, "measurement_delay": 0.050}
+    if name in expected:
+        assert node.values["delay"] == expected[name]
+    if name == "excitation":
+        assert json.loads(node.values["excitation"])["type"] == "chirp" and node.values["max_effort"] == 0.1
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_every_parameter_has_a_description(name):
+    for parameter in NODES[name][1]:
+        assert len(parameter.description) > 10, parameter.name
+        assert parameter.default is not None or parameter.items is not None

@@ -1,0 +1,270 @@
+"""`rhythmid run`: the same data by every way, and a valid bag however a run ends."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from rosbags.rosbag2 import Reader
+
+from rhythmid.experiment import Experiment, perform
+from rhythmid_nodes.joint_state import JointStateReader
+
+MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"
+ALL = ["excitation", "command", "forcing", "plant/joint_states", "joint_states", "run"]
+pytestmark = pytest.mark.timeout(150)
+
+
+def experiment_file(folder: Path, name="experiment", **changes) -> Path:
+    """A short chirp through two delays that are no whole number of samples."""
+    content = {
+        "model": str(MODEL),
+        "excitation": {"type": "chirp", "amplitude": 0.05, "band": [1, 7], "sweep": 3.0},
+        "delays": {"input": 0.0403, "measurement": 0.0507},
+        "noise": {"measurement_std": 1e-4},
+        "seed": 3,
+        "time": {"mode": "lockstep"},
+        "record": {"path": str(folder / f"{name}_bag"), "topics": ALL},
+    }
+    for key, value in changes.items():
+        merge = isinstance(content.get(key), dict) and "type" not in value
+        content[key] = {**content[key], **value} if merge else value
+    path = folder / f"{name}.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def content(bag: Path, namespace="/hopper"):
+    """Topic -> rows of (stamp_ns, position, velocity, effort), and what `run` said."""
+    joint, rows, run = JointStateReader("leg"), {}, []
+    with Reader(bag) as reader:
+        for connection, _, data in reader.messages():
+            topic = connection.topic.removeprefix(f"{namespace}/")
+            if topic == "run":
+                run.append(json.loads(data[8 : 8 + int.from_bytes(data[4:8], "little") - 1]))
+            else:
+                rows.setdefault(topic, []).append(joint.read(data))
+    return rows, run
+
+
+class Running:
+    """`rhythmid run` in the background."""
+
+    def __init__(self, path: Path, *options):
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "rhythmid.cli", "run", str(path), *options],
+            stderr=subprocess.PIPE, text=True, cwd=path.parent,
+        )  # fmt: skip
+
+    def children(self) -> dict[str, int]:
+        """Module -> process id of the nodes."""
+        found = {}
+        for entry in Path("/proc").iterdir():
+            try:
+                words = (entry / "cmdline").read_text().split("\0")
+                parent = re.search(r"PPid:\s*(\d+)", (entry / "status").read_text())
+            except OSError:
+                continue
+            if parent and int(parent[1]) == self.process.pid and "-m" in words:
+                found[words[words.index("-m") + 1].removeprefix("rhythmid_nodes.")] = int(entry.name)
+        return found
+
+    def wait_for_samples(self, bag: Path):
+        """Until the first second is on the disk, or the run has failed to come so far."""
+        patience = time.monotonic() + 60
+        while not (bag.is_dir() and sum(file.stat().st_size for file in bag.iterdir()) > 50_000):
+            assert self.process.poll() is None and time.monotonic() < patience, self.process.stderr.read()
+            time.sleep(0.05)
+
+    def end(self, timeout=40) -> tuple[int, str]:
+        _, said = self.process.communicate(timeout=timeout)
+        return self.process.returncode, said
+
+
+@pytest.fixture
+def started():
+    """Starts runs that do not outlive their test."""
+    running = []
+
+    def start(path, *options):
+        running.append(Running(path, *options))
+        return running[-1]
+
+    yield start
+    for run in running:
+        if run.process.poll() is None:
+            run.process.kill()
+            run.process.wait()
+
+
+@pytest.fixture(scope="module")
+def offline(tmp_path_factory):
+    return perform(Experiment.load(experiment_file(tmp_path_factory.mktemp("offline"))))
+
+
+@pytest.mark.parametrize(
+    ("layout", "window", "storage"),
+    [("composed", 100, "mcap"), ("processes", 7, "sqlite3"), ("composed", 1, "mcap")],
+)
+def test_lockstep_equals_the_run_without_ros(rhythmid, tmp_path, offline, layout, window, storage):
+    path = experiment_file(
+        tmp_path, time={"layout": layout, "window": window}, record={"storage": storage}
+    )  # fmt: skip
+    done = rhythmid("run", path)
+    assert done.returncode == 0, done.stderr
+    rows, run = content(tmp_path / "experiment_bag")
+    assert set(rows) == set(offline)
+    for topic, messages in offline.items():
+        heard = np.array(rows[topic], dtype=object)
+        assert heard[:, 0].tolist() == messages.stamp_ns.tolist(), topic
+        for column, field in enumerate(("position", "velocity", "effort"), start=1):
+            if getattr(messages, field) is not None:
+                np.testing.assert_array_equal(heard[:, column].astype(float), getattr(messages, field), topic)
+    assert [said["state"] for said in run] == ["running", "finished"]
+    concealed = json.dumps(run)
+    assert "0.0403" not in concealed and "0.0507" not in concealed and "stiffness" not in concealed
+
+
+def test_lockstep_follows_a_delay_profile_as_the_run_without_ros_does(rhythmid, tmp_path):
+    (tmp_path / "profile.csv").write_text("0,0.04\n1.5,0.06\n1.51,0.0\n3,0.2\n")
+    path = experiment_file(tmp_path, delays={"input": {"profile": "profile.csv"}}, time={"window": 1})
+    done = rhythmid("run", path)
+    assert done.returncode == 0, done.stderr
+    rows, _ = content(tmp_path / "experiment_bag")
+    expected = perform(Experiment.load(path))
+    for topic in ("command", "joint_states"):
+        assert [row.stamp_ns for row in rows[topic]] == expected[topic].stamp_ns.tolist()
+    assert [row.position for row in rows["joint_states"]] == expected["joint_states"].position.tolist()
+
+
+def test_real_time_loses_nothing_and_reports_its_lateness(rhythmid, tmp_path):
+    path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"})
+    done = rhythmid("run", path)
+    assert done.returncode == 0, done.stderr
+    rows, run = content(tmp_path / "experiment_bag")
+    start_ns = run[0]["start_ns"]
+    assert run[-1]["state"] == "finished" and run[-1]["samples"] == 3000
+    grid = {topic: np.array([row.stamp_ns for row in rows[topic]]) for topic in rows}
+    for topic in ("excitation", "forcing", "plant/joint_states"):
+        assert np.all(np.diff(grid[topic]) == 1_000_000), topic
+    assert grid["excitation"][0] == start_ns and len(grid["excitation"]) == 3001  # and a last one of zero
+    for topic, source, delay in (
+        ("command", "excitation", 40_300_000),
+        ("joint_states", "plant/joint_states", 50_700_000),
+    ):
+        values = {row.stamp_ns: row for row in rows[source]}
+        sent = [values[stamp] for stamp in sorted(values)]
+        key = "effort" if topic == "command" else "position"
+        given, heard = [getattr(r, key) for r in sent], [getattr(r, key) for r in rows[topic]]
+        first = given.index(heard[0]) if topic == "joint_states" else 0
+        common = min(len(heard), len(given) - first)
+        assert common > 2900 and heard[:common] == given[first : first + common], (
+            topic
+        )  # in order, none missing
+        applied = grid[topic][:common] - np.array([row.stamp_ns for row in sent])[first : first + common]
+        assert np.all(applied >= delay) and np.median(applied) < delay + 20_000_000
+    for said in ("lateness_p99_ms", "delay_error_max_ms", "applied_delay_mean_ms", "late_commands"):
+        assert said in done.stderr
+
+
+def test_an_existing_bag_is_refused_before_anything_starts(rhythmid, tmp_path):
+    path = experiment_file(tmp_path)
+    (tmp_path / "experiment_bag").mkdir()
+    done = rhythmid("run", path)
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
+    assert "experiment_bag: exists already" in done.stderr
+
+
+def test_a_place_that_cannot_be_written_is_refused_with_code_2(rhythmid, tmp_path):
+    (tmp_path / "file").touch()
+    done = rhythmid("run", experiment_file(tmp_path), "--out", tmp_path / "file" / "bag")
+    assert done.returncode == 2 and "file/bag" in done.stderr
+
+
+@pytest.mark.parametrize(("layout", "number"), [("processes", signal.SIGINT), ("composed", signal.SIGTERM)])
+def test_stopped_by_the_user_it_leaves_a_valid_bag(started, tmp_path, layout, number):
+    path = experiment_file(
+        tmp_path, time={"mode": "realtime", "layout": layout}, duration=60.0, safety={"ramp": 0.1, "max_effort": 1.0}
+    )  # fmt: skip
+    run = started(path)
+    run.wait_for_samples(tmp_path / "experiment_bag")
+    children = run.children()
+    run.process.send_signal(number)
+    code, said = run.end()
+    assert code == 0 and "stopped by the user" in said
+    rows, states = content(tmp_path / "experiment_bag")
+    assert states[-1]["state"] == "stopped" and rows["excitation"][-1].effort == 0.0
+    assert np.all(np.diff([row.stamp_ns for row in rows["forcing"]]) == 1_000_000)
+    assert children and not any(Path(f"/proc/{pid}").exists() for pid in children.values())
+
+
+@pytest.mark.parametrize("victim", ["plant", "recorder"])
+def test_a_nodes_death_ends_the_run_with_a_valid_bag(started, tmp_path, victim):
+    path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"}, duration=60.0)
+    run = started(path)
+    run.wait_for_samples(tmp_path / "experiment_bag")
+    children = run.children()
+    os.kill(children[victim], signal.SIGKILL)
+    code, said = run.end()
+    assert code == 1 and f"{victim} was killed by SIGKILL" in said
+    rows, _ = content(tmp_path / "experiment_bag")
+    assert rows["excitation"] and len(rows["joint_states"]) > 50
+    assert not any(Path(f"/proc/{pid}").exists() for pid in children.values())
+
+
+def test_the_nodes_end_when_the_supervisor_is_killed(started, tmp_path):
+    run = started(experiment_file(tmp_path, time={"mode": "realtime", "layout": "composed"}, duration=60.0))
+    run.wait_for_samples(tmp_path / "experiment_bag")
+    children = run.children()
+    run.process.kill()
+    patience = time.monotonic() + 20
+    while any(Path(f"/proc/{pid}").exists() for pid in children.values()):
+        assert time.monotonic() < patience
+        time.sleep(0.05)
+    rows, _ = content(tmp_path / "experiment_bag")
+    assert rows["joint_states"]
+
+
+def test_a_machine_that_leaves_its_envelope_ends_the_run_with_code_1(rhythmid, tmp_path):
+    path = experiment_file(
+        tmp_path,
+        time={"mode": "realtime"},
+        excitation={"type": "profile", "points": [[0.0, 0.0], [0.5, 20.0]], "length": 20.0},
+        safety={"envelope": [0.0, 0.25], "max_effort": 30.0},
+    )
+    done = rhythmid("run", path)
+    assert done.returncode == 1 and "outside the envelope" in done.stderr
+    rows, run = content(tmp_path / "experiment_bag")
+    assert run[-1]["state"] == "stopped" and rows["excitation"][-1].effort == 0.0
+
+
+def test_nodes_started_one_by_one_find_each_other_and_end_by_themselves(domain, started, rhythmid, tmp_path):
+    """As in containers: whichever comes first, the lockstep run is complete."""
+    path = experiment_file(tmp_path, excitation={"sweep": 1.0})
+    nodes = {name: started(path, "--node", name) for name in ("excitation", "plant", "command_delay")}
+    time.sleep(2.0)  # the others come late on purpose
+    nodes |= {name: started(path, "--node", name) for name in ("measurement_delay", "recorder")}
+    code, said = nodes.pop("excitation").end(timeout=60)
+    assert code == 0, said
+    for node in nodes.values():
+        node.process.send_signal(signal.SIGTERM)  # what `docker compose` does when one container has ended
+        code, said = node.end()
+        assert code == 0, said
+    rows, _ = content(tmp_path / "experiment_bag")
+    expected = perform(Experiment.load(path))
+    assert [row.position for row in rows["joint_states"]] == expected["joint_states"].position.tolist()
+
+
+def test_an_unknown_node_is_refused_with_the_names_there_are(rhythmid, tmp_path):
+    done = rhythmid("run", experiment_file(tmp_path), "--node", "wheel")
+    assert (
+        done.returncode == 2
+        and "plant, command_delay, measurement_delay, excitation, recorder" in done.stderr
+    )
