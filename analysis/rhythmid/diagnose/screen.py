@@ -179,6 +179,8 @@ def guesses(catalogue: Catalogue, model: Model, sizes: Scales) -> list[tuple[Ele
     for element in catalogue.values():
         if not element.candidate or element.starts is None or element.name in present:
             continue
+        if present & set(element.needless_with):
+            continue
         if element.rotational and model.units.position != "rad":
             continue
         if any(model.borrowed(source, default) is None for source, default in element.borrows.values()):

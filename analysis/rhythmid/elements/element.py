@@ -113,6 +113,7 @@ class Element:
     size: str = ""
     absent: float = 0.0
     candidate: bool = True  # takes part in the search for missing physics
+    needless_with: tuple[str, ...] = ()  # elements beside which another candidate says the same
     rotational: bool = False  # makes sense only where the position is an angle
     starts: Callable[[Scales], list[dict[str, float]]] | None = None
     source: str = ""  # file that defines it

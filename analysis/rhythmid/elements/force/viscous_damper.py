@@ -21,6 +21,7 @@ ELEMENT = Element(
     also_known_as=("dashpot", "linear damper"),
     family="damping",
     special_case_of=("viscoelastic_relaxation",),  # for τ_m → 0
+    needless_with=("switched_damper",),  # flight damping and a free stance damping make it up
     confusable={
         "coulomb_friction": "one amplitude only: Coulomb's apparent damping falls as 1/amplitude",
         "quadratic_drag": "one amplitude only: drag's apparent damping grows with amplitude",
