@@ -1,0 +1,76 @@
+"""`rhythmid proof`: conceal effects, diagnose, open the seals and count."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich.console import Console
+from rich.markdown import Markdown
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from rhythmid.errors import InputError
+
+Kinds = Literal["single", "pairs", "null", "left-out", "all"]
+
+
+def proof(
+    out: Annotated[Path, typer.Option("--out", help="Folder for seals, answers and the score card.")],
+    cases: Annotated[int, typer.Option("--cases", min=1, help="Number of cases.")] = 24,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all that is drawn.")] = 0,
+    kind: Annotated[Kinds, typer.Option("--kind", help="What is concealed.")] = "all",
+    jobs: Annotated[
+        int, typer.Option("--jobs", min=1, help="Cases at a time; they share the processors evenly.")
+    ] = 2,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with a campaign.")] = False,
+    only: Annotated[list[str] | None, typer.Option("--only", help="Only this case; may be repeated.")] = None,
+    keep: Annotated[bool, typer.Option("--keep-bags", help="Keep the bags of cases that are done.")] = False,
+) -> None:
+    """Draw machines with concealed effects, seal the truth, diagnose from bags, open the seals and score."""
+    from rhythmid.proof.campaign import Campaign, Sealed, begin, carry_out, scores_in, write_card
+
+    campaign = Campaign(seed, kind, cases)
+    tasks = campaign.tasks
+    if only:
+        unknown = sorted(set(only) - {task.name for task in tasks})
+        if unknown:
+            raise InputError(f"--only {unknown[0]}: is none of the cases {tasks[0].name} … {tasks[-1].name}")
+        tasks = [task for task in tasks if task.name in only]
+    begin(out, campaign, resume)
+    console = Console()
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as progress:
+        bar = progress.add_task("cases", total=len(tasks), completed=len(scores_in(out, tasks)))
+
+        def report(news) -> None:
+            if isinstance(news, Sealed):
+                progress.console.print(f"{news.case}  sealed  {news.sha256}", highlight=False)
+                return
+            progress.advance(bar)
+            answer = " + ".join(news.named) or news.verdict
+            progress.console.print(
+                f"{news.case}  {news.outcome:10s}  {' + '.join(news.true) or 'nothing'}  →  {answer}"
+                f"  ({news.faintest:.2f} σ, {news.seconds:.0f} s)",
+                highlight=False,
+            )
+
+        failures = carry_out(out, tasks, jobs, report, keep)
+    write_card(out, campaign)
+    console.print(Markdown((out / "proof.md").read_text(encoding="utf-8")))
+    for name, failure in failures.items():
+        console.print(f"[red]{name} could not be done:[/] {failure}", highlight=False)
+    console.print(f"{out / 'proof.md'}, {out / 'proof.json'}")
+    if failures:
+        raise typer.Exit(1)

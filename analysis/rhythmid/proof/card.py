@@ -1,0 +1,206 @@
+"""The score card: rates with their intervals, by kind of case and size of the mismatch, and the confusion matrix."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from rhythmid.proof.score import Estimated, Score
+
+BINS = ((0.3, 1.0), (1.0, 3.0), (3.0, math.inf))
+NORMAL_95 = 1.959964
+
+
+@dataclass(frozen=True)
+class Rate:
+    """So many of so many, with the 95 % interval of E. B. Wilson (J. Am. Stat. Assoc. 22 (1927) 209)."""
+
+    hits: int
+    of: int
+
+    @property
+    def share(self) -> float:
+        return self.hits / self.of if self.of else math.nan
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        if not self.of:
+            return 0.0, 1.0
+        z2, n, p = NORMAL_95**2, self.of, self.share
+        centre = (p + z2 / (2 * n)) / (1 + z2 / n)
+        half = NORMAL_95 / (1 + z2 / n) * math.sqrt(p * (1 - p) / n + z2 / (4 * n * n))
+        return max(0.0, centre - half), min(1.0, centre + half)
+
+    def __str__(self) -> str:
+        if not self.of:
+            return "–"
+        low, high = self.interval
+        return f"{self.hits}/{self.of} = {100 * self.share:.1f} % ({100 * low:.1f}–{100 * high:.1f})"
+
+    def to_dict(self) -> dict[str, Any]:
+        low, high = self.interval
+        return {"hits": self.hits, "of": self.of, "share": self.share, "interval": [low, high]}
+
+
+def rate(scores: Sequence[Score], holds: Callable[[Score], bool]) -> Rate:
+    """How many of the scores something holds for."""
+    return Rate(sum(map(holds, scores)), len(scores))
+
+
+def coverage(estimates: Sequence[Estimated]) -> Rate:
+    """How many 95 % intervals hold the true value."""
+    return Rate(sum(abs(one.deviation) <= NORMAL_95 for one in estimates), len(estimates))
+
+
+def said(score: Score) -> str:
+    """What a case was answered with, in a word or two."""
+    if score.outcome in ("exact", "family", "wrong"):
+        return " + ".join(score.named)
+    return score.outcome
+
+
+def confusion(scores: Sequence[Score]) -> dict[str, Counter[str]]:
+    """How often each concealed effect got each answer."""
+    table: dict[str, Counter[str]] = {}
+    for one in scores:
+        table.setdefault(" + ".join(one.true) or "nothing", Counter())[said(one)] += 1
+    return dict(sorted(table.items()))
+
+
+def _rates(kind: str, scores: Sequence[Score]) -> dict[str, Rate]:
+    if kind == "null":
+        found = {"false alarms": rate(scores, lambda s: s.false_alarm)}
+        for noise in ("white", "coloured", "quantised"):
+            some = [s for s in scores if s.noise == noise]
+            found[f"false alarms, {noise} noise"] = rate(some, lambda s: s.false_alarm)
+        wrong = [s for s in scores if s.nominal_error > 0.25]
+        found["false alarms, nominal model more than 25 % wrong"] = rate(wrong, lambda s: s.false_alarm)
+        found["undecided"] = rate(scores, lambda s: s.outcome == "undecided")
+        return found
+    if kind == "left-out":
+        return {
+            "unknown, undecided or a declared family": rate(scores, lambda s: s.honest),
+            "of these unknown": rate(scores, lambda s: s.outcome == "unknown"),
+            "a confident wrong name": rate(scores, lambda s: s.outcome == "wrong" and not s.families),
+        }
+    found = {
+        "exact name" if kind == "single" else "exact names": rate(scores, lambda s: s.outcome == "exact"),
+        "exact, or in a declared family of two": rate(scores, lambda s: s.right_within_family),
+        "slot": rate(scores, lambda s: s.slot_right),
+    }
+    held = [s for s in scores if s.right_within_family and s.heldout is not None]
+    found["held-out error within 1.1 of the noise floor"] = rate(
+        held, lambda s: (s.heldout or math.inf) <= 1.1
+    )
+    return found
+
+
+def _sizes(scores: Sequence[Score]) -> list[tuple[str, list[Score]]]:
+    names = [f"{low:g}–{high:g}" if math.isfinite(high) else f"over {low:g}" for low, high in BINS]
+    return [(name, [s for s in scores if low <= s.faintest < high]) for name, (low, high) in zip(names, BINS)]
+
+
+def summary(scores: Sequence[Score]) -> dict[str, Any]:
+    """The whole score card as plain data."""
+    card: dict[str, Any] = {}
+    for kind in dict.fromkeys(one.kind for one in scores):
+        some = [one for one in scores if one.kind == kind]
+        part: dict[str, Any] = {
+            "cases": len(some),
+            "rates": {name: value.to_dict() for name, value in _rates(kind, some).items()},
+            "confusion": {true: dict(answers) for true, answers in confusion(some).items()},
+            "seconds": _spread([s.seconds for s in some]),
+            "processor_seconds": _spread([s.processor_seconds for s in some]),
+            "failures": {s.case: s.failure for s in some if s.failure},
+        }
+        if kind != "null":
+            part["by_size"] = {
+                size: {name: value.to_dict() for name, value in _rates(kind, group).items()}
+                for size, group in _sizes(some)
+            }
+        part["coverage"] = {
+            "effects": coverage([e for s in some for e in s.effects]).to_dict(),
+            "machine": coverage([e for s in some for e in s.machine]).to_dict(),
+        }
+        card[kind] = part
+    card["cases"] = [
+        asdict(one) | {"deviations": {e.name: e.deviation for e in (*one.effects, *one.machine)}}
+        for one in scores
+    ]
+    return card
+
+
+def _spread(values: Sequence[float]) -> dict[str, float]:
+    return {
+        "median": float(np.median(values)), "ninth_decile": float(np.quantile(values, 0.9)), "most": max(values),
+    }  # fmt: skip
+
+
+def markdown(scores: Sequence[Score], command: str, complete: bool = True) -> str:
+    """The score card to be read."""
+    lines = ["# Concealed proof", "", f"    {command}", ""]
+    if not complete:
+        lines += ["Not all cases have been scored yet.", ""]
+    lines.append("Rates with 95 % intervals; the mismatch is in units of the noise of a sample.")
+    for kind in dict.fromkeys(one.kind for one in scores):
+        some = [one for one in scores if one.kind == kind]
+        lines += ["", f"## {kind}: {len(some)} cases", ""]
+        lines += _table(kind, some)
+        estimates = [e for s in some for e in s.effects]
+        nuisance = [e for s in some for e in s.machine]
+        if estimates:
+            lines += [
+                "",
+                f"95 % intervals that hold the true value, parameters of the effect: {coverage(estimates)}.",
+            ]
+        if nuisance:
+            lines += [
+                "",
+                f"95 % intervals that hold the true value, machine and delays: {coverage(nuisance)}.",
+            ]
+        time, used = _spread([s.seconds for s in some]), _spread([s.processor_seconds for s in some])
+        lines += [
+            "",
+            f"Seconds a diagnosis: median {time['median']:.1f}, nine tenths below {time['ninth_decile']:.1f}; of processor "
+            f"time {used['median']:.1f} and {used['ninth_decile']:.1f}.",
+        ]
+        if kind != "null":
+            lines += ["", "| concealed | answered |", "| --- | --- |"]
+            for true, answers in confusion(some).items():
+                lines.append(
+                    f"| {true} | {', '.join(f'{what} {count}' for what, count in answers.most_common())} |"
+                )
+        astray = [s for s in some if _astray(s)]
+        if astray:
+            lines += [
+                "",
+                "| case | mismatch | concealed | answered | families |",
+                "| --- | --- | --- | --- | --- |",
+            ]
+            for s in astray:
+                families = "; ".join(" = ".join(group) for group in s.families) or "–"
+                lines.append(
+                    f"| {s.case} | {s.faintest:.2f} | {' + '.join(s.true) or 'nothing'} | "
+                    f"{s.verdict}: {' + '.join(s.named) or '–'} | {families} |"
+                )
+    return "\n".join(lines) + "\n"
+
+
+def _astray(score: Score) -> bool:
+    if score.kind == "null":
+        return score.outcome != "consistent"
+    return not score.honest if score.kind == "left-out" else score.outcome != "exact"
+
+
+def _table(kind: str, scores: Sequence[Score]) -> list[str]:
+    columns = [("all", list(scores))]
+    if kind != "null":
+        columns += _sizes(scores)
+    rates = [_rates(kind, group) for _, group in columns]
+    lines = ["| | " + " | ".join(name for name, _ in columns) + " |", "| --- |" + " --- |" * len(columns)]
+    for name in rates[0]:
+        lines.append(f"| {name} | " + " | ".join(str(column[name]) for column in rates) + " |")
+    return lines

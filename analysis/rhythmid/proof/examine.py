@@ -1,0 +1,45 @@
+"""Diagnosis of a case from what lies in its folder, the bags and the nominal model, and from nothing else."""
+
+import resource
+import time
+import traceback
+from pathlib import Path
+from typing import Any
+
+from rhythmid.diagnose.diagnosis import diagnose
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.errors import InputError
+from rhythmid.model import Model
+from rhythmid.proof.perform import JUDGE, LEARN, NOMINAL
+from rhythmid.record.read import load_records
+
+
+def _processor_time() -> float:
+    """Seconds of processor time of this process and its finished children."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)
+
+
+def examine(folder: Path, catalogue: Catalogue) -> dict[str, Any]:
+    """The diagnosis as plain data, with `seconds`, `processor_seconds`, `phases` (seconds since the start, what began)
+    and the length of the held-out records' block averages. A failure is an answer too: `failure` holds its message."""
+    began, used = time.monotonic(), _processor_time()
+    phases: list[tuple[float, str]] = []
+
+    def tell(what: str) -> None:
+        phases.append((round(time.monotonic() - began, 2), what))
+
+    answer: dict[str, Any] = {}
+    try:
+        tell("reading the bags")
+        nominal = Model.load(folder / NOMINAL, catalogue)
+        learn = load_records(sorted((folder / LEARN).iterdir()))
+        judge = load_records(sorted((folder / JUDGE).iterdir()))
+        found = diagnose(learn, nominal, judge, catalogue, tell)
+        answer = found.diagnosis.to_dict() | {"block": found.evidence.unseen[0].block}
+    except InputError as error:
+        answer = {"failure": f"refused: {error}"}
+    except Exception:
+        answer = {"failure": traceback.format_exc()}
+    spent = {"seconds": time.monotonic() - began, "processor_seconds": _processor_time() - used}
+    return answer | spent | {"phases": phases}
