@@ -17,7 +17,7 @@ Command = Callable[..., subprocess.CompletedProcess[str]]
 
 def pytest_configure(config: pytest.Config) -> None:
     """Keep compiled models from run to run, but apart from the user's own."""
-    if config.cache is not None:
+    if getattr(config, "cache", None) is not None:
         os.environ.setdefault("RHYTHMID_CACHE", str(config.cache.mkdir("compiled")))
 
 

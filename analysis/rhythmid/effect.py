@@ -111,7 +111,8 @@ def effect_along(element: Element, values: Mapping[str, float], model: Model, pa
     """Force (n,) that the element adds on the mass along the path; for a command, actuator or sensor element the
     change of its signal.
 
-    Parameters that the element borrows come from `model`. Raises InputError when the model lacks one.
+    Parameters that the element borrows come from `model`. Raises InputError when the model lacks one, or when one of the
+    element's own has no value.
     """
     borrowed = {
         name: MAX_STEP if source == STEP else model.borrowed(source, default)
@@ -120,11 +121,16 @@ def effect_along(element: Element, values: Mapping[str, float], model: Model, pa
     missing = [element.borrows[name][0] for name, value in borrowed.items() if value is None]
     if missing:
         raise InputError(f"element {element.name!r} needs {missing[0]!r}, which the model does not have")
-    parameters = [values.get(p.name, p.default if p.default is not None else np.nan) for p in element.parameters]
+    parameters = []
+    for parameter in element.parameters:
+        value = values.get(parameter.name, parameter.default)
+        if value is None:
+            raise InputError(f"element {element.name!r}: parameter {parameter.name!r} needs a value")
+        parameters.append(value)
     states = np.zeros(len(element.states))
     if element.states and element.initial is not None:
         first = path.signal[0] if element.slot == "sensor" else path.position[0]
-        given = {p.name: v for p, v in zip(element.parameters, parameters)} | borrowed
+        given = {p.name: v for p, v in zip(element.parameters, parameters, strict=True)} | borrowed
         states[:] = element.initial(float(first), float(path.velocity[0]), **given)
     rows = np.ascontiguousarray(
         np.vstack([path.position, path.velocity, path.effort, path.leg, path.signal]), dtype=float

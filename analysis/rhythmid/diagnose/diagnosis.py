@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from rhythmid.diagnose.calibrate import Calibration, calibrate
 from rhythmid.diagnose.confidence import probabilities
@@ -95,17 +96,18 @@ def diagnose(
     else:
         seen, unseen = hold_out_tail(everything[:count])
         heldout = "held out: the last fifth of every record"
-    with ThreadPoolExecutor(cores()) as pool:
+    # the matrices are tall and thin, and workers run side by side: threads inside linear algebra only get in the way
+    with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
         calibration = calibrate(model, seen, known, pool, tell)
         seen = list(calibration.series)
         found = search(seen, calibration.fit, known, pool, tell)
         tell("locating the mismatch")
         before = dependences(trajectories(found.nominal), pool)
         after = dependences(trajectories(found.fit), pool) if found.best.added else before
-    tell("judging on held-out records")
-    judge = _Judge(found, unseen if holdout else None)
-    diagnosis = _conclude(records, model, found, calibration, before, after, judge, heldout, known)
-    nominal_run, augmented_run = judge.fit(found.nominal.model), judge.fit(found.fit.model)
+        tell("judging on held-out records")
+        judge = _Judge(found, unseen if holdout else None)
+        diagnosis = _conclude(model, found, calibration, before, after, judge, heldout)
+        nominal_run, augmented_run = judge.fit(found.nominal.model), judge.fit(found.fit.model)
     evidence = Evidence(
         tuple(seen), tuple(unseen), calibration, found, tuple(before), tuple(after), nominal_run, augmented_run
     )
@@ -184,7 +186,6 @@ def _significant(dependence: Dependence) -> bool:
 
 
 def _conclude(
-    records: Sequence[Record],
     nominal: Model,
     found: Search,
     calibration: Calibration,
@@ -192,7 +193,6 @@ def _conclude(
     after: Sequence[Dependence],
     judge: _Judge,
     heldout: str,
-    catalogue: Catalogue,
 ) -> Diagnosis:
     """Put the verdict and its reasons together."""
     series = found.fit.run.series

@@ -1,0 +1,226 @@
+"""From a diagnosis' answer to the plain data that its report draws."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2 as chi2_distribution
+
+from rhythmid.diagnose.delays import delays_of
+from rhythmid.diagnose.diagnosis import Answer
+from rhythmid.diagnose.locate import Dependence
+from rhythmid.diagnose.search import LEVEL, WORTH, Search
+from rhythmid.elements.element import SLOTS
+from rhythmid.errors import InputError
+from rhythmid.identify.output_error import Fit
+from rhythmid.identify.series import Series, bandwidth
+from rhythmid.ltp.htf import theoretical_htf
+from rhythmid.ltp.pumping import Pumping, pumping_of
+from rhythmid.model import Model
+from rhythmid.record.record import Record
+from rhythmid.report.diagnosis import diagnosis_page
+from rhythmid.report.findings import ElementScore, Findings, FreeFunction, TransferChange
+from rhythmid.report.page import Page
+from rhythmid.report.record_quality import quality_of
+from rhythmid.report.run import Run
+from rhythmid.simulate import physical_times
+
+Array = NDArray[np.float64]
+INDICES = (0, -1, 1, -2, 2)  # transfer functions that are compared
+POINTS = 240  # of a transfer function
+
+
+def present(
+    answer: Answer,
+    nominal: Model,
+    records: Sequence[Record],
+    holdout: Sequence[Record] = (),
+    command: str = "",
+    name: str = "the nominal model",
+) -> Page:
+    """The report of an answer.
+
+    `nominal`, `records` and `holdout` are what `diagnose` was given, `command` the command line, `name` the nominal model's.
+    """
+    return diagnosis_page(findings(answer, nominal, records, holdout, command, name))
+
+
+def findings(
+    answer: Answer,
+    nominal: Model,
+    records: Sequence[Record],
+    holdout: Sequence[Record] = (),
+    command: str = "",
+    name: str = "the nominal model",
+) -> Findings:
+    """What the report shows, as plain data; arguments as for `present`."""
+    evidence, found = answer.evidence, answer.evidence.search
+    pumpings = {id(record): _pumping(record) for record in (*records, *holdout)}
+    runs = _runs(found.nominal, found.fit, [pumpings[id(r)] for r in records], bool(found.best.added))
+    if evidence.unseen_nominal is not None:
+        after = evidence.unseen_augmented or evidence.unseen_nominal
+        repaired = bool(found.best.added) and evidence.unseen_augmented is not None
+        runs += _runs(evidence.unseen_nominal, after, [pumpings[id(r)] for r in holdout], repaired, heldout=True)
+    models = {"Nominal model": nominal.to_yaml(), "Nominal model, refitted": found.nominal.model.to_yaml()}
+    if found.best.added:
+        models["Augmented model"] = answer.model.to_yaml()
+    count = max(len(found.rounds[0].scores), 1)
+    return Findings(
+        result=answer.diagnosis.to_dict(),
+        source=f"{name} against {_listed([r.name for r in records])}",
+        slots={slot: tuple(t.label for t in nominal.terms if t.element.slot == slot) for slot in SLOTS},
+        forced=any(one.forcing is not None for one in evidence.series),
+        runs=tuple(runs),
+        output_unit=nominal.units.position,
+        noise=found.noise.variance**0.5,
+        slow_noise=found.noise.long_run_variance**0.5,
+        scores=_scores(found),
+        threshold=float(chi2_distribution.isf(LEVEL / count, 1)),
+        functions=_functions(evidence.before, evidence.after if found.best.added else (), nominal),
+        transfer=_transfer(found, [p for r in records if (p := pumpings[id(r)]) is not None], evidence.series, nominal),
+        nominal={n: {"value": v.value, "std": None, "unit": v.unit} for n, v in nominal.parameters.items()},
+        refitted=_estimates(found.nominal),
+        refitted_delays=delays_of(found.nominal),
+        records=tuple(
+            quality_of(r, role) for group, role in ((records, "fit"), (holdout, "held out")) for r in group
+        ),
+        command=command,
+        models=models,
+        worth=WORTH,
+        at_bound=found.fit.at_bound,
+        unconverged=tuple(_names(trial.model, trial.added) for trial in found.trials if not trial.converged),
+        hints=_hints(answer),
+    )
+
+
+def _listed(names: Sequence[str], most: int = 4) -> str:
+    if len(names) > most:
+        return f"{', '.join(names[: most - 1])} and {len(names) - most + 1} more records"
+    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
+
+
+def _pumping(record: Record) -> Pumping | None:
+    """The record's forcing, None where there is none or it is not periodic."""
+    try:
+        found = pumping_of(record)
+    except InputError:
+        return None
+    return found if found is not None and found.active else None
+
+
+def _runs(
+    before: Fit, after: Fit, pumpings: Sequence[Pumping | None], repaired: bool, heldout: bool = False
+) -> list[Run]:
+    """Every series of the fits beside its simulations; they were fitted to the same series."""
+    found: list[Run] = []
+    for index, (one, pumping) in enumerate(zip(before.run.series, pumpings)):
+        rows = after.run.rows(after.model, index, after.starts[index])
+        if rows is None:
+            continue
+        phase = None
+        if pumping is not None:
+            physical = physical_times(after.model, one.centres)
+            phase = ((physical - pumping.origin) * pumping.frequency) % 1.0
+        found.append(
+            Run(
+                name=one.name,
+                time=one.centres,
+                measured=one.averaged,
+                before=one.averaged + before.residuals[index],
+                after=one.averaged + after.residuals[index] if repaired else None,
+                position=rows[:, 0],
+                velocity=rows[:, 1],
+                phase=phase,
+                used=one.used,
+                hidden=np.zeros_like(one.used) if heldout else _hidden(one),
+                heldout=heldout,
+                quiet=_quiet(one),
+            )
+        )
+    return found
+
+
+def _hidden(one: Series) -> NDArray[np.bool_]:
+    """The end of a series that was kept from the fit; single blocks that a gap runs through are not meant."""
+    last = np.flatnonzero(one.used)
+    hidden = np.zeros_like(one.used)
+    if len(last):
+        hidden[last[-1] + 1 :] = True
+    return hidden if hidden.sum() > 3 else np.zeros_like(one.used)
+
+
+def _quiet(one: Series) -> bool:
+    return one.command is None or not np.any(one.command.c)
+
+
+def _scores(found: Search) -> tuple[ElementScore, ...]:
+    """The best score of each element in the first round, best first."""
+    best: dict[str, ElementScore] = {}
+    for score in found.rounds[0].scores:
+        best.setdefault(score.element.name, ElementScore(score.element.name, score.element.slot, score.statistic))
+    return tuple(best.values())
+
+
+def _functions(before: Sequence[Dependence], after: Sequence[Dependence], model: Model) -> tuple[FreeFunction, ...]:
+    later = {one.quantity: one for one in after}
+    units = {"velocity": f"{model.units.position}/s", "time": "s", "actuator force": model.units.force}
+    made = []
+    for one in before:
+        other = later.get(one.quantity)
+        made.append(
+            FreeFunction(
+                one.quantity, one.explained, one.grid, one.force,
+                grid_unit=units.get(one.quantity, model.units.position),
+                force_unit=model.units.position if "sensor" in one.quantity else model.units.force,
+                explained_after=other.explained if other else None,
+                grid_after=other.grid if other else None,
+                force_after=other.force if other else None,
+            )
+        )  # fmt: skip
+    return tuple(made)
+
+
+def _transfer(
+    found: Search, pumpings: Sequence[Pumping], series: Sequence[Series], nominal: Model
+) -> TransferChange | str:
+    """Transfer functions of the refitted nominal and the final model around the cycle of the first forced record."""
+    if not pumpings:
+        return "no periodic forcing was recorded, so there is no cycle around which to state transfer functions"
+    pumping = pumpings[0]
+    highest = max(bandwidth(one.value, one.period) for one in series)
+    frequency = np.linspace(0.02, 1.0, POINTS) * min(highest, 20.0 * pumping.frequency)
+    indices = np.array(INDICES)
+    try:
+        before = theoretical_htf(found.nominal.model, pumping, indices, frequency)
+        after = theoretical_htf(found.fit.model, pumping, indices, frequency)
+    except InputError as error:
+        return f"no transfer functions: {error}"
+    unit = f"{nominal.units.position}/{nominal.units.force}"
+    return TransferChange(frequency, INDICES, before.value, after.value, unit, pumping.frequency)
+
+
+def _estimates(fit: Fit) -> dict[str, dict[str, float | str | None]]:
+    """Every parameter of a fit; standard deviation 0 where it is fixed, None where the records do not determine it."""
+    std: Mapping[str, float] = fit.std
+    made: dict[str, dict[str, float | str | None]] = {}
+    for name, value in fit.model.parameters.items():
+        known = std.get(name, 0.0)
+        limit = 1e9 * max(abs(value.value), 1e-12)
+        made[name] = {"value": value.value, "std": known if known <= limit else None, "unit": value.unit}
+    return made
+
+
+def _names(model: Model, labels: Sequence[str]) -> tuple[str, ...]:
+    return tuple(term.element.name for label in labels if (term := model.term(label)) is not None)
+
+
+def _hints(answer: Answer) -> tuple[tuple[str, str, str], ...]:
+    """What tells the members of the families apart, by the elements' own account."""
+    known = {t.element.name: t.element for trial in answer.evidence.search.trials for t in trial.model.terms}
+    made = []
+    for group in answer.diagnosis.indistinguishable:
+        for name in group:
+            for other, words in known[name].confusable.items() if name in known else ():
+                if other in group:
+                    made.append((name, other, words))
+    return tuple(made)

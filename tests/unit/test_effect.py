@@ -1,0 +1,58 @@
+"""An element along a given trajectory does what it does in the simulator."""
+
+import numpy as np
+import pytest
+from machines import CATALOGUE, hopper
+from rhythmid.errors import InputError
+from rhythmid.effect import Path, effect_along
+from rhythmid.parallel import fork_map
+
+T = np.arange(4000) * 1e-3
+X = 0.2 + 0.01 * np.sin(2 * np.pi * 1.3 * T)
+V = 0.01 * 2 * np.pi * 1.3 * np.cos(2 * np.pi * 1.3 * T)
+F = np.cos(2 * np.pi * T)
+PATH = Path(T, X, V, F, -200.0 * (X - 0.2), F)
+
+
+def test_a_memoryless_force_is_its_formula():
+    got = effect_along(CATALOGUE["cubic_stiffness"], {"coefficient": 1000.0}, hopper(), PATH)
+    assert np.allclose(got, -1000.0 * (X - 0.2) ** 3, atol=1e-12)
+
+
+def test_a_parameter_without_a_value_is_refused_by_name():
+    with pytest.raises(InputError, match="coefficient"):
+        effect_along(CATALOGUE["cubic_stiffness"], {}, hopper(), PATH)
+
+
+def test_a_relaxing_force_is_the_filtered_velocity():
+    got = effect_along(
+        CATALOGUE["viscoelastic_relaxation"], {"stiffness": 5.0, "time_constant": 0.08}, hopper(), PATH
+    )
+    omega = 2 * np.pi * 1.3
+    gain = 5.0 * 1j * omega * 0.08 / (1 + 1j * omega * 0.08)
+    expected = -np.imag(gain * 0.01 * np.exp(1j * omega * T))
+    assert np.abs(got - expected)[2000:].max() < 2e-4 * np.abs(expected).max() + 1e-6
+
+
+def test_an_actuator_s_effect_is_the_change_of_its_signal():
+    got = effect_along(CATALOGUE["actuator_deadband"], {"threshold": 0.1}, hopper(), PATH)
+    assert np.abs(got).max() == pytest.approx(0.1, rel=0.05)
+
+
+def test_forked_workers_return_every_result_once_and_pass_on_refusals():
+    def work(n: int) -> int:
+        if n == 3:
+            raise InputError("three is refused")
+        return n * n
+
+    found = dict(fork_map(work, list(range(6)), 2))
+    assert {k: v for k, v in found.items() if k != 3} == {0: 0, 1: 1, 2: 4, 4: 16, 5: 25}
+    assert str(found[3]) == "three is refused"
+
+
+def test_a_worker_s_failure_is_raised_with_its_traceback():
+    def work(n: int) -> int:
+        return 1 // n
+
+    with pytest.raises(RuntimeError, match="ZeroDivisionError"):
+        list(fork_map(work, [0, 1], 2))

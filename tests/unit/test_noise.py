@@ -1,0 +1,45 @@
+"""Colour of the noise: autoregressive models and whitening."""
+
+import numpy as np
+import pytest
+from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
+from scipy.signal import lfilter
+
+
+def coloured(rng, coefficients, std, n):
+    return lfilter([1.0], np.concatenate([[1.0], -np.asarray(coefficients)]), std * rng.standard_normal(n))
+
+
+@pytest.mark.parametrize("coefficients", [[0.8], [1.2, -0.5], []])
+def test_an_autoregressive_process_is_recovered(coefficients):
+    noise = estimate_noise([coloured(np.random.default_rng(1), coefficients, 0.3, 40_000)])
+    assert noise.std == pytest.approx(0.3, rel=0.02)
+    assert noise.order >= len(coefficients)
+    assert noise.coefficients[: len(coefficients)] == pytest.approx(coefficients, abs=0.03)
+
+
+def test_white_noise_gets_no_colour_in_most_draws():
+    orders = [estimate_noise([np.random.default_rng(seed).standard_normal(5000)]).order for seed in range(40)]
+    assert sum(order == 0 for order in orders) >= 34
+
+
+def test_whitening_leaves_innovations_of_unit_variance():
+    noise = NoiseModel(np.array([1.2, -0.5]), 0.3)
+    white = noise.whiten(coloured(np.random.default_rng(2), [1.2, -0.5], 0.3, 50_000)[500:])
+    assert np.std(white) == pytest.approx(1.0, rel=0.02)
+    assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 0.02
+
+
+def test_variance_and_long_run_variance_match_the_closed_form_of_a_first_order_process():
+    noise = NoiseModel(np.array([0.7]), 0.2)
+    assert noise.variance == pytest.approx(0.04 / (1 - 0.49), rel=1e-3)
+    assert noise.long_run_variance == pytest.approx(0.04 / 0.09, rel=1e-9)
+
+
+def test_a_constant_residual_does_not_divide_by_zero():
+    assert estimate_noise([np.zeros(100)], floor=1e-9).std == 1e-9
+
+
+def test_runs_are_the_unbroken_stretches():
+    used = np.array([1, 1, 0, 1, 0, 0, 1], bool)
+    assert [(s.start, s.stop) for s in runs(used)] == [(0, 2), (3, 4), (6, 7)]

@@ -1,0 +1,105 @@
+"""Output-error estimation: truth recovered, intervals that cover, trouble reported."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from machines import CATALOGUE, SHORT, hopper, record, records
+from rhythmid.errors import InputError
+from rhythmid.identify.output_error import estimate, start_only
+from rhythmid.identify.series import block_length, hold_out_tail, prepare, split
+from rhythmid.model import Prior
+
+TRUTH = {
+    "input_delay.delay": 0.0203,
+    "measurement_delay.delay": 0.0151,
+    "linear_spring.stiffness": 200.0,
+    "linear_spring.rest_length": 0.2,
+    "switched_damper.stance": 2.0,
+}
+
+
+def test_noise_free_records_give_the_true_parameters_from_a_start_a_third_off():
+    wrong = hopper().with_values({"linear_spring.stiffness": 260.0, "switched_damper.stance": 1.2})
+    fit = estimate(wrong, prepare(records(hopper(), std=0.0)))
+    assert fit.converged
+    assert fit.model.value("linear_spring.stiffness") == pytest.approx(200.0, rel=2e-5)
+    assert fit.model.value("switched_damper.stance") == pytest.approx(2.0, rel=5e-4)
+    assert fit.model.value("input_delay.delay") == pytest.approx(0.0203, abs=5e-6)
+    assert fit.model.value("measurement_delay.delay") == pytest.approx(0.0151, abs=5e-6)
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.8])
+def test_intervals_cover_the_truth_under_white_and_coloured_noise(correlation):
+    inside = total = 0
+    for seed in range(12):
+        series = prepare(records(hopper(), SHORT[:2], seed=seed + 1, correlation=correlation))
+        fit = estimate(hopper(), series)
+        for name, truth in TRUTH.items():
+            inside += abs(fit.model.value(name) - truth) < 1.96 * fit.std[name]
+            total += 1
+    assert inside / total >= 0.85  # 95 % nominal; 60 draws of which five at a time share a record
+
+
+def test_a_prior_pulls_and_narrows_the_estimate():
+    series = prepare(records(hopper(), SHORT[:1]))
+    plain = estimate(hopper(), series)
+    value = hopper().parameters["switched_damper.stance"]
+    prior = replace(value, prior=Prior(2.0, 0.1 * plain.std["switched_damper.stance"]))
+    with_prior = estimate(hopper().with_parameters({"switched_damper.stance": prior}), series)
+    assert with_prior.std["switched_damper.stance"] < 0.2 * plain.std["switched_damper.stance"]
+    assert abs(with_prior.model.value("switched_damper.stance") - 2.0) < abs(
+        plain.model.value("switched_damper.stance") - 2.0
+    )
+
+
+def test_a_bound_holds_and_is_reported():
+    value = hopper().parameters["linear_spring.stiffness"]
+    bounded = hopper().with_parameters({"linear_spring.stiffness": replace(value, bounds=(0.0, 190.0), value=180.0)})
+    fit = estimate(bounded, prepare(records(hopper(), SHORT[:1])), iterations=12)
+    assert fit.model.value("linear_spring.stiffness") == 190.0
+    assert "linear_spring.stiffness" in fit.at_bound
+
+
+def test_a_model_that_diverges_is_refused_with_what_to_check():
+    unstable = hopper().with_element(CATALOGUE["viscous_damper"], {"damping": 0.0})
+    value = unstable.parameters["viscous_damper.damping"]
+    unstable = unstable.with_parameters({"viscous_damper.damping": replace(value, value=-1e4, bounds=(-1e5, 0.0))})
+    with pytest.raises(InputError, match="diverges"):
+        estimate(unstable, prepare(records(hopper(), SHORT[:1])))
+
+
+def test_unseen_records_are_judged_with_nothing_but_their_start_estimated():
+    seen = prepare(records(hopper(), SHORT[:1]))
+    fit = estimate(hopper(), seen)
+    unseen = prepare([record(hopper(), SHORT[1][0], seed=77)], block=seen[0].block)
+    judged = start_only(fit.model, unseen, fit.noise, fit.run.max_step)
+    assert judged.names == ()
+    assert judged.chi2 / judged.samples == pytest.approx(1.0, abs=0.15)
+
+
+def test_the_hidden_end_is_hidden_from_the_fit_and_judged_apart():
+    seen, unseen = hold_out_tail(prepare(records(hopper(), SHORT[:1])), 0.25)
+    assert seen[0].used.sum() + unseen[0].used.sum() == seen[0].blocks
+    assert not (seen[0].used & unseen[0].used).any()
+
+
+def test_windows_keep_all_samples_in_order():
+    series = prepare(records(hopper(), SHORT[:1]))[0]
+    parts = split(series, 1.0)
+    joined = np.concatenate([part.value for part in parts])
+    assert len(parts) == 10
+    assert np.array_equal(joined, series.value[: len(joined)])
+    assert len(series.value) - len(joined) < 4 * series.block
+
+
+def test_block_averages_of_the_simulation_equal_averages_of_its_samples():
+    series = prepare(records(hopper(), SHORT[1:2], std=0.0), block=5)[0]
+    centre = series.value[2::5][: series.blocks]
+    assert np.abs(series.of_block(centre) - series.averaged)[1:-1].max() < 2e-7
+
+
+def test_slow_motion_is_averaged_and_fast_motion_is_not():
+    t = np.arange(20_000) * 1e-3
+    assert block_length(np.sin(2 * np.pi * 1.0 * t), 1e-3) == 10
+    assert block_length(np.sin(2 * np.pi * 200.0 * t), 1e-3) == 1
