@@ -51,8 +51,8 @@ benchmark: install ## Compare the simulator with scipy and MuJoCo
 picture: install ## Draw the picture of the README
 	$(BIN)/python docs/signal_path.py
 
-docker: ## Build the image and run it, with docker, or with buildah where there is no engine
-	docker/build
+docker: install ## Build the image and run the graph in containers, with buildah and without any engine
+	$(BIN)/python docker/without_engine.py
 
 lock: install ## Resolve the requirements anew into requirements.lock
 	$(BIN)/python -m pip install --quiet uv

@@ -204,7 +204,8 @@ sensor: [{sensor_lag: {time_constant: 0.01}}]
         environment = {**os.environ, "RHYTHMID_CACHE": folder}
         line = [sys.executable, "-c", FIRST.format(text=text)]
         found = [
-            tuple(map(float, subprocess.check_output(line, env=environment, text=True).split())) for _ in range(2)
+            tuple(map(float, subprocess.check_output(line, env=environment, text=True).split()))
+            for _ in range(2)
         ]
     return found[1][0], found[0][1], found[1][1]
 
@@ -219,11 +220,17 @@ def main() -> None:
     print(f"{'':34}{'seconds':>10}{'x real time':>13}{'ours is faster':>16}{'deviation':>12}")
     for row in rows:
         ratio = row.seconds / rows[0].seconds
-        print(f"{row.name:34}{row.seconds:10.3f}{row.times_real_time:13.0f}{ratio:16.1f}{row.deviation_m:10.1e} m")
+        print(
+            f"{row.name:34}{row.seconds:10.3f}{row.times_real_time:13.0f}{ratio:16.1f}{row.deviation_m:10.1e} m"
+        )
     serial, parallel = two_threads(arguments.duration)
-    print(f"16 perturbed runs: {serial:.2f} s one after another, {parallel:.2f} s on two threads: x{serial / parallel:.2f}")
+    print(
+        f"16 perturbed runs: {serial:.2f} s one after another, {parallel:.2f} s on two threads: x{serial / parallel:.2f}"
+    )
     imports, compiled, again = first_answer()
-    print(f"a combination of elements never seen before: first answer after {compiled:.2f} s (once compiled: {again:.2f} s)")
+    print(
+        f"a combination of elements never seen before: first answer after {compiled:.2f} s (once compiled: {again:.2f} s)"
+    )
     print(f"(a new process needs {imports:.2f} s for its imports)")
     if arguments.json:
         figures = {

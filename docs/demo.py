@@ -38,7 +38,9 @@ def compare(experiment: Experiment, result: dict) -> Table:
         value, std = (scale * found[key] for key in ("value", "std"))
         error = value - scale * true
         share = f" ({100 * error / (scale * true):+.2f} %)" if true else ""
-        table.add_row(name, f"{scale * true:.4g} {unit}", f"{value:.4f}", f"{std:.2g}", f"{error:+.4f}{share}")
+        table.add_row(
+            name, f"{scale * true:.4g} {unit}", f"{value:.4f}", f"{std:.2g}", f"{error:+.4f}{share}"
+        )
 
     for name, delay in (("input", experiment.input_delay), ("measurement", experiment.measurement_delay)):
         row(f"{name} delay", delay.constant, result["delays"][name], "ms", 1e3)

@@ -17,11 +17,24 @@ def main() -> None:
     axes.set(xlim=(0, 110), ylim=(2, 39))
     axes.axis("off")
 
-    def box(x: float, width: float, title: str, below: str, colour: str, y: float = 22, height: float = 9) -> None:
+    def box(
+        x: float, width: float, title: str, below: str, colour: str, y: float = 22, height: float = 9
+    ) -> None:
         axes.add_patch(
-            FancyBboxPatch((x, y), width, height, boxstyle="round,pad=0.3", facecolor=colour, edgecolor=INK, lw=1.1)
+            FancyBboxPatch(
+                (x, y), width, height, boxstyle="round,pad=0.3", facecolor=colour, edgecolor=INK, lw=1.1
+            )
         )
-        axes.text(x + width / 2, y + height * 0.64, title, ha="center", va="center", size=10, color=INK, weight="bold")
+        axes.text(
+            x + width / 2,
+            y + height * 0.64,
+            title,
+            ha="center",
+            va="center",
+            size=10,
+            color=INK,
+            weight="bold",
+        )
         axes.text(x + width / 2, y + height * 0.27, below, ha="center", va="center", size=8.5, color=INK)
 
     def arrow(start: tuple[float, float], end: tuple[float, float], name: str = "") -> None:
@@ -38,10 +51,20 @@ def main() -> None:
     arrow((41.5, level), (52.5, level), "command")
     arrow((68.5, level), (80.5, level), "plant/joint_\nstates")
     arrow((96.5, level), (109, level), "joint_states")
-    axes.text(60.5, 36.3, "f$_0$(t): the pumping force, generated on the robot", ha="center", size=8.5, color=INK)
+    axes.text(
+        60.5, 36.3, "f$_0$(t): the pumping force, generated on the robot", ha="center", size=8.5, color=INK
+    )
     arrow((60.5, 35.3), (60.5, 31.6))
 
-    box(14, 94, "recorder", "a bag of excitation, forcing and joint_states", NODES["recorder"], y=10, height=5.5)
+    box(
+        14,
+        94,
+        "recorder",
+        "a bag of excitation, forcing and joint_states",
+        NODES["recorder"],
+        y=10,
+        height=5.5,
+    )
     dotted = {"arrowstyle": "-|>", "color": INK, "lw": 0.9, "ls": ":"}
     for x, top, name in ((19.5, level, ""), (60.5, 21.5, "forcing"), (103, level, "")):
         axes.annotate("", (x, 15.9), (x, top), arrowprops=dotted)
