@@ -47,7 +47,11 @@ def _source(element: Element) -> str:
     def call(at: str, number: int, states: list[str]) -> list[str]:
         sets = "; ".join(f"{name} = {name}0 + {at} * ({name}1 - {name}0)" for name in rows)
         targets = ", ".join(["value", *(f"a{number}_{i}" for i in range(len(s)))])
-        return [sets, f"t = begin + {at} * width", f"{targets} = kernel({', '.join([*arguments, *p, *states])})"]
+        return [
+            sets,
+            f"t = begin + {at} * width",
+            f"{targets} = kernel({', '.join([*arguments, *p, *states])})",
+        ]
 
     def moved(weight: str, number: int) -> list[str]:
         return [f"{name} + {weight} * a{number}_{i}" for i, name in enumerate(s)]

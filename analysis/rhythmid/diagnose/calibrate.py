@@ -42,7 +42,9 @@ def with_delays(model: Model, series: Sequence[Series], catalogue: Catalogue) ->
         period = max(one.period for one in series)
         current = model.parameters[INPUT_DELAY]
         if not current.fixed:
-            model = with_bounds(model, {INPUT_DELAY: (min(current.bounds[0], -1.5 * period), current.bounds[1])})
+            model = with_bounds(
+                model, {INPUT_DELAY: (min(current.bounds[0], -1.5 * period), current.bounds[1])}
+            )
     return model
 
 
@@ -78,7 +80,9 @@ def calibrate(
     if best is None or best.nrmse() > 0.1 or not best.converged:
         try:
             again = estimate(_shooting_start(model, series, pool), series, pool=pool)
-            if best is None or sum(float(r @ r) for r in again.residuals) < sum(float(r @ r) for r in best.residuals):
+            if best is None or sum(float(r @ r) for r in again.residuals) < sum(
+                float(r @ r) for r in best.residuals
+            ):
                 best = again
         except InputError as error:
             failure = failure or error

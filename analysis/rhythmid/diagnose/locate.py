@@ -52,20 +52,27 @@ def _splines(values: Sequence[Array], count: int) -> tuple[list[list[Array]], Ar
     knots = np.concatenate([[low] * degree, inner, [high] * degree])
     splines = [BSpline.basis_element(knots[i : i + degree + 2], extrapolate=False) for i in range(count)]
     functions = [
-        [np.nan_to_num(spline(np.clip(v, low, high - 1e-12 * (high - low)))) for v in values] for spline in splines
+        [np.nan_to_num(spline(np.clip(v, low, high - 1e-12 * (high - low)))) for v in values]
+        for spline in splines
     ]
     return functions, np.linspace(low, high, 60), splines
 
 
-def _simulated(known: Trajectories, functions: list[list[Array]], pool: ThreadPoolExecutor | None) -> list[list[Array]]:
+def _simulated(
+    known: Trajectories, functions: list[list[Array]], pool: ThreadPoolExecutor | None
+) -> list[list[Array]]:
     """Outputs' changes when each function acts as a force; its size is chosen small and scaled back."""
     run, fit = known.disturbed, known.fit
-    scale = 1e-3 * fit.model.mass.value * max(float(np.std(np.gradient(p.velocity, p.time))) for p in known.paths)
+    scale = (
+        1e-3 * fit.model.mass.value * max(float(np.std(np.gradient(p.velocity, p.time))) for p in known.paths)
+    )
 
     def one(function: list[Array]) -> list[Array]:
         changes = []
         for index, (one_series, path) in enumerate(zip(run.series, known.paths)):
-            rows = run.rows(fit.model, index, fit.starts[index], first_order_hold(path.time, scale * function[index]))
+            rows = run.rows(
+                fit.model, index, fit.starts[index], first_order_hold(path.time, scale * function[index])
+            )
             if rows is None:
                 changes.append(np.zeros(one_series.blocks))
             else:
@@ -75,7 +82,9 @@ def _simulated(known: Trajectories, functions: list[list[Array]], pool: ThreadPo
     return list(pool.map(one, functions)) if pool else [one(function) for function in functions]
 
 
-def _regress(fit: Fit, columns: list[list[Array]], penalty: float = 1e-6) -> tuple[float, float, float, Array]:
+def _regress(
+    fit: Fit, columns: list[list[Array]], penalty: float = 1e-6
+) -> tuple[float, float, float, Array]:
     """Cross-validated share explained, p-value, chi2 gain, and coefficients of a linear combination of columns."""
     white_residual = whitened(fit, fit.residuals, fit.noise)
     per_column = [whitened(fit, column, fit.noise) for column in columns]
@@ -115,7 +124,9 @@ def _regress(fit: Fit, columns: list[list[Array]], penalty: float = 1e-6) -> tup
     return float(np.clip(explained, -1.0, 1.0)), p_value, gain, coefficients / norms
 
 
-def dependences(known: Trajectories, pool: ThreadPoolExecutor | None = None, count: int = 8) -> list[Dependence]:
+def dependences(
+    known: Trajectories, pool: ThreadPoolExecutor | None = None, count: int = 8
+) -> list[Dependence]:
     """Dependence of the residual on each quantity, the most explaining first."""
     fit = known.fit
     found: list[Dependence] = []
@@ -144,5 +155,7 @@ def dependences(known: Trajectories, pool: ThreadPoolExecutor | None = None, cou
         columns = [[s.of_block(f) for s, f in zip(fit.run.series, function)] for function in functions]
         explained, p, gain, coefficients = _regress(fit, columns)
         drawn = sum(c * np.nan_to_num(s(grid)) for c, s in zip(coefficients, splines))
-        found.append(Dependence("measured position (sensor error)", explained, p, gain, grid, np.asarray(drawn)))
+        found.append(
+            Dependence("measured position (sensor error)", explained, p, gain, grid, np.asarray(drawn))
+        )
     return sorted(found, key=lambda d: -d.explained)

@@ -48,7 +48,13 @@ def _menu(effort: float, frequency: float, length: float) -> list[tuple[str, dic
                   {"type": "multisine", "rms": effort, "period": length / 3, "periods": 3, "band": [frequency / 5, 3 * top]},
                   1.0))  # fmt: skip
     for scale in (0.3, 3.0):
-        found.append((f"the cycle alone with the forcing scaled by {scale:g}", {"type": "silence", "length": length}, scale))
+        found.append(
+            (
+                f"the cycle alone with the forcing scaled by {scale:g}",
+                {"type": "silence", "length": length},
+                scale,
+            )
+        )
     return found
 
 
@@ -60,7 +66,7 @@ def _predicted(trial: Trial, series: Series, step: float) -> Array | None:
 
 def _imagined(series: Series, excitation: Excitation, forcing: PPoly | None, factor: float) -> Series:
     n = int(excitation.duration / series.period)
-    time = np.arange(n) * series.period
+    time = np.arange(n, dtype=float) * series.period
     value = np.resize(series.value, n)
     scaled = None
     if forcing is not None:
@@ -73,8 +79,10 @@ def _imagined(series: Series, excitation: Excitation, forcing: PPoly | None, fac
                   series.kind)  # fmt: skip
 
 
-def _imagined_shorter(series: Series, excitation: Excitation, forcing: PPoly, factor: float, span: float) -> Series:
-    time = np.arange(0.0, span, series.period)
+def _imagined_shorter(
+    series: Series, excitation: Excitation, forcing: PPoly, factor: float, span: float
+) -> Series:
+    time = np.arange(0.0, span, series.period, dtype=np.float64)
     scaled = spline(time, factor * np.asarray(forcing(forcing.x[0] + time)))
     n = len(time)
     return Series("imagined", time, np.resize(series.value, n), zero_order_hold(time, excitation(time)), scaled,
@@ -112,7 +120,9 @@ def next_experiment(found: Search, rivals: Sequence[Trial], series: Sequence[Ser
     if not others:
         others = [t for t in found.trials if set(t.added) != set(best.added)]
     if not others or (verdict == "consistent" and len(found.trials) < 2):
-        return "none needed for these records; a larger and more varied excitation would exclude smaller effects"
+        return (
+            "none needed for these records; a larger and more varied excitation would exclude smaller effects"
+        )
     menu = separation(best, others[0], series, found.noise.variance, found.fit.run.max_step)
     if not menu:
         return "repeat the records with a larger and more varied excitation"

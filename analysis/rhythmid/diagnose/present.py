@@ -12,14 +12,15 @@ from rhythmid.diagnose.locate import Dependence
 from rhythmid.diagnose.search import LEVEL, WORTH, Search
 from rhythmid.elements.element import SLOTS
 from rhythmid.errors import InputError
-from rhythmid.identify.output_error import Fit
+from rhythmid.identify.output_error import Fit, noise_of
+from rhythmid.identify.repeats import noise_from_repeats
 from rhythmid.identify.series import Series, bandwidth
 from rhythmid.ltp.htf import theoretical_htf
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.report.diagnosis import diagnosis_page
-from rhythmid.report.findings import ElementScore, Findings, FreeFunction, TransferChange
+from rhythmid.report.findings import ElementScore, ElementWords, Findings, FreeFunction, TransferChange
 from rhythmid.report.page import Page
 from rhythmid.report.record_quality import quality_of
 from rhythmid.report.run import Run
@@ -65,15 +66,16 @@ def findings(
     if found.best.added:
         models["Augmented model"] = answer.model.to_yaml()
     count = max(len(found.rounds[0].scores), 1)
+    repeats = noise_from_repeats(list(found.fit.run.series)) or noise_of(found.fit)
     return Findings(
         result=answer.diagnosis.to_dict(),
         source=f"{name} against {_listed([r.name for r in records])}",
-        slots={slot: tuple(t.label for t in nominal.terms if t.element.slot == slot) for slot in SLOTS},
+        slots={slot: tuple(t.element.name for t in nominal.terms if t.element.slot == slot) for slot in SLOTS},
         forced=any(one.forcing is not None for one in evidence.series),
         runs=tuple(runs),
         output_unit=nominal.units.position,
-        noise=found.noise.variance**0.5,
-        slow_noise=found.noise.long_run_variance**0.5,
+        noise=repeats.variance**0.5,
+        slow_noise=repeats.long_run_variance**0.5,
         scores=_scores(found),
         threshold=float(chi2_distribution.isf(LEVEL / count, 1)),
         functions=_functions(evidence.before, evidence.after if found.best.added else (), nominal),
@@ -84,6 +86,7 @@ def findings(
         records=tuple(
             quality_of(r, role) for group, role in ((records, "fit"), (holdout, "held out")) for r in group
         ),
+        words=_words(answer, nominal),
         command=command,
         models=models,
         worth=WORTH,
@@ -163,18 +166,27 @@ def _scores(found: Search) -> tuple[ElementScore, ...]:
 
 def _functions(before: Sequence[Dependence], after: Sequence[Dependence], model: Model) -> tuple[FreeFunction, ...]:
     later = {one.quantity: one for one in after}
+
+    def shape(one: Dependence) -> Array:
+        """The curve less what the model's own parameters can take up: an offset, and a slope over position or speed."""
+        if not len(one.force):
+            return one.force
+        inside = slice(0, -1)  # the splines end before the last point
+        degree = 1 if one.quantity in ("position", "velocity") else 0
+        return (one.force - np.polyval(np.polyfit(one.grid[inside], one.force[inside], degree), one.grid))[inside]
+
     units = {"velocity": f"{model.units.position}/s", "time": "s", "actuator force": model.units.force}
     made = []
     for one in before:
         other = later.get(one.quantity)
         made.append(
             FreeFunction(
-                one.quantity, one.explained, one.grid, one.force,
+                one.quantity, one.explained, one.grid[:-1], shape(one),
                 grid_unit=units.get(one.quantity, model.units.position),
                 force_unit=model.units.position if "sensor" in one.quantity else model.units.force,
                 explained_after=other.explained if other else None,
-                grid_after=other.grid if other else None,
-                force_after=other.force if other else None,
+                grid_after=other.grid[:-1] if other else None,
+                force_after=shape(other) if other else None,
             )
         )  # fmt: skip
     return tuple(made)
@@ -212,6 +224,16 @@ def _estimates(fit: Fit) -> dict[str, dict[str, float | str | None]]:
 
 def _names(model: Model, labels: Sequence[str]) -> tuple[str, ...]:
     return tuple(term.element.name for label in labels if (term := model.term(label)) is not None)
+
+
+def _words(answer: Answer, nominal: Model) -> dict[str, ElementWords]:
+    elements = [term.element for term in nominal.terms]
+    elements += [score.element for score in answer.evidence.search.rounds[0].scores]
+    elements += [term.element for trial in answer.evidence.search.trials for term in trial.model.terms]
+    return {
+        e.name: ElementWords(e.title, {p.name: p.description for p in e.parameters}, e.also_known_as, e.reference)
+        for e in elements
+    }
 
 
 def _hints(answer: Answer) -> tuple[tuple[str, str, str], ...]:

@@ -74,7 +74,9 @@ class Proposal:
     guesses: tuple[dict[str, float], ...]
 
 
-def propose(base: Model, element: Element, guesses: Sequence[dict[str, float]], added: tuple[str, ...]) -> Proposal:
+def propose(
+    base: Model, element: Element, guesses: Sequence[dict[str, float]], added: tuple[str, ...]
+) -> Proposal:
     """The base model with one more element; `guesses` are values of the element's own parameters."""
     extended = base.with_element(element, guesses[0])
     label = extended.terms[-1].label
@@ -161,14 +163,21 @@ def run_trials(
         return [], excluded
     best = min(trial.chi2 for trial in trials)
     worst = max(trial.chi2 for trial in trials)
-    open_ones = [t for t in trials if not t.converged and t.chi2 - best <= PROMISING * max(worst - best, t.samples)]
+    open_ones = [
+        t for t in trials if not t.converged and t.chi2 - best <= PROMISING * max(worst - best, t.samples)
+    ]
     finished = under_noise(open_ones, series, noise, max_step, THOROUGH)
     done = {t.added for t in finished}
     return sorted([*finished, *(t for t in trials if t.added not in done)], key=lambda t: t.bic()), excluded
 
 
 def whole_fit(
-    trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int = 15, pool=None
+    trial: Trial,
+    series: Sequence[Series],
+    noise: NoiseModel,
+    max_step: float,
+    iterations: int = 15,
+    pool=None,
 ) -> Fit:
     """The full fit of a trial under a noise model; one that has converged under it is only evaluated."""
     if trial.noise is noise and trial.converged:
@@ -178,7 +187,11 @@ def whole_fit(
 
 
 def under_noise(
-    trials: Sequence[Trial], series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int = 15
+    trials: Sequence[Trial],
+    series: Sequence[Series],
+    noise: NoiseModel,
+    max_step: float,
+    iterations: int = 15,
 ) -> list[Trial]:
     """The trials, best first, all under one noise model: those that were fitted under another are fitted again."""
     done = [trial for trial in trials if trial.noise is noise and trial.converged]

@@ -85,7 +85,9 @@ class Trajectories:
 def trajectories(fit: Fit) -> Trajectories:
     """Run the fitted model once and keep all that elements may depend on."""
     run = fit.run
-    disturbed = replace(prepare_run(fit.model, run.series, run.max_step, disturbed=True), max_step=run.max_step)
+    disturbed = replace(
+        prepare_run(fit.model, run.series, run.max_step, disturbed=True), max_step=run.max_step
+    )
     paths, outputs, commands = [], [], []
     q = run.states
     for index, (one, start) in enumerate(zip(run.series, fit.starts)):
@@ -112,13 +114,20 @@ def _body_force(model: Model, time: Array, x: Array, v: Array, f: Array) -> Arra
     total = np.zeros(len(time))
     for term in model.terms:
         element = term.element
-        if element.slot == "force" and element.acts == "body" and element.kernel is not None and not element.states:
+        if (
+            element.slot == "force"
+            and element.acts == "body"
+            and element.kernel is not None
+            and not element.states
+        ):
             values = {name: value.value for name, value in term.values.items()}
             total += effect_along(element, values, model, Path(time, x, v, f, total, x))
     return total
 
 
-def change_of_output(known: Trajectories, element: Element, values: Mapping[str, float]) -> list[Array] | None:
+def change_of_output(
+    known: Trajectories, element: Element, values: Mapping[str, float]
+) -> list[Array] | None:
     """Change of each series' block-averaged output when the element with these values joins the fitted model.
 
     None when the model diverges with it.
@@ -199,7 +208,11 @@ def changes_of(
     def one(case: tuple[int, tuple[Element, dict[str, float]]]) -> Change | None:
         key, (element, values) = case
         outputs = change_of_output(known, element, values)
-        if outputs is None or not all(np.isfinite(o).all() for o in outputs) or not any(np.any(o) for o in outputs):
+        if (
+            outputs is None
+            or not all(np.isfinite(o).all() for o in outputs)
+            or not any(np.any(o) for o in outputs)
+        ):
             return None
         return Change(key, element, values, tuple(outputs))
 

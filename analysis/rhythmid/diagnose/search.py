@@ -34,9 +34,13 @@ from rhythmid.model import Model
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
 
-WORTH = 10.0  # difference of the information criterion below which two models are told apart by nothing but hope
+WORTH = (
+    10.0  # difference of the information criterion below which two models are told apart by nothing but hope
+)
 LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
-REFITTED = 6  # elements of a round that are refitted; the right one was among the first five in all of 234 trials
+REFITTED = (
+    6  # elements of a round that are refitted; the right one was among the first five in all of 234 trials
+)
 MOST = 4  # effects at once
 
 
@@ -141,7 +145,16 @@ def search(
     tell("scoring the catalogue")
     first, nominal = _one_round(nominal, catalogue, pool, colour=True)
     current, noise = nominal, nominal.noise
-    base = Trial((), nominal.model, nominal.starts, nominal.chi2, nominal.samples, len(nominal.names), nominal.converged, noise)
+    base = Trial(
+        (),
+        nominal.model,
+        nominal.starts,
+        nominal.chi2,
+        nominal.samples,
+        len(nominal.names),
+        nominal.converged,
+        noise,
+    )
     trials: dict[tuple[str, ...], Trial] = {(): base}
     best = base
     rounds, excluded = [first], []
@@ -184,7 +197,9 @@ def search(
     ranked = under_noise(_contenders(trials, best), series, noise, step)
     best = next(t for t in ranked if set(t.added) == set(best.added))
     fit = whole_fit(best, series, noise, step, pool=pool)
-    return Search(under(nominal, noise, pool), best, fit, noise, tuple(ranked), tuple(rounds), tuple(excluded))
+    return Search(
+        under(nominal, noise, pool), best, fit, noise, tuple(ranked), tuple(rounds), tuple(excluded)
+    )
 
 
 def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial, count: int = 10) -> list[Trial]:
@@ -217,7 +232,9 @@ def _defend(
                 proposals.append(Proposal(rest, slim, ({},)))
             term = best.model.term(label)
             assert term is not None
-            names = {e.name for e in catalogue.values() if term.element.name in e.special_case_of and e.candidate}
+            names = {
+                e.name for e in catalogue.values() if term.element.name in e.special_case_of and e.candidate
+            }
             if len(best.added) > 1:
                 names |= {s.element.name for r in rounds for s, _ in _distinct(r.scores, 4)}
             for name in sorted(names - {best.model.term(x).element.name for x in best.added}):  # type: ignore[union-attr]
@@ -231,7 +248,9 @@ def _defend(
         found, _ = run_trials(proposals, series, best.starts, known, noise, step)
         tried |= {tuple(sorted(t.added)): t for t in found}
         simpler = [t for t in [*found, *trials.values()] if t.added and _simpler(t, best)]
-        better = [t for t in found if t.bic() < best.bic() - (0.0 if len(t.added) <= len(best.added) else WORTH)]
+        better = [
+            t for t in found if t.bic() < best.bic() - (0.0 if len(t.added) <= len(best.added) else WORTH)
+        ]
         options = sorted(simpler + better, key=lambda t: (len(t.added), t.free, t.bic()))
         if not options:
             break

@@ -119,7 +119,9 @@ def prepare_run(
     """
     kinds = {one.kind for one in series if one.command is not None}
     if len(kinds) > 1:
-        raise InputError(f"records with different kinds of input ({', '.join(sorted(kinds))}) cannot be fitted together")
+        raise InputError(
+            f"records with different kinds of input ({', '.join(sorted(kinds))}) cannot be fitted together"
+        )
     excited = kinds.pop() if kinds else "force"
     inputs = tuple(_inputs(one) for one in series)
     smooth = all(i.smooth is not None or len(i.command[0]) <= 2 for i in inputs)
@@ -138,7 +140,9 @@ def _contiguous(pair: Pieces) -> Pieces:
     return np.ascontiguousarray(pair[0]), np.ascontiguousarray(pair[1])
 
 
-def accurate(run: FreeRun, model: Model, starts: Sequence[Array], tolerance: float, finest: int = 8) -> FreeRun:
+def accurate(
+    run: FreeRun, model: Model, starts: Sequence[Array], tolerance: float, finest: int = 8
+) -> FreeRun:
     """The run with its step halved until that changes the outputs by less than `tolerance` (rms); the finer of the two.
 
     The remaining error is a fraction of the tolerance: a sixteenth where the forces are smooth. At most `finest` halvings.

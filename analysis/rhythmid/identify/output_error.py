@@ -64,7 +64,10 @@ class Fit:
     @property
     def std(self) -> dict[str, float]:
         """Standard deviation of each free parameter; infinite where the records do not determine it."""
-        return {name: float(math.sqrt(v)) if v >= 0 else math.inf for name, v in zip(self.names, np.diag(self.covariance))}
+        return {
+            name: float(math.sqrt(v)) if v >= 0 else math.inf
+            for name, v in zip(self.names, np.diag(self.covariance))
+        }
 
     def nrmse(self, unused: bool = False) -> float:
         """rms(simulated − measured) / std(measured) over the averages used, or over the unused ones."""
@@ -93,11 +96,15 @@ def first_guess(model: Model, run: FreeRun) -> list[Array]:
 class _Problem:
     """One structure, its series and a noise model: residuals and their sensitivities."""
 
-    def __init__(self, run: FreeRun, names: Sequence[str], noise: NoiseModel, pool: ThreadPoolExecutor | None) -> None:
+    def __init__(
+        self, run: FreeRun, names: Sequence[str], noise: NoiseModel, pool: ThreadPoolExecutor | None
+    ) -> None:
         self.run, self.names, self.noise, self.pool = run, tuple(names), noise, pool
         self.hidden: list[tuple[Array, Array]] = []  # mean and scatter of each series' element states
         self.spread = max(float(np.std(one.averaged)) for one in run.series) or 1.0
-        self.stretches = [[s for s in runs(one.used) if s.stop - s.start > noise.order + 1] for one in run.series]
+        self.stretches = [
+            [s for s in runs(one.used) if s.stop - s.start > noise.order + 1] for one in run.series
+        ]
 
     def whitened(self, index: int, samples: Array) -> Array:
         """Used stretches of series `index`, whitened and joined; (n,) or (n, q)."""
@@ -119,7 +126,11 @@ class _Problem:
         self.hidden = []
         for index, start in enumerate(starts):
             rows = self.run.rows(model, index, start)
-            states = rows[len(rows) // 4 :, 2 : self.run.states] if rows is not None else np.zeros((1, self.run.states - 2))
+            states = (
+                rows[len(rows) // 4 :, 2 : self.run.states]
+                if rows is not None
+                else np.zeros((1, self.run.states - 2))
+            )
             self.hidden.append((states.mean(axis=0), 3.0 * states.std(axis=0) + 1e-12))
 
     def departure(self, index: int, start: Array) -> Array:
@@ -154,7 +165,12 @@ class _Problem:
         return self.run.many(cases, self.pool)
 
     def settle_steps(
-        self, model: Model, starts: Sequence[Array], residuals: Sequence[Array], steps: Array, state_steps: Array
+        self,
+        model: Model,
+        starts: Sequence[Array],
+        residuals: Sequence[Array],
+        steps: Array,
+        state_steps: Array,
     ) -> tuple[Array, Array]:
         """Difference steps under which every parameter and state moves the outputs by about the same small amount.
 
@@ -195,7 +211,12 @@ class _Problem:
         return signed
 
     def linearise(
-        self, model: Model, starts: Sequence[Array], residuals: Sequence[Array], steps: Array, state_steps: Array
+        self,
+        model: Model,
+        starts: Sequence[Array],
+        residuals: Sequence[Array],
+        steps: Array,
+        state_steps: Array,
     ) -> tuple[Linearisation, list[tuple[Array, Array, Array]], Array, Array]:
         """Sensitivities by forward differences whose steps settle at a ten-thousandth of the motion.
 
@@ -203,7 +224,9 @@ class _Problem:
         next steps.
         """
         signed = self._signed(model, steps)
-        outputs = self._perturbed(model, starts, signed, state_steps, range(len(self.names) + self.run.states))
+        outputs = self._perturbed(
+            model, starts, signed, state_steps, range(len(self.names) + self.run.states)
+        )
         base = [residual + one.averaged for residual, one in zip(residuals, self.run.series)]
         p, q = len(self.names), self.run.states
         rows, columns, bases, states, places = [], [], [], [], []
@@ -243,7 +266,9 @@ def _state_update(sensitivity: Array, target: Array) -> Array:
     live = norms > 1e-9 * max(norms.max(initial=0.0), 1e-300)
     change = np.zeros(sensitivity.shape[1])
     if live.any():
-        change[live] = np.linalg.lstsq(sensitivity[:, live] / norms[live], -target, rcond=1e-7)[0] / norms[live]
+        change[live] = (
+            np.linalg.lstsq(sensitivity[:, live] / norms[live], -target, rcond=1e-7)[0] / norms[live]
+        )
     return change
 
 
@@ -334,7 +359,9 @@ def minimise(
             for row, (i, prior) in enumerate(weight):
                 extra[row, i] = 1.0 / prior.std
             jacobian = np.vstack([jacobian, extra])
-            residual = np.concatenate([residual, [(values[i] - prior.mean) / prior.std for i, prior in weight]])
+            residual = np.concatenate(
+                [residual, [(values[i] - prior.mean) / prior.std for i, prior in weight]]
+            )
         gradient = jacobian.T @ residual
         blocked = ((values <= low) & (gradient > 0)) | ((values >= high) & (gradient < 0))
         improved = False
@@ -402,7 +429,9 @@ def _covariance(jacobian: Array, priors: Sequence) -> Array:
         if prior is not None:
             information[i, i] += 1.0 / (prior.std * norms[i]) ** 2
     eigenvalues, vectors = np.linalg.eigh(information)
-    inverse = np.where(eigenvalues > 1e-11 * max(eigenvalues[-1], 1e-300), 1.0 / np.maximum(eigenvalues, 1e-300), 1e24)
+    inverse = np.where(
+        eigenvalues > 1e-11 * max(eigenvalues[-1], 1e-300), 1.0 / np.maximum(eigenvalues, 1e-300), 1e24
+    )
     with np.errstate(over="ignore"):
         return (vectors * inverse) @ vectors.T / np.outer(norms, norms)
 

@@ -24,7 +24,11 @@ def _sampled(series: Series, which: str) -> Array | None:
 
 def repeat_length(series: Series) -> int | None:
     """Smallest number of blocks after which command and forcing repeat for at least half of the series; None if none."""
-    signals = [s for s in (_sampled(series, "command"), _sampled(series, "forcing")) if s is not None and np.ptp(s) > 0]
+    signals = [
+        s
+        for s in (_sampled(series, "command"), _sampled(series, "forcing"))
+        if s is not None and np.ptp(s) > 0
+    ]
     n = series.blocks
     if not signals or n < 64:
         return None

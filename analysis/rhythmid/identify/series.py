@@ -75,7 +75,6 @@ class Series:
         return self.average(self.value)
 
 
-
 def bandwidth(value: Array, period: float, share: float = 0.9999) -> float:
     """Frequency [Hz] below which `share` of the motion's power lies (its mean and trend left out)."""
     n = len(value)
@@ -108,7 +107,9 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
     for record in records:
         time, value = record.output.time, record.output.value
         if len(time) < 16:
-            raise InputError(f"{record.name}: has only {len(time)} samples of the output; at least 16 are needed")
+            raise InputError(
+                f"{record.name}: has only {len(time)} samples of the output; at least 16 are needed"
+            )
         period = float(np.median(np.diff(time)))
         command = None
         if record.input is not None and len(record.input.time) > 1:
@@ -120,7 +121,17 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
         if record.forcing is not None and np.any(record.forcing.value != 0.0):
             forcing = _spline_of(record.forcing.time, record.forcing.value)
         made.append(
-            Series(record.name, time, value, command, forcing, 1, np.ones(len(time), bool), period, record.input_kind)
+            Series(
+                record.name,
+                time,
+                value,
+                command,
+                forcing,
+                1,
+                np.ones(len(time), bool),
+                period,
+                record.input_kind,
+            )
         )
     if block is None:
         block = min(block_length(s.value, s.period) for s in made)
@@ -142,7 +153,9 @@ def split(series: Series, length: float) -> list[Series]:
     parts: list[Series] = []
     for first in range(0, len(series.time) - 4 * series.block, size):
         window = slice(first, min(first + size, len(series.time)))
-        used = series.used[first // series.block : first // series.block + (window.stop - first) // series.block]
+        used = series.used[
+            first // series.block : first // series.block + (window.stop - first) // series.block
+        ]
         parts.append(
             replace(series, name=f"{series.name}@{series.time[first]:.2f}s", time=series.time[window],
                     value=series.value[window], used=used)
@@ -175,7 +188,9 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     step = biggest.period * biggest.block
     velocity = float(np.std(np.gradient(biggest.averaged, step))) if biggest.blocks > 2 else position
     frequency = dominant_frequency(biggest)
-    stiffness = model.borrowed("linear_spring.stiffness", None) or model.mass.value * (2 * np.pi * frequency) ** 2
+    stiffness = (
+        model.borrowed("linear_spring.stiffness", None) or model.mass.value * (2 * np.pi * frequency) ** 2
+    )
     effort, pumping = 0.0, 0.0
     for one in series:
         total = np.zeros(len(one.time))

@@ -1,0 +1,90 @@
+"""The verdict: consistent, missing physics, unknown physics or undecided, and what cannot be told apart."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from rhythmid.diagnose.locate import Dependence
+from rhythmid.diagnose.refit import Trial
+from rhythmid.diagnose.result import Verdict
+from rhythmid.diagnose.search import LEVEL, Search
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.series import Series, dominant_frequency
+
+TWINS = 2  # a family of this many is an answer; a larger one is undecided
+REMAINDER_LEVEL = 1e-6  # p-value of a structured remainder
+PERIODS = 4  # of the dominant motion, below which a record says nothing
+
+
+def significant(dependence: Dependence) -> bool:
+    return dependence.p_value < REMAINDER_LEVEL and dependence.explained > 0.05
+
+
+def element_of(trial: Trial, label: str) -> str:
+    """Name of the element that a trial has under a label."""
+    term = trial.model.term(label)
+    assert term is not None
+    return term.element.name
+
+
+def twins_of(best: Trial, rivals: Sequence[Trial]) -> list[tuple[str, ...]]:
+    """Families within which the records cannot tell: elements that replace one another in equally good models."""
+    groups: list[tuple[str, ...]] = []
+    for label in best.added:
+        others = []
+        for rival in rivals:
+            gone = set(best.added) - set(rival.added)
+            come = set(rival.added) - set(best.added)
+            if gone == {label} and len(come) == 1:
+                other = element_of(rival, come.pop())
+                if not _contains(best, label, other):
+                    others.append(other)
+        if others:
+            groups.append((element_of(best, label), *others))
+    return groups
+
+
+def _contains(best: Trial, label: str, other: str) -> bool:
+    """Whether `other` is a richer element that has the chosen one as a special case: never to be told from it, and no rival."""
+    term = best.model.term(label)
+    return term is not None and other in term.element.special_case_of
+
+
+def verdict_of(
+    found: Search,
+    p_value: float,
+    remains: Sequence[Dependence],
+    twins: Sequence[tuple[str, ...]],
+    repeats: NoiseModel | None,
+    series: Sequence[Series],
+) -> tuple[Verdict, str]:
+    fit = found.fit
+    too_big = False
+    if repeats is not None and repeats.variance > 0:
+        residual = np.concatenate([r[one.used] for r, one in zip(fit.residuals, series)])
+        ratio = float(np.mean(residual**2)) / repeats.variance
+        colour = max(repeats.long_run_variance / repeats.variance, 1.0)
+        too_big = ratio > 1.1 + 6.0 * math.sqrt(2.0 * colour / len(residual))
+    if not found.best.added:
+        if too_big and remains:
+            return "unknown_physics", "no element of the catalogue explains what the nominal model leaves"
+        if remains and remains[0].explained > 0.2 and p_value < LEVEL:
+            return "unknown_physics", "no element of the catalogue explains what the nominal model leaves"
+        if p_value < LEVEL:
+            return "undecided", "something is there, but too faint for any element to be worth its parameters"
+        if _weak(series):
+            return "undecided", "the records are too short or too quiet to exclude anything of interest"
+        return "consistent", ""
+    improvement = found.nominal.chi2 - fit.chi2
+    leftover = max((d.gain for d in remains), default=0.0)
+    if too_big or leftover > 0.1 * max(improvement, 1.0):
+        return "unknown_physics", "the best elements of the catalogue leave a structured remainder"
+    if any(len(group) > TWINS for group in twins):
+        return "undecided", "several effects explain the records equally well"
+    return "missing_physics", ""
+
+
+def _weak(series: Sequence[Series]) -> bool:
+    """Records that hold fewer than a few periods of motion."""
+    return all((one.time[-1] - one.time[0]) * dominant_frequency(one) < PERIODS for one in series)
