@@ -100,18 +100,17 @@ class LimitCycle:
     def ring_down(self) -> float:
         """Time constant [s] of the slowest decaying perturbation; infinite where one does not decay.
 
-        A multiplier within 1e-9 of one stands for a state that keeps its value (play, hysteresis) and is left out.
+        A multiplier of one stands for a state that keeps its value (play, hysteresis) and is left out.
         """
-        size = np.abs(self.multipliers)
-        size = size[np.abs(size - 1.0) > 1e-9]
-        slowest = float(size.max(initial=0.0))
-        if slowest >= 1.0:
+        multipliers = self.multipliers
+        slowest = float(np.abs(multipliers[np.abs(multipliers - 1.0) > 1e-6]).max(initial=0.0))
+        if slowest >= 1.0 - 1e-9:
             return np.inf
         return self.pumping.period / -np.log(slowest) if slowest > 0.0 else 0.0
 
 
-class _PeriodMap:
-    """x(0) -> x(T) of the forced, uncommanded model."""
+class PeriodMap:
+    """x(0) -> x(T) of the forced, uncommanded model, and what lies between."""
 
     def __init__(self, model: Model, pumping: Pumping, excited: InputKind, max_step: float) -> None:
         self.compiled = compile_model(model, excited=excited)
@@ -122,6 +121,7 @@ class _PeriodMap:
         self.max_step = max_step
 
     def rows(self, start: Array, times: Array) -> Array:
+        """Rows [state (q), output, effort] at cycle times (n,) within a period, from `start` (q,) at the first."""
         out = np.empty((len(times), len(start) + 2))
         done = self.compiled.run(
             times, *self.still, *self.forcing, *self.still, self.parameters, np.ascontiguousarray(start),
@@ -141,12 +141,12 @@ class _PeriodMap:
         return start
 
     def jacobian(self, start: Array, scale: Array) -> Array:
-        """Central differences of the map with steps of 1e-6 of the motion."""
+        """Central differences of the map with steps of 1e-4 of the motion: jumps of the force want them no smaller."""
         q = len(start)
         jacobian = np.empty((q, q))
         for i in range(q):
             step = np.zeros(q)
-            step[i] = 1e-6 * scale[i]
+            step[i] = 1e-4 * scale[i]
             jacobian[:, i] = (self(start + step) - self(start - step)) / (2.0 * step[i])
         return jacobian
 
@@ -172,7 +172,7 @@ def limit_cycle(
     periods.
     """
     step = max_step or min(MAX_STEP, pumping.period / SAMPLES)
-    period_map = _PeriodMap(model, pumping, excited, step)
+    period_map = PeriodMap(model, pumping, excited, step)
     if guess is None:
         start = period_map.relaxed(_start(model, period_map.compiled), SETTLING)
     else:

@@ -3,24 +3,26 @@
 The Jacobian is taken by differences of the compiled right-hand side along the cycle. Where it jumps (a damper switches, a
 contact opens) the instant is found by bisection, and Fourier coefficients are integrated piece by piece between these
 instants: for the paper's plant that gives the coefficients of s(t) in (13) exactly from its switch times. Where the
-force itself jumps, perturbed motions cross the jump earlier or later, which acts like an impulse in A(t): the
-saltation matrix (P. C. Müller, Chaos, Solitons & Fractals 5 (1995) 1671), whose logarithm is that impulse's size.
+force itself jumps, perturbed motions cross the jump earlier or later: ξ becomes S ξ with the saltation matrix S (P. C.
+Müller, Chaos, Solitons & Fractals 5 (1995) 1671). In A(t) that is an impulse J δ(t − t_s). A Fourier series takes the mean
+of both sides at a jump, so S ξ − ξ = J (S ξ + ξ)/2, which gives J.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import logm
+from scipy.linalg import expm
 
-from rhythmid.ltp.limit_cycle import LimitCycle, right_hand_side
+from rhythmid.ltp.limit_cycle import LimitCycle, PeriodMap, right_hand_side
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 PANELS = 96  # of the quadrature, in a period
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
+SMALLEST = 1e-3  # jump, relative to the variation of what jumps, that is looked for
+STRETCH = 2e-3  # periods before and after a jump of the force over which its effect is measured
 STEP = 1e-6  # of the differences, relative to the motion
 
 
@@ -73,7 +75,8 @@ class _Jacobian:
         self.rates = right_hand_side(cycle.model, cycle.pumping, cycle.excited)
         span = np.ptp(cycle.states, axis=0)
         size = np.abs(cycle.states).max(axis=0)
-        self.steps = STEP * np.where(span > 1e-9 * size, span, np.where(size > 0.0, size, 1.0))
+        size[1] = max(size[1], 1e-3 * size[0] * cycle.pumping.omega)  # at rest
+        self.steps = STEP * np.where(span > 1e-6 * size, span, np.where(size > 0.0, size, 1.0))
         self.effort_step = STEP * effort
 
     def at(self, time: Array) -> tuple[Array, Array]:
@@ -96,27 +99,38 @@ class _Jacobian:
         motion = np.concatenate([self.steps, [self.effort_step]]) / STEP
         return np.hstack([(jacobian * motion).reshape(len(time), -1), flow])
 
-    def flow(self, time: Array, offset: Array) -> Array:
-        """dx/dt (n, q) at the cycle's states plus `offset` (q,)."""
-        inside = np.mod(time, self.cycle.pumping.period)
-        return self.rates(inside, (self.cycle.path(inside) + offset)[None])[0, :, : len(offset)]
+    def variation(self) -> Array:
+        """How much each entry of `scaled` varies along the cycle, (k,); at least a thousandth of the largest in its row
+        of the Jacobian, so that the rounding of differences is not taken for a variation."""
+        q = len(self.steps)
+        values = self.scaled(self.cycle.time)
+        largest = np.abs(values).max(axis=0)
+        rows = largest[: (q + 1) ** 2].reshape(q + 1, q + 1).max(axis=1)
+        rows[:q] = np.maximum(rows[:q], largest[(q + 1) ** 2 :])
+        floor = 1e-3 * np.concatenate([np.repeat(rows, q + 1), rows[:q]])
+        return np.maximum(np.ptp(values, axis=0), floor) + 1e-300
+
+    def flow(self, time: Array) -> Array:
+        """dx/dt (n, q) along the cycle."""
+        return self.rates(time, self.cycle.path(time)[None])[0, :, : len(self.steps)]
 
 
-def _bisect(scaled: Callable[[Array], Array], low: Array, high: Array, rounds: int) -> tuple[Array, Array, Array]:
-    """Halve each interval [low, high] towards the side across which the signal changes more.
+def _bisect(
+    signal: Callable[[Array], Array], low: Array, high: Array, rounds: int
+) -> tuple[Array, Array, Array]:
+    """Halve each interval [low, high] towards the side across which the signal (n, k) changes more.
 
-    Returns the ends and the change (n, k) that is left across them.
+    Returns the ends and the largest change (n,) that is left across them.
     """
-    at_low, at_high = scaled(low), scaled(high)
-    size = np.maximum(np.abs(at_low), np.abs(at_high)).max(axis=0) + 1e-300
+    at_low, at_high = signal(low), signal(high)
     for _ in range(rounds):
         middle = 0.5 * (low + high)
-        at_middle = scaled(middle)
-        left = np.abs((at_middle - at_low) / size).max(axis=1) > np.abs((at_high - at_middle) / size).max(axis=1)
+        at_middle = signal(middle)
+        left = np.abs(at_middle - at_low).max(axis=1) > np.abs(at_high - at_middle).max(axis=1)
         high, low = np.where(left, middle, high), np.where(left, low, middle)
         at_high = np.where(left[:, None], at_middle, at_high)
         at_low = np.where(left[:, None], at_low, at_middle)
-    return low, high, at_high - at_low
+    return low, high, np.abs(at_high - at_low).max(axis=1)
 
 
 def _jumps(jacobian: _Jacobian) -> tuple[Array, Array]:
@@ -125,51 +139,53 @@ def _jumps(jacobian: _Jacobian) -> tuple[Array, Array]:
     inner = time[:-1] + 0.5 * np.diff(time)  # a switch on a grid time is then inside an interval
     low, high = np.concatenate([[inner[-1] - time[-1]], inner[:-1]]), inner
     period = jacobian.cycle.pumping.period
-    after = jacobian.scaled(high)
-    before = np.roll(after, 1, axis=0)
-    spread = np.maximum(np.ptp(after, axis=0), 1e-7 * np.abs(after).max(axis=0)) + 1e-300
-    change = np.abs((after - before) / spread).max(axis=1)
+    scale = jacobian.variation()
+
+    def signal(at: Array) -> Array:
+        return jacobian.scaled(at) / scale
+
+    after = signal(high)
+    change = np.abs(after - np.roll(after, 1, axis=0)).max(axis=1)
     steep = high[change > 0.02]
-    candidate = change > np.maximum(4.0 * np.median(change), 1e-6)
+    candidate = change > np.maximum(4.0 * np.median(change), SMALLEST)
     if not candidate.any():
         return np.empty(0), steep
-    first, last, left = _bisect(jacobian.scaled, low[candidate], high[candidate], 7)
+    first, last, left = _bisect(signal, low[candidate], high[candidate], 7)
     # a smooth change is spread over the interval, a jump is not; differences smear it over 1e-6 of the period
-    jumped = np.abs(left / spread).max(axis=1) > 0.5 * change[candidate]
+    jumped = left > 0.5 * change[candidate]
     if not jumped.any():
         return np.empty(0), steep
-    first, last, _ = _bisect(jacobian.scaled, first[jumped], last[jumped], 14)
+    first, last, _ = _bisect(signal, first[jumped], last[jumped], 14)
     times = np.sort(np.mod(0.5 * (first + last), period))
     apart = np.concatenate([[True], np.diff(times) > 1e-9 * period]) if len(times) else np.empty(0, bool)
     return times[apart], steep
 
 
 def _impulse(jacobian: _Jacobian, time: float) -> Impulse | None:
-    """What a jump of the right-hand side at `time` does; None where it is continuous there."""
-    period = jacobian.cycle.pumping.period
-    q = len(jacobian.steps)
-    margin = 1e-7 * period
+    """What a jump of the right-hand side at `time` does; None where it is continuous there.
 
-    still = np.zeros(q)
-    before, after = jacobian.flow(np.array([time - margin, time + margin]), still)
-    jump = after - before
-    size = np.abs(jacobian.cycle.rates).max(axis=0) + 1e-300
-    if np.max(np.abs(jump) / size) < 1e-5:
+    The saltation matrix is what is left of the state's sensitivity across a short stretch, simulated in very fine steps,
+    when the smooth motion before and after is undone.
+    """
+    cycle, period = jacobian.cycle, jacobian.cycle.pumping.period
+    q = len(jacobian.steps)
+    around = np.mod(time + np.array([-1e-5, 1e-5]) * period, period)
+    before, after = jacobian.flow(around)
+    if np.all(np.abs(after - before) < SMALLEST * np.abs(cycle.rates).max(axis=0)):
         return None
-    later = np.zeros(q)  # how much later the jump comes when a state is larger
-    width = 1e-3 * period
-    for i, step in enumerate(jacobian.steps):
+    half = STRETCH * period
+    ends = np.array([time - half, time + half])
+    start = cycle.path(ends[0] % period)
+    period_map = PeriodMap(cycle.model, cycle.pumping, cycle.excited, half / 1e4)
+    through = np.empty((q, q))
+    for i, rate in enumerate(jacobian.flow(np.array([ends[0] % period]))[0]):
         shift = np.zeros(q)
-        shift[i] = 100.0 * step
-        ends = []
-        for sign in (1.0, -1.0):
-            low, high, _ = _bisect(
-                partial(jacobian.flow, offset=sign * shift), np.array([time - width]), np.array([time + width]), 40
-            )
-            ends.append(0.5 * float(low[0] + high[0]))
-        later[i] = (ends[0] - ends[1]) / (200.0 * step)
-    saltation = np.eye(q) - np.outer(jump, later)
-    return Impulse(time, np.real(logm(saltation)))
+        shift[i] = max(0.3 * half * abs(rate), 10.0 * jacobian.steps[i])  # the jump stays within the stretch
+        up, down = (period_map.rows(start + sign * shift, ends)[-1, :q] for sign in (1.0, -1.0))
+        through[:, i] = (up - down) / (2.0 * shift[i])
+    smooth, _ = jacobian.at(np.mod(ends, period))
+    saltation = expm(-smooth[1, :q, :q] * half) @ through @ expm(-smooth[0, :q, :q] * half)
+    return Impulse(time, 2.0 * np.linalg.solve((saltation + np.eye(q)).T, (saltation - np.eye(q)).T).T)
 
 
 def linearise(cycle: LimitCycle, effort: float | None = None) -> Linearisation:

@@ -40,33 +40,31 @@ class PiecewiseLti:
         dz/dt = F z + B, F = A − jνI. The output's component at ω is the m-th Fourier coefficient of C z + D.
         """
         omega_p = 2.0 * np.pi / self.period
-        found = np.empty((len(harmonics), len(frequency)), dtype=complex)
-        for row, m in enumerate(harmonics):
-            for column, hertz in enumerate(frequency):
-                found[row, column] = self._sideband(2.0 * np.pi * hertz - m * omega_p, m * omega_p)
-        return found
+        omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
+        return np.array([self._sideband(omega - m * omega_p, m * omega_p) for m in harmonics])
 
-    def _sideband(self, nu: float, shift: float) -> complex:
-        """Component at ν + `shift` [rad/s] of the response to exp(jνt)."""
+    def _sideband(self, nu: Array, shift: float) -> Complex:
+        """Components at ν + `shift` of the responses to exp(jνt), ν (n,) [rad/s]."""
         q = len(self.pieces[0].b)
         identity = np.eye(q)
-        through, offset = identity.astype(complex), np.zeros(q, dtype=complex)
+        through = np.broadcast_to(identity.astype(complex), (len(nu), q, q))
+        offset = np.zeros((len(nu), q, 1), dtype=complex)
+        steps = []
         for piece in self.pieces:  # z(end) = Φ z(start) + forced part, piece after piece
-            f = piece.a - 1j * nu * identity
+            f = piece.a - 1j * nu[:, None, None] * identity
+            steady = -np.linalg.solve(f, np.broadcast_to(piece.b[:, None], (len(nu), q, 1)))
             phi = expm(f * (piece.end - piece.start))
-            offset = phi @ offset + np.linalg.solve(f, (phi - identity) @ piece.b)
+            steps.append((piece, f, steady, phi))
+            offset = phi @ (offset - steady) + steady
             through = phi @ through
         state = np.linalg.solve(identity - through, offset)
-        total = 0.0 + 0.0j
-        for piece in self.pieces:
+        total = np.zeros(len(nu), dtype=complex)
+        for piece, f, steady, phi in steps:  # z = steady + exp(F t) (z(start) − steady)
             length = piece.end - piece.start
-            f = piece.a - 1j * nu * identity
-            phi = expm(f * length)
-            steady = -np.linalg.solve(f, piece.b)  # z = steady + exp(F t) (z(start) − steady)
             turned = f - 1j * shift * identity
             moving = np.linalg.solve(turned, (expm(turned * length) - identity) @ (state - steady))
             window = length if shift == 0.0 else (1.0 - np.exp(-1j * shift * length)) / (1j * shift)
-            part = piece.c @ moving + (piece.c @ steady + piece.d) * window
+            part = (piece.c @ moving)[:, 0] + ((piece.c @ steady)[:, 0] + piece.d) * window
             total += part * np.exp(-1j * shift * piece.start)
             state = steady + phi @ (state - steady)
         return total / self.period

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline, PPoly
+from scipy.interpolate import PPoly
 
 from rhythmid.errors import InputError
 from rhythmid.record.record import Channel, Record
+from rhythmid.signal import spline
 
 Array = NDArray[np.float64]
 HARMONICS = 9  # of the forcing that are looked for
@@ -62,14 +63,12 @@ class Pumping:
         return total
 
     def signal(self) -> PPoly | None:
-        """The forcing over one period of cycle time, 0 <= t <= T; None where there is none."""
+        """The forcing over one period of cycle time and a sixteenth around it; None where there is none."""
         if not self.active:
             return None
-        t = np.linspace(0.0, self.period, GRID + 1)
-        value = self(t)
-        value[-1] = value[0]
-        fitted = CubicSpline(t, value, bc_type="periodic")
-        return PPoly(fitted.c, fitted.x, extrapolate=True)
+        margin = GRID // 16
+        t = self.period / GRID * np.arange(-margin, GRID + margin + 1)
+        return spline(t, self(t))
 
 
 def _projection(time: Array, value: Array, frequency: float, harmonics: int) -> tuple[NDArray[np.complex128], Array]:
@@ -83,7 +82,7 @@ def _projection(time: Array, value: Array, frequency: float, harmonics: int) -> 
 
 def fundamental_frequency(time: Array, value: Array) -> float:
     """Frequency [Hz] of a periodic signal (n,) sampled at increasing times [s]: strongest line, refined to full
-    precision by the drift of its phase (Gauss-Newton on the frequency)."""
+    precision by the drift of its phase."""
     n = len(time)
     span = time[-1] - time[0]
     even = np.linspace(time[0], time[-1], n)
@@ -96,18 +95,26 @@ def fundamental_frequency(time: Array, value: Array) -> float:
         if lower >= 6 and spectrum[lower - 2 : lower + 3].max() > 0.01 * spectrum[peak]:
             peak = lower
     frequency = peak * (n - 1) / (span * 4 * n)
-    middle = time - time.mean()
+    for harmonics in (1, max(1, int(np.clip(0.25 * n / (span * frequency), 1, HARMONICS)))):
+        frequency = _refined(time - time.mean(), value, frequency, harmonics)
+    return frequency
+
+
+def _refined(time: Array, value: Array, frequency: float, harmonics: int) -> float:
+    """Gauss-Newton on the frequency of a Fourier series with so many harmonics."""
+    h = np.arange(1, harmonics + 1)
     for _ in range(8):
-        angle = 2 * np.pi * frequency * middle
+        angle = np.multiply.outer(2 * np.pi * frequency * time, h)
         cosine, sine = np.cos(angle), np.sin(angle)
-        columns = np.stack([np.ones(n), cosine, sine], axis=1)
-        _, a, b = np.linalg.lstsq(columns, value, rcond=None)[0]
-        slope = 2 * np.pi * middle * (b * cosine - a * sine)
-        step = float(np.linalg.lstsq(np.column_stack([columns, slope]), value, rcond=None)[0][3])
+        columns = np.hstack([np.ones((len(time), 1)), cosine, sine])
+        solution = np.linalg.lstsq(columns, value, rcond=1e-12)[0]
+        a, b = solution[1 : harmonics + 1], solution[harmonics + 1 :]
+        slope = 2 * np.pi * time * (cosine @ (h * b) - sine @ (h * a))
+        step = float(np.linalg.lstsq(np.column_stack([columns, slope]), value, rcond=1e-12)[0][-1])
         frequency += step
         if abs(step) < 1e-13 * frequency:
             break
-    return float(frequency)
+    return frequency
 
 
 def pumping_of_channel(channel: Channel, source: str = "forcing channel") -> Pumping:

@@ -1,0 +1,65 @@
+"""The forcing as a time reference: frequency, phase and harmonics from a recorded channel."""
+
+import numpy as np
+import pytest
+
+from rhythmid.errors import InputError
+from rhythmid.ltp.pumping import Pumping, pumping_of_channel
+from rhythmid.record.record import Channel
+
+TIME = np.arange(12_000) * 1e-3
+
+
+def channel(value: np.ndarray, time: np.ndarray = TIME) -> Channel:
+    return Channel(time, value, "N")
+
+
+@pytest.mark.parametrize("frequency", [1.0, 0.97, 2.5137])
+@pytest.mark.parametrize("phase", [0.0, 1.0, -3.0])
+def test_frequency_amplitude_and_phase_of_a_recorded_cosine_are_found(frequency: float, phase: float) -> None:
+    found = pumping_of_channel(channel(0.7 * np.cos(2 * np.pi * frequency * TIME + phase)))
+    assert found.frequency == pytest.approx(frequency, rel=1e-10)
+    assert found.coefficients[1] == pytest.approx(0.7, rel=1e-9)
+    assert found(TIME - found.origin) == pytest.approx(0.7 * np.cos(2 * np.pi * frequency * TIME + phase), abs=1e-8)
+
+
+def test_a_stated_cosine_and_its_recording_are_the_same_pumping() -> None:
+    stated = Pumping.cosine(-0.4, 1.25, 0.3)
+    recorded = pumping_of_channel(channel(-0.4 * np.cos(2 * np.pi * 1.25 * TIME + 0.3)))
+    assert recorded(TIME - recorded.origin) == pytest.approx(stated(TIME - stated.origin), abs=1e-9)
+
+
+def test_harmonics_of_the_forcing_are_kept_even_where_they_are_stronger_than_the_fundamental() -> None:
+    value = 0.3 * np.cos(2 * np.pi * TIME + 0.4) + 0.5 * np.sin(4 * np.pi * TIME) + 0.1
+    found = pumping_of_channel(channel(value))
+    assert found.frequency == pytest.approx(1.0, rel=1e-9)
+    assert found(TIME - found.origin) == pytest.approx(value, abs=1e-9)
+
+
+def test_irregular_stamps_do_not_matter() -> None:
+    time = np.sort(TIME + np.random.default_rng(1).uniform(0, 8e-4, len(TIME)))
+    found = pumping_of_channel(channel(np.cos(2 * np.pi * 1.1 * time - 0.2), time))
+    assert found.frequency == pytest.approx(1.1, rel=1e-10)
+
+
+def test_the_signal_over_a_period_is_the_forcing() -> None:
+    pumping = Pumping(0.8, np.array([0.1, 0.5, 0.2 - 0.1j]), 0.3)
+    signal = pumping.signal()
+    assert signal is not None
+    at = np.linspace(0.0, pumping.period, 777)
+    assert signal(at) == pytest.approx(pumping(at), abs=1e-10)
+
+
+def test_a_constant_forcing_is_no_pumping() -> None:
+    assert not pumping_of_channel(channel(np.full(len(TIME), 2.0))).active
+
+
+def test_a_forcing_that_is_not_periodic_is_refused() -> None:
+    noise = np.random.default_rng(0).standard_normal(len(TIME))
+    with pytest.raises(InputError, match="not periodic"):
+        pumping_of_channel(channel(noise))
+
+
+def test_less_than_two_periods_of_forcing_are_refused() -> None:
+    with pytest.raises(InputError, match="at least 2"):
+        pumping_of_channel(channel(np.cos(2 * np.pi * 0.1 * TIME)))
