@@ -136,4 +136,4 @@ def _hold(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None, t
     if sum(float(r @ r) for r in again.residuals) < sum(float(r @ r) for r in fit.residuals) * (1 + 1e-3):
         note += " The input is band-limited, not held; it is reconstructed so in all that follows."
         return Calibration(again, tuple(smooth), (note,), late)
-    return Calibration(fit, kept, (note + " Holding it fits better all the same."), late)
+    return Calibration(fit, kept, (note + " Holding it fits better all the same.",), late)

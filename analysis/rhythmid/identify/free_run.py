@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
-from rhythmid.compiled import Compiled, compile_model
+from rhythmid.compiled import Compiled, InputKind, compile_model
 from rhythmid.errors import InputError
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
@@ -101,13 +101,18 @@ def _delay_of(model: Model, stamps: Array) -> Array | None:
     return total
 
 
-def _inputs(one: Series) -> Inputs:
-    smooth = None
+def _stand_in(one: Series) -> Pieces | None:
+    """Smooth stand-in for a held command that changes about as often as the measurement is sampled, or more often."""
     command = one.command
-    if command is not None and command.c.shape[0] == 1 and len(command.x) > 16:
-        if float(np.median(np.diff(command.x[:-1]))) <= 2.0 * one.period * (1.0 + 1e-6) and one.block > 1:
-            smooth = _contiguous(pieces(impulse_preserving(command)))
-    return Inputs(_contiguous(pieces(command)), smooth, _contiguous(pieces(one.forcing)))
+    if command is None or command.c.shape[0] > 1 or len(command.x) <= 16 or one.block == 1:
+        return None
+    if float(np.median(np.diff(command.x[:-1]))) > 2.0 * one.period * (1.0 + 1e-6):
+        return None
+    return _contiguous(pieces(impulse_preserving(command)))
+
+
+def _inputs(one: Series) -> Inputs:
+    return Inputs(_contiguous(pieces(one.command)), _stand_in(one), _contiguous(pieces(one.forcing)))
 
 
 def prepare_run(
@@ -117,12 +122,12 @@ def prepare_run(
 
     `max_step` [s] None means one Runge-Kutta step a block at most.
     """
-    kinds = {one.kind for one in series if one.command is not None}
+    kinds: set[InputKind] = {one.kind for one in series if one.command is not None}
     if len(kinds) > 1:
         raise InputError(
             f"records with different kinds of input ({', '.join(sorted(kinds))}) cannot be fitted together"
         )
-    excited = kinds.pop() if kinds else "force"
+    excited: InputKind = kinds.pop() if kinds else "force"
     inputs = tuple(_inputs(one) for one in series)
     smooth = all(i.smooth is not None or len(i.command[0]) <= 2 for i in inputs)
     if not smooth:

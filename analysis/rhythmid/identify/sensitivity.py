@@ -1,0 +1,216 @@
+"""Sensitivities of a free run to parameters and initial states, by differences, with the initial states projected out."""
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.identify.free_run import FreeRun
+from rhythmid.identify.noise import NoiseModel, runs
+from rhythmid.model import Model
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Whitened residual (n,) and its sensitivities to parameters (n, p), both with the initial states projected out;
+    `bases` (one (n_s, q) orthonormal basis a series) span what initial states can do; `steps` are the differences used."""
+
+    residual: Array
+    jacobian: Array
+    bases: tuple[Array, ...]
+    pieces: tuple[slice, ...]
+    steps: Array
+
+
+class Problem:
+    """One structure, its series and a noise model: residuals and their sensitivities."""
+
+    def __init__(
+        self, run: FreeRun, names: Sequence[str], noise: NoiseModel, pool: ThreadPoolExecutor | None
+    ) -> None:
+        self.run, self.names, self.noise, self.pool = run, tuple(names), noise, pool
+        self.hidden: list[tuple[Array, Array]] = []  # mean and scatter of each series' element states
+        self.spread = max(float(np.std(one.averaged)) for one in run.series) or 1.0
+        self.stretches = [
+            [s for s in runs(one.used) if s.stop - s.start > noise.order + 1] for one in run.series
+        ]
+
+    def whitened(self, index: int, samples: Array) -> Array:
+        """Used stretches of series `index`, whitened and joined; (n,) or (n, q)."""
+        parts = [self.noise.whiten(samples[s]) for s in self.stretches[index]]
+        return np.concatenate(parts) if parts else samples[:0]
+
+    def residuals(self, model: Model, starts: Sequence[Array]) -> list[Array] | None:
+        outputs = self.run.outputs(model, starts)
+        if outputs is None:
+            return None
+        return [output - one.averaged for output, one in zip(outputs, self.run.series)]
+
+    def learn_hidden(self, model: Model, starts: Sequence[Array]) -> None:
+        """Take the usual values of the elements' own states from a run.
+
+        A hidden state hardly differs from a kick to the velocity when its element is fast; knowing its usual range keeps
+        it from wandering off.
+        """
+        self.hidden = []
+        for index, start in enumerate(starts):
+            rows = self.run.rows(model, index, start)
+            states = (
+                rows[len(rows) // 4 :, 2 : self.run.states]
+                if rows is not None
+                else np.zeros((1, self.run.states - 2))
+            )
+            self.hidden.append((states.mean(axis=0), 3.0 * states.std(axis=0) + 1e-12))
+
+    def departure(self, index: int, start: Array) -> Array:
+        """Element states of a start, as multiples of their usual scatter from their usual mean."""
+        mean, scatter = self.hidden[index]
+        return (start[2:] - mean) / scatter
+
+    def cost(self, model: Model, residuals: Sequence[Array] | None, starts: Sequence[Array]) -> float:
+        if residuals is None:
+            return math.inf
+        total = sum(float(np.sum(self.whitened(i, r) ** 2)) for i, r in enumerate(residuals))
+        total += sum(float(np.sum(self.departure(i, start) ** 2)) for i, start in enumerate(starts))
+        for name in self.names:
+            value = model.parameters[name]
+            if value.prior is not None:
+                total += ((value.value - value.prior.mean) / value.prior.std) ** 2
+        return total if math.isfinite(total) else math.inf
+
+    def _perturbed(
+        self, model: Model, starts: Sequence[Array], signed: Array, state_steps: Array, columns: Sequence[int]
+    ) -> list[list[Array] | None]:
+        """Outputs with parameter or (from p on) initial state of each of the `columns` moved by its step."""
+        cases: list[tuple[Model, Sequence[Array]]] = []
+        for c in columns:
+            if c < len(self.names):
+                name = self.names[c]
+                cases.append((model.with_values({name: model.value(name) + signed[c]}), starts))
+            else:
+                shift = np.zeros(self.run.states)
+                shift[c - len(self.names)] = state_steps[c - len(self.names)]
+                cases.append((model, [start + shift for start in starts]))
+        return self.run.many(cases, self.pool)
+
+    def settle_steps(
+        self,
+        model: Model,
+        starts: Sequence[Array],
+        residuals: Sequence[Array],
+        steps: Array,
+        state_steps: Array,
+    ) -> tuple[Array, Array]:
+        """Difference steps under which every parameter and state moves the outputs by about the same small amount.
+
+        Their natural sizes span many powers of ten (a stiffness, a delay, a hidden state of an actuator).
+        """
+        base = [residual + one.averaged for residual, one in zip(residuals, self.run.series)]
+        joint = np.concatenate([steps, state_steps])
+        p = len(self.names)
+        todo = list(range(len(joint)))
+        for _ in range(4):
+            signed = self._signed(model, joint[:p])
+            outputs = self._perturbed(model, starts, signed, joint[p:], todo)
+            again = []
+            for c, case in zip(todo, outputs):
+                if case is None:
+                    joint[c] *= 1e-2
+                    again.append(c)
+                    continue
+                moved = max(float(np.sqrt(np.mean((new - old) ** 2))) for new, old in zip(case, base))
+                ratio = float(np.clip(1e-4 * self.spread / max(moved, 1e-30), 1e-4, 1e4))
+                joint[c] *= ratio
+                if not 0.1 < ratio < 10.0:
+                    again.append(c)
+            todo = again
+            if not todo:
+                break
+        return joint[:p], joint[p:]
+
+    def _signed(self, model: Model, steps: Array) -> Array:
+        """Steps that stay within the parameters' bounds."""
+        signed = steps.copy()
+        for i, name in enumerate(self.names):
+            value = model.parameters[name]
+            low, high = value.bounds
+            signed[i] = min(signed[i], 0.1 * (high - low))
+            if value.value + signed[i] > high:
+                signed[i] = -signed[i]
+        return signed
+
+    def linearise(
+        self,
+        model: Model,
+        starts: Sequence[Array],
+        residuals: Sequence[Array],
+        steps: Array,
+        state_steps: Array,
+    ) -> tuple[Linearisation, list[tuple[Array, Array, Array]], Array, Array]:
+        """Sensitivities by forward differences whose steps settle at a ten-thousandth of the motion.
+
+        Returns the linearisation, each series' whitened residual and sensitivities to parameters and initial state, and the
+        next steps.
+        """
+        signed = self._signed(model, steps)
+        outputs = self._perturbed(
+            model, starts, signed, state_steps, range(len(self.names) + self.run.states)
+        )
+        base = [residual + one.averaged for residual, one in zip(residuals, self.run.series)]
+        p, q = len(self.names), self.run.states
+        rows, columns, bases, states, places = [], [], [], [], []
+        place = 0
+        moved = np.zeros(p + q)
+        for index, at in enumerate(base):
+            change = np.zeros((len(at), p + q))
+            for c, case in enumerate(outputs):
+                if case is not None:
+                    change[:, c] = case[index] - at
+            moved = np.maximum(moved, np.sqrt(np.mean(change**2, axis=0)))
+            change[:, :p] /= signed
+            white = self.whitened(index, np.column_stack([residuals[index], change]))
+            known = np.zeros((q - 2, 1 + p + q))
+            known[:, 0] = self.departure(index, starts[index])
+            known[:, 1 + p + 2 :] = np.diag(state_steps[2:] / self.hidden[index][1])
+            joined = np.vstack([white, known])
+            basis = _basis(joined[:, 1 + p :])
+            projected = joined[:, : 1 + p] - basis @ (basis.T @ joined[:, : 1 + p])
+            rows.append(projected[: len(white), 0])
+            columns.append(projected[: len(white), 1:])
+            bases.append(basis[: len(white)])
+            states.append((joined[:, 0], joined[:, 1 : 1 + p], joined[:, 1 + p :]))
+            places.append(slice(place, place + len(white)))
+            place += len(white)
+        target = 1e-4 * self.spread
+        ratio = np.clip(target / np.maximum(moved, 1e-30), 1e-3, 1e3)
+        linearisation = Linearisation(
+            np.concatenate(rows), np.concatenate(columns), tuple(bases), tuple(places), signed
+        )
+        return linearisation, states, steps * ratio[:p], state_steps * ratio[p:]
+
+
+def state_update(sensitivity: Array, target: Array) -> Array:
+    """Least-squares change of a series' initial state (in units of its difference steps)."""
+    norms = np.linalg.norm(sensitivity, axis=0)
+    live = norms > 1e-9 * max(norms.max(initial=0.0), 1e-300)
+    change = np.zeros(sensitivity.shape[1])
+    if live.any():
+        change[live] = (
+            np.linalg.lstsq(sensitivity[:, live] / norms[live], -target, rcond=1e-7)[0] / norms[live]
+        )
+    return change
+
+
+def _basis(columns: Array) -> Array:
+    """Orthonormal basis of the columns' span; dependent ones are dropped."""
+    norms = np.linalg.norm(columns, axis=0)
+    live = norms > 1e-9 * max(norms.max(initial=0.0), 1e-300)
+    if not live.any():
+        return np.zeros((len(columns), 0))
+    left, singular, _ = np.linalg.svd(columns[:, live] / norms[live], full_matrices=False)
+    return left[:, singular > 1e-7 * singular[0]]
