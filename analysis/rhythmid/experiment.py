@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,87 +21,10 @@ from rhythmid.excitation.excitation import Excitation
 from rhythmid.excitation.sequence import build
 from rhythmid.model import Model
 from rhythmid.record.messages import Messages
-from rhythmid.time_table import read_time_table
+from rhythmid.settings import Delay, Forcing, Noise, Recording, Safety, TimeMode
 
 TOPICS = ("excitation", "command", "forcing", "plant/joint_states", "joint_states", "run", "diagnostics")
 LONGEST = 50_000_000  # samples of an offline run: 14 hours at 1 kHz, a few gigabytes
-
-
-@dataclass(frozen=True)
-class Forcing:
-    """Periodic forcing amplitude [N] cos(2π frequency [Hz] t + phase [rad]); amplitude 0 switches it off."""
-
-    amplitude: float = 1.0
-    frequency: float = 1.0
-    phase: float = 0.0
-
-
-@dataclass(frozen=True)
-class Delay:
-    """A transport delay: constant [s], or a profile of (seconds since start, delay [s]) joined by straight lines."""
-
-    constant: float = 0.0
-    profile: Path | None = None
-
-    def table(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Corner times and delays of the profile. Raises InputError when the file is not such a table."""
-        if self.profile is None:
-            return np.zeros(1), np.array([self.constant])
-        times, delays = read_time_table(self.profile, "delay [s]")
-        if np.any(delays < 0.0):
-            raise InputError(f"{self.profile}: a delay cannot be negative ({delays.min():g} s)")
-        return times, delays
-
-    def release(self, stamp_ns: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Stamps [ns] on release: stamp + delay, in order (nothing overtakes). Shapes (n,) -> (n,)."""
-        times, delays = self.table()
-        late = np.rint(np.interp(stamp_ns * 1e-9, times, delays) * 1e9).astype(np.int64)
-        released = stamp_ns + late
-        order = np.arange(len(released), dtype=np.int64)
-        return np.maximum.accumulate(released - order) + order
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Measurement noise: standard deviation [m], correlation from sample to sample, rounding step [m] (0: none)."""
-
-    measurement_std: float = 0.0
-    correlation: float = 0.0
-    quantisation: float = 0.0
-
-
-@dataclass(frozen=True)
-class TimeMode:
-    """`mode` lockstep (simulated time) or realtime; `rate` [Hz]; credit `window` [samples]; process `layout`."""
-
-    mode: Literal["lockstep", "realtime"] = "lockstep"
-    rate: int = 1000
-    window: int = 100
-    layout: Literal["composed", "processes"] = "composed"
-
-    @property
-    def period_ns(self) -> int:
-        return round(1e9 / self.rate)
-
-
-@dataclass(frozen=True)
-class Safety:
-    """Limits of the excitation: largest effort [N], ramps in and out [s], age of the newest measurement [s] and
-    range of positions [m] beyond which it stops by itself."""
-
-    max_effort: float = 100.0
-    ramp: float = 0.0
-    stale_after: float = 0.5
-    envelope: tuple[float, float] = (-math.inf, math.inf)
-
-
-@dataclass(frozen=True)
-class Recording:
-    """What is recorded, where and how."""
-
-    path: Path = Path("bag")
-    storage: Literal["mcap", "sqlite3"] = "mcap"
-    topics: tuple[str, ...] = ("excitation", "joint_states", "forcing", "run")
 
 
 @dataclass(frozen=True)
@@ -125,7 +48,9 @@ def plant_model(model: Model, forcing: Forcing, noise: Noise, catalogue: Catalog
         values = {"std": noise.measurement_std, "correlation": noise.correlation}
         model = model.with_element(known["measurement_noise"], values, fixed=True)
     if noise.quantisation > 0.0:
-        model = model.with_element(known["sensor_quantisation"], {"resolution": noise.quantisation}, fixed=True)
+        model = model.with_element(
+            known["sensor_quantisation"], {"resolution": noise.quantisation}, fixed=True
+        )
     return model
 
 
@@ -207,7 +132,9 @@ class Experiment:
             "count": self.count,
         }
         streams = [topic for topic in self.record.topics if topic not in ("run", "diagnostics")]
-        sinks = ["recorder"] if streams else []  # what the credit of lockstep waits for at the end of the path
+        sinks = (
+            ["recorder"] if streams else []
+        )  # what the credit of lockstep waits for at the end of the path
 
         def injector(name: str, source: str, target: str, delay: Delay) -> NodeSpec:
             return NodeSpec(
@@ -278,7 +205,9 @@ def _json(value: Any) -> str:
     return json.dumps(value, default=str)
 
 
-def ramped(excitation: Excitation, safety: Safety, time: NDArray[np.float64], duration: float) -> NDArray[np.float64]:
+def ramped(
+    excitation: Excitation, safety: Safety, time: NDArray[np.float64], duration: float
+) -> NDArray[np.float64]:
     """Excitation [N] at times [s] since its start, faded in and out over the ramp and clamped to the largest effort."""
     value = excitation(time)
     if safety.ramp > 0.0:
@@ -294,7 +223,9 @@ def perform(experiment: Experiment) -> dict[str, Messages]:
     from rhythmid.plant import Plant  # the compiler behind it is slow to load, and most nodes need no plant
 
     if experiment.count > LONGEST:
-        raise InputError(f"{experiment.count} samples are too many to simulate at once; the limit is {LONGEST}")
+        raise InputError(
+            f"{experiment.count} samples are too many to simulate at once; the limit is {LONGEST}"
+        )
     period = experiment.time.period_ns
     stamps = np.arange(experiment.count, dtype=np.int64) * period
     time = (stamps * 1e-9).astype(np.float64)
@@ -311,7 +242,9 @@ def perform(experiment: Experiment) -> dict[str, Messages]:
         "plant/joint_states": Messages(
             stamps, position=samples.position, velocity=samples.velocity, effort=samples.effort
         ),
-        "joint_states": Messages(seen, position=samples.position, velocity=samples.velocity, effort=samples.effort),
+        "joint_states": Messages(
+            seen, position=samples.position, velocity=samples.velocity, effort=samples.effort
+        ),
     }
 
 
