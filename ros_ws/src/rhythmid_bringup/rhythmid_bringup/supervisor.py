@@ -24,6 +24,7 @@ from .observer import Observer
 from .processes import Supervised, end
 
 READY_WITHIN = 60.0  # seconds; importing ROS and compiling the model take most of it on a busy machine
+STALLED_AFTER = 30.0  # seconds
 POST_ROLL = 0.25  # seconds recorded in real time after the last response can have arrived
 
 
@@ -155,17 +156,18 @@ class Supervisor:
             *columns, TimeElapsedColumn(), TimeRemainingColumn(), console=self._console
         ) as progress:
             bar = progress.add_task(self._experiment.time.mode, total=self._length)
-            outcome = None
+            outcome, moved = None, 0.0
             while outcome is None:
                 self._listen()
                 now = time.monotonic() - started
-                self.observed.elapsed = now
-                self.observed.played = (
-                    observer.acknowledged_ns * 1e-9 if self._lockstep and self._streams else now
-                )
-                self.observed.played = min(self.observed.played, self._length)
+                played = observer.acknowledged_ns * 1e-9 if self._lockstep and self._streams else now
+                if played > self.observed.played:
+                    moved = now
+                self.observed.elapsed, self.observed.played = now, min(played, self._length)
                 progress.update(bar, completed=self.observed.played)
                 outcome = self._trouble() or self._ending(observer)
+                if outcome is None and now - moved > STALLED_AFTER:
+                    outcome = Outcome(1, f"nothing has moved for {STALLED_AFTER:g} s")
         if self._interrupted():
             self._fade_out(observer)
         return outcome
