@@ -8,6 +8,7 @@ from rhythmid.signal import (
     band_limited,
     continuous,
     first_order_hold,
+    impulse_preserving,
     pieces,
     shifted,
     spline,
@@ -76,6 +77,16 @@ def test_a_shifted_signal_is_the_same_later(hold):
     np.testing.assert_allclose(
         evaluate(shifted(signal, 0.0403), at + 0.0403), evaluate(signal, at), atol=1e-9
     )
+
+
+def test_the_smooth_stand_in_of_a_held_command_has_its_impulse_between_any_two_knots():
+    values = np.sin(2 * np.pi * 7 * TIME)
+    held = zero_order_hold(TIME, values)
+    smooth = impulse_preserving(held)
+    for first, last in [(0, 1), (3, 4), (100, 1500), (0, 1999)]:
+        expected = np.sum(values[first:last]) * 1e-3
+        assert smooth.integrate(TIME[first], TIME[last]) == pytest.approx(expected, abs=1e-12)
+    assert np.all(np.abs(evaluate(smooth, np.array([-1.0, -0.1]))) < 1e-12)
 
 
 def test_no_signal_is_zero():

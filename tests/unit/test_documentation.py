@@ -1,0 +1,60 @@
+"""What the documents show works: every YAML block is read by the code that it is meant for."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+import rhythmid
+from rhythmid.experiment import Experiment
+from rhythmid.model import Model
+from rhythmid.record.signals import Signals
+
+ROOT = Path(__file__).parents[2]
+PAPER = Path(rhythmid.__file__).parent / "models" / "paper_hopper.yaml"
+
+
+def block(name: str) -> str:
+    text = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
+    found = re.search(rf"```yaml\n(# {name}\n.*?)```", text, re.DOTALL)
+    assert found is not None
+    return found[1]
+
+
+def test_the_model_file_that_is_shown():
+    model = Model.from_text(block("model.yaml"))
+    assert model.value("switched_damper.stance") == 2.0
+    assert "actuator_lag.time_constant" in model.free
+
+
+def test_the_experiment_file_that_is_shown(tmp_path):
+    shutil.copy(PAPER, tmp_path)
+    experiment = Experiment.from_text(block("experiment.yaml"), tmp_path)
+    assert experiment.count == 300_000
+
+
+def test_the_signals_file_that_is_shown(tmp_path):
+    (tmp_path / "signals.yaml").write_text(block("signals.yaml"), encoding="utf-8")
+    assert Signals.load(tmp_path / "signals.yaml").use == (10.0, 90.0)
+
+
+@pytest.mark.parametrize("document", ["README.md", "docs/files.md"])
+def test_links_lead_to_files_that_exist(document):
+    text = (ROOT / document).read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)#]+)\)", text):
+        assert (ROOT / document).parent.joinpath(target).exists(), target
+
+
+def test_the_packages_agree_about_their_version():
+    manifests = [ROOT / "analysis" / "package.xml", *(ROOT / "ros_ws" / "src").glob("*/package.xml")]
+    versions = [re.search(r"<version>(.*)</version>", path.read_text(encoding="utf-8")) for path in manifests]
+    assert {found[1] for found in versions if found} == {rhythmid.__version__}
+    assert len(manifests) == 3
+
+
+def test_what_the_makefile_offers_is_what_the_readme_names():
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    for target in re.findall(r"`?make ([a-z]+)", readme):
+        assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
