@@ -81,7 +81,7 @@ def impulse_preserving(held: PPoly) -> PPoly:
     grid = np.concatenate([knots[0] + padding, knots, [knots[-1] + step]])
     level = np.concatenate([np.zeros(len(padding)), values])
     impulse = np.concatenate([[0.0], np.cumsum(level * np.diff(grid))])
-    slopes = CubicSpline(grid, impulse, bc_type=((1, 0.0), (1, float(values[-1])))).derivative()
+    slopes = CubicSpline(grid, impulse, bc_type=((1, 0.0), (1, float(values[-1])))).derivative()  # pyright: ignore[reportArgumentType]
     return PPoly(slopes.c, slopes.x, extrapolate=True)
 
 
