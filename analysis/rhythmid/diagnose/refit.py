@@ -22,7 +22,7 @@ from rhythmid.parallel import fork_map
 from rhythmid.simulate import start_states
 
 Array = NDArray[np.float64]
-BRIEF, THOROUGH = 8, 25  # iterations
+BRIEF, THOROUGH = 6, 20  # iterations
 PROMISING = 0.5  # share of the spread of chi2 within which a model is carried to convergence
 
 

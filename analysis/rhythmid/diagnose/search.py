@@ -5,6 +5,7 @@ the best if it is worth its parameters. Afterwards every element must defend its
 a simpler member of its family, and, where there are several, against the other candidates.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.compiled import compile_model
-from rhythmid.diagnose.refit import Proposal, Trial, propose, run_trials, under_noise, whole_fit
+from rhythmid.diagnose.refit import Proposal, Trial, fine_enough, propose, run_trials, under_noise, whole_fit
 from rhythmid.diagnose.screen import (
     Change,
     Score,
@@ -26,6 +27,7 @@ from rhythmid.diagnose.screen import (
     under,
 )
 from rhythmid.elements.catalogue import Catalogue
+from rhythmid.identify.free_run import accurate
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.output_error import Fit, noise_of
 from rhythmid.identify.series import Series, scales
@@ -42,6 +44,8 @@ REFITTED = (
     6  # elements of a round that are refitted; the right one was among the first five in all of 234 trials
 )
 MOST = 4  # effects at once
+MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
+RIVALS = 4  # elements that scored best at first, tried again in the place of each of several effects
 
 
 @dataclass(frozen=True)
@@ -123,11 +127,11 @@ def _proposals(
     chosen = _distinct(scores, count)
     made, enough = [], []
     for best, group in chosen:
-        starts = [one.start for one in group[:3]]
-        if best.element.size:
-            starts.append(dict(group[0].values))
-        made.append(propose(base, best.element, starts[:4], added))
-        enough.append(chi2 - 0.9 * best.statistic)
+        starts = [one.start for one in group[: 3 if len(group) > MANY else 2]]
+        if not 0.2 < abs(best.size) < 5.0:  # far from the guess that was scored, the size is an extrapolation
+            starts.insert(1, dict(best.values))
+        made.append(propose(base, best.element, starts[:3], added))
+        enough.append(chi2 - 0.8 * best.statistic)
     return made, enough
 
 
@@ -159,8 +163,9 @@ def search(
     best = base
     rounds, excluded = [first], []
     now = first
-    while now.p_value < LEVEL and len(best.added) < most:
-        proposals, enough = _proposals(best.model, best.added, now.scores, REFITTED, best.chi2)
+    while now.p_value < LEVEL and _could_pay(now, best) and len(best.added) < most:
+        count = REFITTED if not best.added else REFITTED - 2
+        proposals, enough = _proposals(best.model, best.added, now.scores, count, best.chi2)
         tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
         found, failed = run_trials(
             proposals, series, best.starts, current.run.compiled.layout.states, noise, step, enough
@@ -171,6 +176,10 @@ def search(
         trials |= {tuple(sorted(t.added)): t for t in found}
         top = found[0]
         fit = whole_fit(top, series, noise, step, pool=pool)
+        finer = accurate(fit.run, fit.model, fit.starts, 0.1 * fit.noise.variance**0.5, 3)
+        if finer.max_step < 0.45 * fine_enough(top.model, step):
+            step = finer.max_step
+            fit = whole_fit(replace(top, converged=False), series, noise, step, pool=pool)
         settled = noise_of(fit, floor=floor)
         compared = under_noise(
             [t for t in found if t.bic() - top.bic() < 60.0] + [best], series, settled, step
@@ -202,6 +211,11 @@ def search(
     )
 
 
+def _could_pay(now: Round, best: Trial) -> bool:
+    """Whether the best score, which can understate what a refit gains, is of the order that an element has to earn."""
+    return now.scores[0].statistic > 0.5 * (WORTH + math.log(max(best.samples, 2)))
+
+
 def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial, count: int = 10) -> list[Trial]:
     """The models worth comparing at the end: the nominal one, the chosen one and its nearest rivals."""
     rivals = sorted(trials.values(), key=lambda t: t.bic())[:count]
@@ -220,43 +234,54 @@ def _defend(
     rounds: Sequence[Round],
     tell: Tell,
 ) -> tuple[Trial, dict[tuple[str, ...], Trial]]:
-    """Let every added element defend its place; returns the survivor and the models that were tried on the way."""
+    """Let every added element defend its place; returns the survivor and the models that were tried on the way.
+
+    First whether it can be left out, then whether another one does better in its place: a simpler member of its family,
+    or, where there are several effects, an element that scored well before the others were known.
+    """
     tried: dict[tuple[str, ...], Trial] = {}
-    known = _states(best)
-    for _ in range(3):
-        proposals: list[Proposal] = []
-        for label in best.added:
-            rest = tuple(name for name in best.added if name != label)
-            slim = best.model.without(label)
-            if len(best.added) > 1:
-                proposals.append(Proposal(rest, slim, ({},)))
-            term = best.model.term(label)
-            assert term is not None
-            names = {
-                e.name for e in catalogue.values() if term.element.name in e.special_case_of and e.candidate
-            }
-            if len(best.added) > 1:
-                names |= {s.element.name for r in rounds for s, _ in _distinct(r.scores, 4)}
-            for name in sorted(names - {best.model.term(x).element.name for x in best.added}):  # type: ignore[union-attr]
-                starts = _starts_for(catalogue, name, series, slim, rounds)
-                if starts and tuple(sorted((*rest, name))) not in trials:
-                    proposals.append(propose(slim, catalogue[name], starts, rest))
-        proposals = [p for p in proposals if tuple(sorted(p.added)) not in tried]
-        if not proposals:
+
+    def run(proposals: list[Proposal]) -> list[Trial]:
+        fresh = [p for p in proposals if tuple(sorted(p.added)) not in tried]
+        if not fresh:
+            return []
+        tell(f"testing {', '.join(' + '.join(p.added) for p in fresh)}")
+        found, _ = run_trials(fresh, series, best.starts, _states(best), noise, step)
+        tried.update({tuple(sorted(t.added)): t for t in found})
+        return found
+
+    while len(best.added) > 1:
+        dropped = run(
+            [Proposal(_rest(best, label), best.model.without(label), ({},)) for label in best.added]
+        )
+        kept = [t for t in dropped if t.bic() < best.bic() + WORTH]
+        if not kept:
             break
-        tell(f"testing {len(proposals)} simpler or other models")
-        found, _ = run_trials(proposals, series, best.starts, known, noise, step)
-        tried |= {tuple(sorted(t.added)): t for t in found}
-        simpler = [t for t in [*found, *trials.values()] if t.added and _simpler(t, best)]
-        better = [
-            t for t in found if t.bic() < best.bic() - (0.0 if len(t.added) <= len(best.added) else WORTH)
-        ]
-        options = sorted(simpler + better, key=lambda t: (len(t.added), t.free, t.bic()))
-        if not options:
-            break
-        best = min(better, key=lambda t: t.bic()) if better else options[0]
-        known = _states(best)
+        best = min(kept, key=lambda t: t.bic())
+    swaps: list[Proposal] = []
+    for label in best.added:
+        element = best.model.term(label).element  # type: ignore[union-attr]
+        names = {e.name for e in catalogue.values() if element.name in e.special_case_of and e.candidate}
+        if len(best.added) > 1:
+            names |= {score.element.name for score, _ in _distinct(rounds[0].scores, RIVALS)}
+        rest = _rest(best, label)
+        slim = best.model.without(label)
+        for name in sorted(names - {best.model.term(x).element.name for x in best.added}):  # type: ignore[union-attr]
+            starts = _starts_for(catalogue, name, series, slim, rounds)
+            if starts and tuple(sorted((*rest, name))) not in trials:
+                swaps.append(propose(slim, catalogue[name], starts, rest))
+    found = run(swaps)
+    simpler = [t for t in [*found, *trials.values()] if t.added and _simpler(t, best)]
+    better = [t for t in found if t.bic() < best.bic()]
+    if better:
+        best = min(better, key=lambda t: t.bic())
+    elif simpler:
+        best = min(simpler, key=lambda t: (t.free, t.bic()))
     return best, tried
+
+
+def _rest(trial: Trial, label: str) -> tuple[str, ...]:
+    return tuple(name for name in trial.added if name != label)
 
 
 def _simpler(trial: Trial, best: Trial) -> bool:
