@@ -56,7 +56,7 @@ def proof(
 
         def report(news) -> None:
             if isinstance(news, Sealed):
-                progress.console.print(f"{news.case}  sealed  {news.sha256}", highlight=False)
+                progress.console.print(f"{news.case}  sealed  {news.sha256}", highlight=False, soft_wrap=True)
                 return
             progress.advance(bar)
             answer = " + ".join(news.named) or news.verdict
@@ -64,13 +64,14 @@ def proof(
                 f"{news.case}  {news.outcome:10s}  {' + '.join(news.true) or 'nothing'}  →  {answer}"
                 f"  ({news.faintest:.2f} σ, {news.seconds:.0f} s)",
                 highlight=False,
+                soft_wrap=True,
             )
 
         failures = carry_out(out, tasks, jobs, report, keep)
     write_card(out, campaign)
     console.print(Markdown((out / "proof.md").read_text(encoding="utf-8")))
     for name, failure in failures.items():
-        console.print(f"[red]{name} could not be done:[/] {failure}", highlight=False)
+        console.print(f"[red]{name} could not be done:[/] {failure}", highlight=False, soft_wrap=True)
     console.print(f"{out / 'proof.md'}, {out / 'proof.json'}")
     if failures:
         raise typer.Exit(1)

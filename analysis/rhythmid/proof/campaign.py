@@ -63,9 +63,9 @@ class Campaign:
         if self.kind != "all":
             return [Task(self.seed, self.kind, index) for index in range(self.cases)]  # type: ignore[arg-type]
         whole = sum(SHARES.values())
-        order = [kind for kind in KINDS for _ in range(SHARES[kind])]
+        order: list[Kind] = [kind for kind in KINDS for _ in range(SHARES[kind])]
         found: list[Task] = []
-        counts = dict.fromkeys(KINDS, 0)
+        counts: dict[Kind, int] = dict.fromkeys(KINDS, 0)
         for number in range(self.cases):
             kind = order[(number * 3) % whole]  # 3 and the sum of the shares have no common divisor
             found.append(Task(self.seed, kind, counts[kind]))
