@@ -18,6 +18,7 @@ class Topic:
     encoding: str = "cdr"
     definition: str = ""
     definition_format: str = ""  # "ros2msg", "ros2idl" or ""
+    qos: str = ""  # offered QoS profiles, YAML, as the bag stores them
 
 
 Wanted = Callable[[Topic], bool]

@@ -1,6 +1,6 @@
 """Fields of a bag's messages as arrays: by layout where all messages of a block have the same, one by one elsewhere."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from rosbags.serde import SerdeError
 
 from rhythmid.errors import InputError
-from rhythmid.record.bag import Bag
 from rhythmid.record.block import Block, Topic
 from rhythmid.record.field import Field
 from rhythmid.record.layout import Layout, Unsupported, value_of
@@ -25,6 +24,7 @@ class Columns:
     stamp_ns : int64[n], its header's stamp [ns]; None if the type has none.
     values : field -> float64[n]; NaN also where `missing`.
     missing : field -> bool[n], whether the message has no such entry (a joint that it does not list).
+    reason : field -> why the first message without the entry has none.
     singly : number of messages that had to be deserialised one by one.
     """
 
@@ -33,6 +33,7 @@ class Columns:
     stamp_ns: NDArray[np.int64] | None
     values: Mapping[Field, NDArray[np.float64]]
     missing: Mapping[Field, NDArray[np.bool_]]
+    reason: Mapping[Field, str]
     singly: int = 0
 
 
@@ -47,6 +48,7 @@ class _Reader:
     log_ns: list[NDArray[np.int64]] = field(default_factory=list)
     rows: list[NDArray[np.float64]] = field(default_factory=list)  # float64[fields, n] each
     missing: list[NDArray[np.bool_]] = field(default_factory=list)
+    reason: dict[Field, str] = field(default_factory=dict)
     singly: int = 0
 
     def __post_init__(self) -> None:
@@ -103,8 +105,9 @@ class _Reader:
             for row, path in enumerate(self.paths):
                 try:
                     rows[row, column] = value_of(message, path)
-                except LookupError:
+                except LookupError as error:
                     missing[row, column] = True
+                    self.reason.setdefault(path, str(error))
         return rows, missing
 
     def columns(self) -> Columns:
@@ -120,20 +123,24 @@ class _Reader:
             stamp_ns,
             dict(zip(self.fields, rows, strict=False)),
             dict(zip(self.fields, missing, strict=False)),
+            self.reason,
             self.singly,
         )
 
 
-def read_columns(bag: Bag, wanted: Mapping[str, Sequence[Field]], direct: bool = True) -> dict[str, Columns]:
-    """Read fields of the topics `wanted` (topic -> fields) in one pass over the bag.
+def read_columns(
+    blocks: Iterable[Block], wanted: Mapping[str, Sequence[Field]], direct: bool = True
+) -> dict[str, Columns]:
+    """Read fields of the topics `wanted` (topic -> fields) in one pass over the blocks of a bag.
 
-    `direct=False` deserialises every message one by one, with the same result. Topics without messages are left out;
-    `bag.topics` tells them from those that the bag does not have. Raises InputError when a type or field is unknown.
+    `direct=False` deserialises every message one by one, with the same result. Topics without messages are left out.
+    Raises InputError when a type or field is unknown.
     """
     readers: dict[str, _Reader] = {}
-    for block in bag.blocks(lambda topic: topic.name in wanted):
+    for block in blocks:
         name = block.topic.name
-        if name not in readers:
-            readers[name] = _Reader(block.topic, tuple(wanted[name]), direct)
-        readers[name].add(block)
+        if name in wanted:
+            if name not in readers:
+                readers[name] = _Reader(block.topic, tuple(wanted[name]), direct)
+            readers[name].add(block)
     return {name: reader.columns() for name, reader in readers.items()}

@@ -70,8 +70,7 @@ class Layout:
             self.root: dict[str, Any] = self._part(msgtype)
         except (struct.error, KeyError, UnicodeDecodeError) as error:
             raise Unsupported(str(error)) from None
-        self.end = self._at
-        if self.end > len(message):
+        if self._at > len(message):
             raise Unsupported("the message is too short")
 
     def _align(self, size: int) -> None:
@@ -137,16 +136,18 @@ class Layout:
                 here = here[step]
         return here, names
 
-    def fits(self, block: Block, names: list[Text]) -> bool:
-        """Whether all messages of the block have this layout and the same `names`."""
-        if int(block.size.min()) < self.end:
+    def fits(self, block: Block, numbers: list[Number], names: list[Text]) -> bool:
+        """Whether `numbers` stand at the same place in all messages of the block, by the same `names`.
+
+        Only the length words in front of the last number matter; what follows it may vary.
+        """
+        end = max((number.at + np.dtype(number.dtype).itemsize for number in numbers), default=HEAD)
+        if int(block.size.min()) < end:
             return False
-        constant = [(0, "<u2", LITTLE_ENDIAN)] + [(at, "<u4", value) for at, value in self.words]
+        constant = [(0, "<u2", LITTLE_ENDIAN)] + [(at, "<u4", value) for at, value in self.words if at < end]
         for name in dict.fromkeys(names):
             constant += [(name.at + i, "u1", self._message[name.at + i]) for i in range(name.size)]
-        return all(
-            (gather(block.buffer, block.start + at, kind) == value).all() for at, kind, value in constant
-        )
+        return all((gather(block.buffer, block.start + at, kind) == value).all() for at, kind, value in constant)
 
     @staticmethod
     def read(block: Block, number: Number) -> NDArray[np.float64]:
@@ -168,15 +169,19 @@ def _position(name: str, above: list[dict[str, Any]]) -> tuple[int, list[Text]]:
 
 
 def value_of(message: Any, field: Field) -> float:
-    """The number that `field` means in a deserialised message. Raises LookupError when it has no such entry."""
+    """The number that `field` means in a deserialised message. Raises LookupError, saying why, if there is none."""
     here = message
     above: list[Any] = []
+    done = ""
     for step in field.steps:
         if isinstance(step, tuple):
             step = _index_of(step[0], above)
         if isinstance(step, str):
             above.append(here)
             here = getattr(here, normalize_fieldname(step))
+            done = step
+        elif step >= len(here):
+            raise LookupError(f"{done} has {len(here)} entries")
         else:
             here = here[step]
     return float(here)
@@ -188,6 +193,6 @@ def _index_of(name: str, above: list[Any]) -> int:
             listed = getattr(part, key, None)
             if isinstance(listed, list):
                 if name not in listed:
-                    raise LookupError(name)
+                    raise LookupError(f"it names {', '.join(map(str, listed)) or 'nothing'}, but not {name}")
                 return listed.index(name)
-    raise LookupError(name)
+    raise LookupError(f"it has no entry called {name}")

@@ -69,7 +69,7 @@ class McapReader:
         while at + 9 <= end:
             op, size = unpack(data, at)
             following = at + 9 + size
-            if following > end or len(found) >= _MESSAGE_BATCH and data is self._data:
+            if following > end or (len(found) >= _MESSAGE_BATCH and data is self._data):
                 break
             if op == MESSAGE:
                 add(at)
@@ -127,9 +127,14 @@ class McapReader:
         if number in self._channels:
             return
         name, at = _text(body, 4)
-        encoding, _ = _text(body, at)
+        encoding, at = _text(body, at)
+        metadata, at = {}, at + 4
+        while at < len(body):
+            key, at = _text(body, at)
+            metadata[key], at = _text(body, at)
         msgtype, form, definition = self._schemas.get(schema, ("", "", ""))
-        self._channels[number] = Topic(name, msgtype, encoding, definition, form)
+        qos = metadata.get("offered_qos_profiles", "")
+        self._channels[number] = Topic(name, msgtype, encoding, definition, form, qos)
         self.topics[name] = self._channels[number]
 
 

@@ -78,8 +78,10 @@ def _topics(database: sqlite3.Connection) -> dict[int, Topic]:
     if "message_definitions" in tables:
         query = "SELECT topic_type, encoded_message_definition, encoding FROM message_definitions"
         definitions = {name: (definition, form) for name, definition, form in database.execute(query)}
-    query = "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
+    stored = {column[1] for column in database.execute("PRAGMA table_info(topics)")}
+    qos = "offered_qos_profiles" if "offered_qos_profiles" in stored else "''"
+    query = f"SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id"
     return {
-        number: Topic(name, msgtype, encoding, *definitions.get(msgtype, ("", "")))
-        for number, name, msgtype, encoding in database.execute(query)
+        number: Topic(name, msgtype, encoding, *definitions.get(msgtype, ("", "")), profiles)
+        for number, name, msgtype, encoding, profiles in database.execute(query)
     }
