@@ -1,6 +1,9 @@
 """What the unit tests share: the paper's hopper, and any element added to it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -8,7 +11,9 @@ from scipy.interpolate import PPoly
 
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.elements.element import Scales
+from rhythmid.experiment import Experiment, perform
 from rhythmid.model import Model
+from rhythmid.record.record import Channel, Record
 from rhythmid.signal import zero_order_hold
 from rhythmid.simulate import Trajectory, simulate
 
@@ -86,3 +91,41 @@ def rig(catalogue: Catalogue) -> Rig:
 @pytest.fixture(scope="session")
 def scales() -> Scales:
     return SCALES
+
+
+PAPER_EXPERIMENT = """
+model: paper_hopper.yaml
+excitation: {{type: chirp, amplitude: {amplitude}, band: [0, 7], sweep: 30.0, repetitions: 9, warm_up: {warm_up},
+             shift: {{period: 1.0, count: 9}}}}
+forcing: {{amplitude: 1.0, frequency: 1.0, phase: {phase}}}
+delays: {{input: {delays[0]}, measurement: {delays[1]}}}
+noise: {{measurement_std: {noise}}}
+"""
+
+
+@pytest.fixture(scope="session")
+def paper_record() -> Callable[..., Record]:
+    """The paper's experiment as a user of the robot sees it, by delays (τ_u, τ_y), noise [m], phase of the forcing, …"""
+
+    @lru_cache(maxsize=16)
+    def made(
+        delays: tuple[float, float] = (0.04, 0.05),
+        noise: float = 0.0,
+        phase: float = 0.0,
+        amplitude: float = 0.004,
+        warm_up: int = 1,
+    ) -> Record:
+        text = PAPER_EXPERIMENT.format(delays=delays, noise=noise, phase=phase, amplitude=amplitude, warm_up=warm_up)
+        topics = perform(Experiment.from_text(text, str(files("rhythmid") / "models")))
+
+        def channel(topic: str, field: str, unit: str) -> Channel:
+            return Channel(topics[topic].stamp_ns * 1e-9, getattr(topics[topic], field), unit)
+
+        return Record(
+            "paper",
+            channel("joint_states", "position", "m"),
+            channel("excitation", "effort", "N"),
+            channel("forcing", "effort", "N"),
+        )
+
+    return made

@@ -238,7 +238,12 @@ def _covariance(jacobian: Array, priors: Sequence) -> Array:
 
 def noise_of(fit: Fit, floor: float = 0.0) -> NoiseModel:
     """Noise model of a fit's residuals over the averages that were used."""
-    stretches = [r[s] for r, one in zip(fit.residuals, fit.run.series) for s in runs(one.used)]
+    stretches = []
+    for residual, one in zip(fit.residuals, fit.run.series):
+        if one.ignored is not None:
+            columns = one.ignored[one.used]
+            residual = residual - one.ignored @ np.linalg.lstsq(columns, residual[one.used], rcond=1e-12)[0]
+        stretches += [residual[s] for s in runs(one.used)]
     return estimate_noise(stretches, floor=floor)
 
 

@@ -13,6 +13,7 @@ from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
+DEAD = 1e-5  # share of a sensitivity, below which what the projection leaves of it is taken for rounding
 
 
 @dataclass(frozen=True)
@@ -39,11 +40,18 @@ class Problem:
         self.stretches = [
             [s for s in runs(one.used) if s.stop - s.start > noise.order + 1] for one in run.series
         ]
+        self.ignored = [
+            None if one.ignored is None else _basis(self._white(i, one.ignored)) for i, one in enumerate(run.series)
+        ]
 
-    def whitened(self, index: int, samples: Array) -> Array:
-        """Used stretches of series `index`, whitened and joined; (n,) or (n, q)."""
+    def _white(self, index: int, samples: Array) -> Array:
         parts = [self.noise.whiten(samples[s]) for s in self.stretches[index]]
         return np.concatenate(parts) if parts else samples[:0]
+
+    def whitened(self, index: int, samples: Array) -> Array:
+        """Used stretches of series `index`, whitened and joined, what is ignored projected out; (n,) or (n, q)."""
+        white, ignored = self._white(index, samples), self.ignored[index]
+        return white if ignored is None else white - ignored @ (ignored.T @ white)
 
     def residuals(self, model: Model, starts: Sequence[Array]) -> list[Array] | None:
         outputs = self.run.outputs(model, starts)
@@ -180,6 +188,9 @@ class Problem:
             joined = np.vstack([white, known])
             basis = _basis(joined[:, 1 + p :])
             projected = joined[:, : 1 + p] - basis @ (basis.T @ joined[:, : 1 + p])
+            if self.ignored[index] is not None:  # what is left of a parameter that acts as the ignored is rounding
+                whole = np.linalg.norm(self._white(index, change[:, :p]), axis=0)
+                projected[:, 1:][:, np.linalg.norm(projected[:, 1:], axis=0) < DEAD * whole] = 0.0
             rows.append(projected[: len(white), 0])
             columns.append(projected[: len(white), 1:])
             bases.append(basis[: len(white)])

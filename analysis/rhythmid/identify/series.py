@@ -29,6 +29,8 @@ class Series:
 
     `time` (n,) [s] and `value` (n,) are the stamps and samples of the measurement; `block` samples are averaged into
     one; `used` (n // block,) marks the averages that the fit may see; `period` [s] is the usual sample period.
+    `ignored` (n // block, q) are signals any multiple of which the averages may contain, so that nothing is learnt from
+    them (the limit cycle's harmonics, where the cycle is not to be used).
     """
 
     name: str
@@ -40,6 +42,7 @@ class Series:
     used: Mask
     period: float
     kind: InputKind = "force"
+    ignored: Array | None = None
 
     @property
     def blocks(self) -> int:

@@ -1,0 +1,120 @@
+"""What is found in records: parameters, delays, HTFs, each with its uncertainty, and on which assumptions.
+
+`Identification.to_dict` is the contract of `rhythmid identify --json`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.identify.paper import PaperResult
+from rhythmid.ltp.htf import HarmonicTransferFunctions
+from rhythmid.model import Model
+from rhythmid.record.record import Record
+
+Array = NDArray[np.float64]
+POINTS = 600  # of an HTF that are written out at most
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with its standard deviation; `value` None where the question has no answer."""
+
+    value: float | None
+    std: float | None
+    unit: str
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"value": self.value, "std": self.std, "unit": self.unit}
+
+
+@dataclass(frozen=True)
+class Delays:
+    """Input delay τ_u, measurement delay τ_y and their sum [s].
+
+    `separable` tells whether the two can be told apart; if not they have no value. `assumption` is what the split rests
+    on. `closure` is (limit-cycle phase + sideband offset − slope of G_0) in its standard deviations, which a right model
+    keeps near zero; None where one of the three cannot be had. `aliases` are further pairs that fit as well.
+    """
+
+    input: Estimate
+    measurement: Estimate
+    sum: Estimate
+    separable: bool
+    assumption: str
+    closure: float | None = None
+    aliases: tuple[tuple[float, float], ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "input": self.input.to_dict(),
+            "measurement": self.measurement.to_dict(),
+            "sum": self.sum.to_dict(),
+            "separable": self.separable,
+            "assumption": self.assumption,
+            "closure": {"z": self.closure},
+            "aliases": [list(pair) for pair in self.aliases],
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """The answer to `rhythmid identify`.
+
+    Attributes
+    ----------
+    model : the model with all estimates in it, delays included.
+    parameters : estimates by "element.parameter".
+    delays : of the command and measurement paths.
+    harmonics : Ĥ_m found in the first record, with standard deviations; `reached` bool[h, n] where they mean something.
+    paper : the paper's method, record by record.
+    quality : rate [Hz], gaps, jitter_std [s], nrmse and what else tells how far to trust the rest.
+    notes : what the user should know, one line each.
+    """
+
+    model: Model
+    records: tuple[Record, ...]
+    parameters: Mapping[str, Estimate]
+    delays: Delays
+    harmonics: HarmonicTransferFunctions
+    reached: NDArray[np.bool_]
+    paper: tuple[PaperResult, ...]
+    quality: Mapping[str, Any]
+    notes: tuple[str, ...] = field(default_factory=tuple)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON of `identify --json`; plain numbers, lists and strings."""
+        return {
+            "parameters": {name: estimate.to_dict() for name, estimate in self.parameters.items()},
+            "delays": self.delays.to_dict(),
+            "harmonics": list(self._harmonics()),
+            "methods": {"paper": {harmonic_name(m): d.to_dict() for m, d in self.paper[0].delays.items()}},
+            "quality": dict(self.quality),
+            "notes": list(self.notes),
+        }
+
+    def _harmonics(self) -> Sequence[dict[str, Any]]:
+        found = []
+        for row, m in enumerate(self.harmonics.harmonics):
+            inside = np.flatnonzero(self.reached[row])
+            inside = inside[:: max(1, -(-len(inside) // POINTS))]
+            value = self.harmonics.value[row, inside]
+            std = np.full(len(inside), np.nan) if self.harmonics.std is None else self.harmonics.std[row, inside]
+            found.append(
+                {
+                    "m": int(m),
+                    "frequency": self.harmonics.frequency[inside].tolist(),
+                    "magnitude": np.abs(value).tolist(),
+                    "phase": np.angle(value).tolist(),
+                    "std": std.tolist(),
+                }
+            )
+        return found
+
+
+def harmonic_name(m: int) -> str:
+    """G0, G-1, G+1, …"""
+    return "G0" if m == 0 else f"G{m:+d}"

@@ -1,0 +1,206 @@
+"""Identify a model and its delays from records."""
+
+import math
+from collections.abc import Iterator, Sequence
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.errors import InputError
+from rhythmid.identify.delay_fit import DelayEstimate
+from rhythmid.identify.identification import Delays, Estimate, Identification
+from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
+from rhythmid.ltp.pumping import Pumping, pumping_of
+from rhythmid.model import Model
+from rhythmid.record.record import Record
+from rhythmid.signal import continuous, spline
+from rhythmid.simulate import simulate
+
+Array = NDArray[np.float64]
+ON_ROBOT = "the forcing acts on the machine undelayed"
+ASSUMPTIONS = {
+    "forcing channel": f"{ON_ROBOT}, and the recorded forcing has the phase that acts, on the clock of the measurements",
+    "stated formula": f"{ON_ROBOT}, with the phase stated for it in the record's time",
+    "model": f"{ON_ROBOT}, with the phase that the model's periodic_forcing has in the record's time; it was not recorded",
+}
+LEAKAGE = 0.05  # above which a record's leakage is told
+MISFIT = 0.1  # of the magnitudes above which the fit is called into question
+NO_FORCING = "no forcing is known, so nothing tells when the machine's cycle is at which phase"
+
+
+def paper_hopper() -> Model:
+    """The model that is used where none is given: the paper's hopper, equation (10)."""
+    text = (files("rhythmid") / "models" / "paper_hopper.yaml").read_text(encoding="utf-8")
+    return Model.from_text(text, "paper_hopper.yaml")
+
+
+def forced_by(model: Model, record: Record) -> tuple[Model, Pumping]:
+    """The pumping of a record and the model without a forcing of its own.
+
+    The record's forcing wins over the model's `periodic_forcing`. Where neither is there the machine is taken as not
+    forced.
+    """
+    own = [term for term in model.terms if term.element.name == "periodic_forcing"]
+    for term in own:
+        model = model.without(term.label)
+    pumping = pumping_of(record)
+    if pumping is None and own:
+        values = {name: value.value for name, value in own[0].values.items()}
+        if values["frequency"] > 0.0:
+            pumping = Pumping.cosine(values["amplitude"], values["frequency"], values["phase"], "model")
+    return model, pumping or Pumping(1.0, np.zeros(2, dtype=complex), 0.0, "none")
+
+
+def with_delays(model: Model, input_delay: float, measurement_delay: float) -> Model:
+    """The model with these transport delays [s], whose elements are added where it lacks them."""
+    catalogue = load_catalogue() if not {"input_delay", "measurement_delay"} <= {t.label for t in model.terms} else None
+    for label, delay in (("input_delay", input_delay), ("measurement_delay", measurement_delay)):
+        if model.term(label) is None:
+            assert catalogue is not None
+            model = model.with_element(catalogue[label], {"delay": delay})
+        else:
+            model = model.with_values({f"{label}.delay": delay})
+    return model
+
+
+def free_run_nrmse(model: Model, record: Record, start: Array) -> float:
+    """rms(simulated − measured) / std(measured) in free-run simulation from the state `start` at the first sample."""
+    command = None if record.input is None else continuous(record.input.time, record.input.value, record.hold)
+    forcing = None if record.forcing is None else spline(record.forcing.time, record.forcing.value)
+    simulated = simulate(model, record.output.time, command, forcing, start).output
+    return float(np.sqrt(np.mean((simulated - record.output.value) ** 2)) / np.std(record.output.value))
+
+
+def _combined(estimates: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Mean of independent (value, std), each weighed by its variance."""
+    if len(estimates) == 1:
+        return estimates[0]
+    values = np.array([value for value, _ in estimates])
+    weight = np.array([1.0 / max(std, 1e-300) ** 2 if math.isfinite(std) else 0.0 for _, std in estimates])
+    if weight.sum() == 0.0:
+        return float(values.mean()), math.inf
+    return float(weight @ values / weight.sum()), float(1.0 / math.sqrt(weight.sum()))
+
+
+def _cycle_delay(result: PaperResult) -> float:
+    """Measurement delay [s], modulo the period, by which the limit cycle's fundamental lags behind the model's."""
+    model = result.fit.linearised.cycle.harmonics(1)[1]
+    return float(-np.angle(result.spectra.cycle[1] / model) / result.pumping.omega)
+
+
+def _closure(result: PaperResult, combined: DelayEstimate) -> float | None:
+    """(A + C − B) / std with A the limit cycle's phase, C the sidebands' offset, B the slope of G_0."""
+    whole, sided = result.delays.get(0), [d for m, d in result.delays.items() if m != 0]
+    if whole is None or not sided or combined.input is None or combined.measurement is None:
+        return None
+    best = min(sided, key=lambda d: d.input_std or math.inf)
+    assert best.input is not None and best.input_std is not None
+    period = result.pumping.period
+    gap = _cycle_delay(result) + best.input - whole.sum
+    gap = (gap + 0.5 * period) % period - 0.5 * period
+    return gap / math.hypot(best.input_std, whole.sum_std)
+
+
+def _delays(results: Sequence[PaperResult], source: str) -> Delays:
+    def estimate(pairs: Sequence[tuple[float, float]]) -> Estimate:
+        return Estimate(*_combined(pairs), "s")
+
+    nothing = Estimate(None, None, "s")
+    found = [result.combined for result in results]
+    if source == "none" or any(one is None for one in found):
+        total = estimate([(result.delays[0].sum, result.delays[0].sum_std) for result in results])
+        return Delays(nothing, nothing, total, False, NO_FORCING)
+    pairs = [one for one in found if one is not None]
+    return Delays(
+        estimate([(one.input or 0.0, one.input_std or 0.0) for one in pairs]),
+        estimate([(one.measurement or 0.0, one.measurement_std or 0.0) for one in pairs]),
+        estimate([(one.sum, one.sum_std) for one in pairs]),
+        True,
+        ASSUMPTIONS.get(source, ON_ROBOT),
+        _closure(results[0], pairs[0]),
+        pairs[0].aliases,
+    )
+
+
+def identify(
+    records: Record | Sequence[Record], model: Model | None = None, harmonics: int = HARMONICS
+) -> Identification:
+    """Identify a model's free parameters and its delays from records.
+
+    Parameters
+    ----------
+    records : one or more recordings of the same machine.
+    model : what is known of it; the paper's hopper where None.
+    harmonics : M, sidebands on either side that are estimated.
+
+    Raises InputError when a record has no input, is shorter than a period, or the model has no limit cycle.
+    """
+    given = (records,) if isinstance(records, Record) else tuple(records)
+    if not given:
+        raise InputError("nothing to identify from: give at least one record")
+    nominal = model or paper_hopper()
+    results: list[PaperResult] = []
+    pumpings: list[Pumping] = []
+    for record in given:
+        own, pumping = forced_by(nominal, record)
+        results.append(paper_method(record, own, pumping, harmonics if pumping.active else 0))
+        pumpings.append(pumping)
+    first = results[0]
+    units = first.fit.model.parameters
+    parameters = {
+        name: Estimate(*_combined([(r.fit.values[i], r.fit.std[name]) for r in results]), units[name].unit)
+        for i, name in enumerate(first.fit.names)
+    }
+    delays = _delays(results, pumpings[0].source)
+    fitted = first.fit.model.with_values({n: e.value for n, e in parameters.items() if e.value is not None})
+    if delays.separable:
+        assert delays.input.value is not None and delays.measurement.value is not None
+        fitted = with_delays(fitted, delays.input.value, delays.measurement.value)
+    else:  # what a simulation needs is the sum, wherever it stands
+        fitted = with_delays(fitted, delays.sum.value or 0.0, 0.0)
+    return Identification(
+        fitted, given, parameters, delays, first.estimate.htf, first.estimate.reached, tuple(results),
+        _quality(fitted, given, results), tuple(note for r, one in zip(given, results) for note in _notes(r, one)),
+    )  # fmt: skip
+
+
+def _notes(record: Record, result: PaperResult) -> Iterator[str]:
+    """What should make a user doubt the paper's method here."""
+    window, operator = result.spectra.window, result.estimate.operator
+    if window.leakage > LEAKAGE:
+        yield (
+            f"{record.name}: the command does not repeat over whole pumping periods, so its response leaks "
+            f"({window.leakage:.0%}): begin with a warm-up repetition, or leave silence at both ends"
+        )
+    apart = operator.spacing * operator.spectra.resolution
+    if apart * np.pi * result.fit.linearised.cycle.ring_down > 1.0:
+        yield (
+            f"{record.name}: the excited frequencies are {apart:.3g} Hz apart, wider than the machine's resonance: HTFs "
+            "between them are interpolated; excite denser lines"
+        )
+    if result.fit.misfit > MISFIT:
+        yield f"{record.name}: the model leaves {result.fit.misfit:.0%} of the HTFs' magnitudes unexplained"
+
+
+def _quality(model: Model, records: Sequence[Record], results: Sequence[PaperResult]) -> dict[str, Any]:
+    channels = [record.quality for record in records]
+    nrmse = 0.0
+    for record, result in zip(records, results):
+        cycle, delay = result.fit.linearised.cycle, model.value("measurement_delay.delay")
+        begin = (record.output.time[0] - delay - result.pumping.origin) % result.pumping.period
+        nrmse = max(nrmse, free_run_nrmse(model, record, cycle.path(begin)))
+    first = results[0]
+    return {
+        "rate": 1.0 / records[0].output.period,
+        "gaps": sum(q.gaps for q in channels if q.channels),
+        "jitter_std": max((q.jitter_std for q in channels if q.channels), default=0.0),
+        "nrmse": nrmse,
+        "periods": first.spectra.window.periods,
+        "leakage": first.spectra.window.leakage,
+        "smoothing_window": first.estimate.operator.window,
+        "smoothing_loss": {f"{m:+d}": float(v) for m, v in zip(first.estimate.htf.harmonics, first.loss)},
+    }
+

@@ -1,0 +1,271 @@
+"""Joint maximum likelihood: parameters and both delays at once, from the nonlinear model, with the limit cycle as data.
+
+The fit itself is output error in the time domain on the full simulator: whitened, so efficient for Gaussian noise, and
+without the distortion that biases a linearised machine. What this file adds is a start that does not depend on the
+model's values (the harmonic likelihood, which sees delays as phases and tries them all), the choice of what counts as
+data, and the judgement whether the search arrived.
+"""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.errors import InputError
+from rhythmid.identify.harmonic_likelihood import DELAYS, INPUT_DELAY, MEASUREMENT_DELAY, harmonic_likelihood
+from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
+from rhythmid.identify.series import Series, dominant_frequency, prepare, split
+from rhythmid.ltp.pumping import Pumping, pumping_of
+from rhythmid.model import Model
+from rhythmid.record.record import Record
+
+Array = NDArray[np.float64]
+LONGEST = 0.5  # [s] delays that are looked for on either side, if not told otherwise
+STUCK = 0.5  # unexplained share (rms) of the response to the command, beyond which a fit is no answer
+POOR = 0.3  # the same of the whole motion
+CYCLE_HARMONICS = 24  # that are projected out where the limit cycle is not to be used
+NO_PUMPING = Pumping(1.0, np.zeros(2, dtype=complex), 0.0, "none")
+
+
+@dataclass(frozen=True)
+class Search:
+    """How well a fit explains its records: unexplained shares (rms) of the whole motion and of the response to the
+    command, and residual over noise floor. `arrived` is False where the search is stuck or the model does not fit."""
+
+    motion: float
+    response: float
+    over_noise: float
+
+    @property
+    def arrived(self) -> bool:
+        return self.motion < POOR and (self.response < STUCK or self.over_noise < 2.0)
+
+    def __str__(self) -> str:
+        return (
+            f"the fit leaves {self.motion:.1%} of the motion and {self.response:.0%} of the response to the command "
+            f"unexplained, {self.over_noise:.3g} times the noise floor"
+        )
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """The answer: the time-domain `fit`, its `pumping` (None without forcing) and the `search` that led there."""
+
+    fit: Fit
+    pumping: Pumping | None
+    search: Search
+
+    @property
+    def model(self) -> Model:
+        return self.fit.model
+
+
+def prepared_model(model: Model, records: Sequence[Record]) -> tuple[Model, Pumping | None]:
+    """The model with both delays, without a forcing that the records already hold; and the pumping of the first.
+
+    Both delays may come out negative by a sample and a half: noise scatters about zero, and an input that is not held
+    but simulated as held acts half a sample early.
+    """
+    catalogue = load_catalogue()
+    own = [term for term in model.terms if term.element.name == "periodic_forcing"]
+    recorded = [pumping_of(record) for record in records]
+    pumping = next((p for p in recorded if p is not None and p.active), None)
+    if any(p is not None for p in recorded):
+        for term in own:
+            model = model.without(term.label)
+    elif own:
+        values = {name: value.value for name, value in own[0].values.items()}
+        if values["frequency"] > 0.0 and values["amplitude"] != 0.0:
+            pumping = Pumping.cosine(values["amplitude"], values["frequency"], values["phase"], "model")
+    excited = any(record.input is not None and np.ptp(record.input.value) > 0.0 for record in records)
+    wanted = [MEASUREMENT_DELAY] if pumping is not None else []
+    wanted += [INPUT_DELAY] if excited else []
+    for name in wanted:
+        label = name.split(".")[0]
+        if model.term(label) is None:
+            model = model.with_element(catalogue[label], {"delay": 0.0})
+    if not excited and INPUT_DELAY in model.parameters:
+        value = model.parameters[INPUT_DELAY]
+        model = model.with_parameters({INPUT_DELAY: replace(value, fixed=True)})
+    slack = 1.5 * max(record.output.period for record in records)
+    bounds = {}
+    for name in DELAYS:
+        if name in model.free:
+            low, high = model.parameters[name].bounds
+            bounds[name] = (-slack if low == 0.0 else low, high)
+    return with_bounds(model, bounds), pumping
+
+
+def _without_forcing(model: Model) -> Model:
+    for term in model.terms:
+        if term.element.name == "periodic_forcing":
+            model = model.without(term.label)
+    return model
+
+
+def _begun(record: Record, delay: float) -> Record:
+    """The record from where the past of command and forcing, `delay` [s] ago, is known."""
+    known = [c.time[0] for c in (record.input, record.forcing) if c is not None and len(c) > 0]
+    first = int(np.searchsorted(record.output.time, max(known, default=-np.inf) + delay))
+    if first == 0 or first > len(record.output) // 2:
+        return record
+    output = record.output
+    return replace(record, output=replace(output, time=output.time[first:], value=output.value[first:]))
+
+
+def _cycle_columns(series: Series, pumping: Pumping) -> Array:
+    """Mean and harmonics of the limit cycle at the blocks' centres."""
+    highest = int(0.5 / (series.period * series.block * pumping.frequency)) - 1
+    n = np.arange(1, max(1, min(CYCLE_HARMONICS, highest)) + 1)
+    angle = np.multiply.outer(pumping.omega * series.centres, n)
+    return np.hstack([np.ones((len(angle), 1)), np.cos(angle), np.sin(angle)])
+
+
+def _explained(fit: Fit, pumping: Pumping | None) -> Search:
+    """Compare what the fit leaves with the motion, with the response to the command and with the noise."""
+    left = response = floor = count = 0.0
+    for one, residual in zip(fit.run.series, fit.residuals):
+        used = one.used
+        columns = np.ones((one.blocks, 1)) if pumping is None else _cycle_columns(one, pumping)
+        measured = one.averaged
+        if one.ignored is not None:
+            residual = residual - columns @ np.linalg.lstsq(columns[used], residual[used], rcond=1e-12)[0]
+        moved = measured - columns @ np.linalg.lstsq(columns[used], measured[used], rcond=1e-12)[0]
+        left += float(np.sum(residual[used] ** 2))
+        response += float(np.sum(moved[used] ** 2))
+        power = np.abs(np.fft.rfft(moved * np.hanning(len(moved)))) ** 2
+        high = power[int(0.6 * len(power)) :]
+        floor += float(np.mean(high)) * 2.0 * len(high) / 0.4 / 0.375 / len(moved)
+        count += float(used.sum())
+    explained = max(response - floor, 1e-300)
+    motion = fit.nrmse() if all(one.ignored is None for one in fit.run.series) else 0.0
+    least = max(floor, 1e-18 * response)
+    return Search(motion, float(np.sqrt(left / max(explained, 0.01 * response))), float(np.sqrt(left / least)))
+
+
+def _start(
+    model: Model, records: Sequence[Record], pumping: Pumping | None, longest: float, cycle: bool
+) -> list[Model]:
+    """Models with values from the harmonic likelihood of each record, best first; empty where it has nothing to see."""
+    found: list[tuple[float, Model]] = []
+    plain = _without_forcing(model)
+    for record in sorted(records, key=lambda r: -r.duration)[:3]:
+        if record.input is None or np.ptp(record.input.value) == 0.0 or record.input_kind == "base_displacement":
+            continue
+        try:
+            own = (pumping_of(record) or pumping) if pumping is not None else NO_PUMPING
+            fit = harmonic_likelihood(record, plain, own or NO_PUMPING, 3, cycle, longest, search=True)
+        except InputError:
+            continue
+        values = {name: v for name, v in zip(fit.names, fit.values) if name in model.free}
+        low = {name: model.parameters[name].bounds for name in values}
+        values = {name: float(np.clip(v, *low[name])) for name, v in values.items()}
+        found.append((fit.misfit, model.with_values(values)))
+        if fit.misfit < 0.2:
+            break
+    return [start for _, start in sorted(found, key=lambda pair: pair[0])]
+
+
+def _search_in_time(
+    model: Model, series: Sequence[Series], longest: float, pool: ThreadPoolExecutor | None
+) -> Fit:
+    """Fit without a start from the harmonics: short windows with starts of their own first, then delays far apart."""
+    length = 2.0 / max(dominant_frequency(one) for one in series)
+    windows = [part for one in series for part in split(one, length)]
+    best: Fit | None = None
+    failure: InputError | None = None
+    for attempt in (lambda: model, lambda: estimate(model, windows[:: max(1, len(windows) // 60)], iterations=12).model):
+        try:
+            trial = estimate(attempt(), series, pool=pool)
+        except InputError as error:
+            failure = error
+            continue
+        if best is None or _sum_of_squares(trial) < _sum_of_squares(best):
+            best = trial
+        if best.nrmse() < 0.1:
+            return best
+    if best is None:
+        assert failure is not None
+        raise failure
+    reached = best
+    for name in (n for n in DELAYS if n in best.names):
+        for delay in np.linspace(0.0, longest, 9)[1:]:
+            try:
+                trial = minimise(
+                    reached.model.with_values({name: delay}), reached.run, reached.names, reached.noise,
+                    reached.starts, 12, pool,
+                )  # fmt: skip
+            except InputError:
+                continue
+            if trial.chi2 < best.chi2:
+                best = trial
+    return best if best is reached else estimate(best.model, series, pool=pool)
+
+
+def _sum_of_squares(fit: Fit) -> float:
+    return sum(float(r @ r) for r in fit.residuals)
+
+
+def joint_likelihood(
+    records: Record | Sequence[Record],
+    model: Model,
+    cycle: bool = True,
+    longest: float = LONGEST,
+    block: int | None = None,
+    pool: ThreadPoolExecutor | None = None,
+) -> JointFit:
+    """Estimate all free parameters of the model and its delays from all records at once.
+
+    Parameters
+    ----------
+    records : recordings of the same machine.
+    model : what is known of it; its values may be far off.
+    cycle : whether the limit cycle is used as data; without it only the response to the command is.
+    longest : largest delay on either side [s] that is looked for.
+    block : samples that are averaged into one; None chooses by the bandwidth.
+
+    Raises InputError when the records have nothing to fit, and when the search did not arrive: a fit that is stuck is
+    never returned.
+    """
+    given = (records,) if isinstance(records, Record) else tuple(records)
+    if not given:
+        raise InputError("nothing to identify from: give at least one record")
+    model, pumping = prepared_model(model, given)
+    starts = _start(model, given, pumping, longest, cycle)
+    best: JointFit | None = None
+    for start in starts:
+        late = sum(max(start.value(name), 0.0) for name in DELAYS if name in start.parameters)
+        try:
+            trial = _judged(estimate(start, _series(given, late, block, cycle, pumping), pool=pool), pumping)
+        except InputError:
+            continue
+        if best is None or trial.search.motion + trial.search.response < best.search.motion + best.search.response:
+            best = trial
+        if trial.search.arrived:
+            return trial
+    series = _series(given, 0.0 if pumping is None else 0.2, block, cycle, pumping)
+    trial = _judged(_search_in_time(model, series, longest, pool), pumping)
+    if trial.search.arrived:
+        return trial
+    if best is None or trial.search.motion < best.search.motion:
+        best = trial
+    raise InputError(
+        f"no answer: {best.search}; either the search is stuck or the machine has physics that the model lacks: "
+        "start from better values, look for delays elsewhere, or run `rhythmid diagnose`"
+    )
+
+
+def _series(
+    records: Sequence[Record], delay: float, block: int | None, cycle: bool, pumping: Pumping | None
+) -> list[Series]:
+    series = prepare([_begun(record, delay + 0.05 if delay > 0.0 else 0.0) for record in records], block)
+    if not cycle and pumping is not None:
+        series = [replace(one, ignored=_cycle_columns(one, pumping)) for one in series]
+    return series
+
+
+def _judged(fit: Fit, pumping: Pumping | None) -> JointFit:
+    return JointFit(fit, pumping, _explained(fit, pumping))

@@ -1,0 +1,188 @@
+"""The paper's nine experiments, simulated, recorded to bags, and each identified from its bag alone: its Table 1."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rhythmid.errors import InputError
+from rhythmid.experiment import Experiment, perform
+from rhythmid.identify.identification import Identification
+from rhythmid.identify.identify import identify, paper_hopper
+from rhythmid.ltp.htf import theoretical_htf
+from rhythmid.parallel import fork_map
+from rhythmid.record.bag_writer import write_bag
+from rhythmid.record.read import read_record
+from rhythmid.report.figures import Curve, magnitude_figure, phase_figure, save_figure
+
+# Paper, equation (14): nine chirps of 30 s that start at nine phases of the period T = 1 s. One more comes first, so that
+# the response to the nine is periodic when they are analysed.
+EXPERIMENT = """
+model: paper_hopper.yaml
+excitation:
+  {{type: chirp, amplitude: 0.004, band: [0, 7], sweep: 30.0, repetitions: 9, warm_up: 1, shift: {{period: 1.0, count: 9}}}}
+forcing: {{amplitude: 1.0, frequency: 1.0}}
+delays: {{input: {input}, measurement: {measurement}}}
+"""
+DRAWN = 5  # experiment whose HTFs are drawn, as in the paper's Figures 2 and 3
+HIGHEST = 7.0  # [Hz] drawn
+
+
+@dataclass(frozen=True)
+class Case:
+    """One row of the paper's Table 1: actual delays, and the paper's estimates from G_0, G_−1 and G_1; seconds."""
+
+    number: int
+    input: float
+    measurement: float
+    sum: float
+    minus: tuple[float, float]
+    plus: tuple[float, float]
+
+
+def _case(number: int, actual: tuple[float, float], total: float, minus: tuple[float, float], plus: tuple[float, float]) -> Case:
+    def seconds(pair: tuple[float, float]) -> tuple[float, float]:
+        return pair[0] / 1000.0, pair[1] / 1000.0
+
+    return Case(number, *seconds(actual), total / 1000.0, seconds(minus), seconds(plus))
+
+
+CASES = (  # Paper, Table 1; milliseconds
+    _case(1, (0, 0), 0, (0, 1.6), (0, 0)),
+    _case(2, (0, 50), 49.9, (0, 51.6), (0, 47.5)),
+    _case(3, (0, 100), 99.9, (0, 101.6), (0, 97.5)),
+    _case(4, (40, 0), 40.0, (41.1, 0), (38, 0)),
+    _case(5, (40, 50), 90.1, (41.7, 49.7), (41.2, 47.6)),
+    _case(6, (40, 100), 140.1, (41.9, 99.5), (41.2, 95.1)),
+    _case(7, (80, 0), 80.1, (81.7, 0.5), (76.7, 2.9)),
+    _case(8, (80, 50), 130.1, (81.8, 50.4), (76.8, 52.4)),
+    _case(9, (80, 100), 180.1, (82.1, 100.2), (76.9, 102.7)),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """What one experiment gave: `result` is the dictionary of `identify --json` with the actual delays added; `panels`
+    are the curves of the two figures by harmonic, None where they are not drawn."""
+
+    case: Case
+    result: dict[str, Any]
+    magnitude: dict[int, list[Curve]] | None = None
+    phase: dict[int, list[Curve]] | None = None
+
+
+def record_case(case: Case, path: Path) -> None:
+    """Perform one experiment and write its bag: what a user of the robot sees, and nothing of the truth."""
+    with as_file(files("rhythmid") / "models") as folder:
+        experiment = Experiment.from_text(
+            EXPERIMENT.format(input=case.input, measurement=case.measurement), folder
+        )
+    messages = perform(experiment)
+    wanted = [topic for topic in experiment.record.topics if topic in messages]
+    write_bag(
+        path, {f"{experiment.namespace}/{topic}": messages[topic] for topic in wanted},
+        run=experiment.description(), joint=experiment.joint, namespace=experiment.namespace,
+    )  # fmt: skip
+
+
+def curves(found: Identification) -> tuple[dict[int, list[Curve]], dict[int, list[Curve]]]:
+    """Curves of Figures 2 and 3: theory, estimate, parametric fit; the estimate compensated by the delays found."""
+    paper = found.paper[0]
+    htf = found.harmonics
+    theory = theoretical_htf(paper_hopper(), paper.pumping, htf.harmonics, htf.frequency, delays=False)
+    fit = paper.fit.linearised.htf(htf.harmonics, htf.frequency)
+    undone = htf
+    if found.delays.input.value is not None and found.delays.measurement.value is not None:
+        undone = htf.delayed(-found.delays.input.value, -found.delays.measurement.value, paper.pumping.frequency)
+    magnitude, phase = {}, {}
+    for m in (0, -1, 1):
+        row = htf.row(m)
+        seen = found.reached[row] & (htf.frequency <= HIGHEST)
+        at = htf.frequency[seen]
+        estimate = Curve("estimate", at, htf.value[row, seen])
+        fitted = Curve("parametric fit", at, fit[row, seen])
+        magnitude[m] = [Curve("theory", at, theory.value[row, seen]), estimate, fitted]
+        phase[m] = [fitted, estimate, Curve("compensated", at, undone.value[row, seen])]
+    return magnitude, phase
+
+
+def run_case(case: Case, folder: Path) -> Row:
+    """Simulate, record to `folder`, and identify from the bag alone."""
+    path = folder / f"experiment_{case.number}"
+    record_case(case, path)
+    found = identify(read_record(path))
+    result = found.to_dict() | {"actual": {"input": case.input, "measurement": case.measurement}}
+    return Row(case, result, *(curves(found) if case.number == DRAWN else (None, None)))
+
+
+def table1(
+    folder: Path, cases: Sequence[Case] = CASES, workers: int | None = None, tell: Callable[[str], None] | None = None
+) -> list[Row]:
+    """All experiments, on all cores; bags and figures go to `folder`. Raises InputError when one of them fails."""
+    folder.mkdir(parents=True, exist_ok=True)
+    rows: dict[int, Row] = {}
+    for index, row in fork_map(lambda case: run_case(case, folder), cases, workers):
+        if isinstance(row, Exception):
+            raise InputError(f"experiment {cases[index].number}: {row}")
+        rows[index] = row
+        if tell is not None:
+            tell(f"experiment {cases[index].number} done ({len(rows)} of {len(cases)})")
+        if row.magnitude is not None and row.phase is not None:
+            save_figure(magnitude_figure(row.magnitude), folder / "figure2_magnitude.png")
+            save_figure(phase_figure(row.phase), folder / "figure3_phase.png")
+    return [rows[index] for index in sorted(rows)]
+
+
+def _pair(ours: float, paper: float) -> str:
+    return f"{1e3 * ours:7.2f} {f'({1e3 * paper:.1f})':>8}"
+
+
+def format_table(rows: Sequence[Row]) -> str:
+    """The table as text: delays in milliseconds, ours and, in brackets, the paper's."""
+    heads = ("exp", "actual τu  τy", "G0 τu+τy", "G-1 τu", "G-1 τy", "G+1 τu", "G+1 τy", "k [N/m]", "c [N s/m]")
+    widths = (4, 14, 17, 17, 17, 17, 17, 10, 10)
+    lines = ["".join(f"{head:>{width}}" for head, width in zip(heads, widths))]
+    for row in rows:
+        case, found, values = row.case, row.result["methods"]["paper"], row.result["parameters"]
+        cells = [
+            f"#{case.number}",
+            f"{1e3 * case.input:.0f}  {1e3 * case.measurement:5.0f}",
+            _pair(found["G0"]["sum"], case.sum),
+            _pair(found["G-1"]["input"], case.minus[0]),
+            _pair(found["G-1"]["measurement"], case.minus[1]),
+            _pair(found["G+1"]["input"], case.plus[0]),
+            _pair(found["G+1"]["measurement"], case.plus[1]),
+            f"{values['linear_spring.stiffness']['value']:.3f}",
+            f"{values['switched_damper.stance']['value']:.4f}",
+        ]
+        lines.append("".join(f"{cell:>{width}}" for cell, width in zip(cells, widths)))
+    lines.append("delays in ms, ours (the paper's); the paper found k = 200, c = 2.12 from all nine; the truth is 200, 2")
+    lines.append(f"worst error of a delay: ours {1e3 * worst_error(rows):.2f} ms, the paper's {1e3 * _paper_worst(rows):.2f} ms")
+    return "\n".join(lines)
+
+
+def worst_error(rows: Sequence[Row]) -> float:
+    """Largest error [s] of all delay estimates by the paper's method."""
+    return max(
+        abs(value - actual)
+        for row in rows
+        for estimates in row.result["methods"]["paper"].values()
+        for name, value in estimates.items()
+        for actual in [_actual(row.case, name)]
+    )
+
+
+def _actual(case: Case, name: str) -> float:
+    return {"sum": case.input + case.measurement, "input": case.input, "measurement": case.measurement}[name]
+
+
+def _paper_worst(rows: Sequence[Row]) -> float:
+    errors = []
+    for case in (row.case for row in rows):
+        errors.append(abs(case.sum - case.input - case.measurement))
+        for pair in (case.minus, case.plus):
+            errors += [abs(pair[0] - case.input), abs(pair[1] - case.measurement)]
+    return float(np.max(errors))

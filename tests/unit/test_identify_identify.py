@@ -1,0 +1,102 @@
+"""`identify`: estimates, assumptions, and the dictionary that other programs read."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rhythmid.errors import InputError
+from rhythmid.identify.identify import identify, paper_hopper, with_delays
+from rhythmid.model import Model
+from rhythmid.record.signals import Sinusoid
+
+
+@pytest.fixture(scope="module")
+def found(paper_record):
+    return identify(paper_record())
+
+
+def test_the_dictionary_has_the_shape_that_other_programs_rely_on(found) -> None:
+    result = json.loads(json.dumps(found.to_dict()))
+    assert {"parameters", "delays", "harmonics", "methods", "quality"} <= set(result)
+    assert result["parameters"]["linear_spring.stiffness"]["unit"] == "N/m"
+    assert {"value", "std", "unit"} == set(result["parameters"]["switched_damper.stance"])
+    assert {"input", "measurement", "sum", "separable", "assumption", "closure"} <= set(result["delays"])
+    assert set(result["delays"]["input"]) == {"value", "std", "unit"}
+    assert set(result["methods"]["paper"]) == {"G0", "G-1", "G+1"}
+    assert set(result["methods"]["paper"]["G0"]) == {"sum"}
+    assert set(result["methods"]["paper"]["G-1"]) == {"input", "measurement"}
+    assert {"rate", "gaps", "jitter_std", "nrmse"} <= set(result["quality"])
+    for harmonic in result["harmonics"]:
+        lengths = {len(harmonic[key]) for key in ("frequency", "magnitude", "phase", "std")}
+        assert len(lengths) == 1
+    assert [harmonic["m"] for harmonic in result["harmonics"]] == [-3, -2, -1, 0, 1, 2, 3]
+
+
+def test_the_papers_hopper_is_found_from_the_papers_experiment(found) -> None:
+    result = found.to_dict()
+    assert result["parameters"]["linear_spring.stiffness"]["value"] == pytest.approx(200.0, rel=1e-3)
+    assert result["parameters"]["switched_damper.stance"]["value"] == pytest.approx(2.0, rel=5e-3)
+    assert result["delays"]["input"]["value"] == pytest.approx(0.04, abs=0.3e-3)
+    assert result["delays"]["measurement"]["value"] == pytest.approx(0.05, abs=0.3e-3)
+    assert result["delays"]["separable"] is True
+    assert result["quality"]["nrmse"] < 2e-3
+
+
+def test_the_identified_model_holds_the_estimates_and_can_be_saved(found, tmp_path) -> None:
+    found.model.save(tmp_path / "identified.yaml")
+    again = Model.load(tmp_path / "identified.yaml")
+    assert again.value("input_delay.delay") == pytest.approx(0.04, abs=0.3e-3)
+    assert again.value("linear_spring.stiffness") == found.model.value("linear_spring.stiffness")
+
+
+def test_the_assumption_on_the_forcing_is_stated(found, paper_record) -> None:
+    assert "recorded" in found.delays.assumption
+    stated = replace(paper_record(), forcing_law=Sinusoid(1.0, 1.0, 0.0))
+    assert "stated" in identify(stated).delays.assumption
+
+
+def test_without_forcing_only_the_sum_is_given(paper_record) -> None:
+    blind = replace(paper_record(), forcing=None)
+    smooth = paper_hopper().with_values({"switched_damper.stance": 1.0, "switched_damper.flight": 1.0})
+    delays = identify(blind, smooth).delays
+    assert delays.separable is False
+    assert delays.input.value is None and delays.measurement.value is None
+    assert delays.sum.value == pytest.approx(0.09, abs=3e-3)
+
+
+def test_a_forcing_of_another_phase_changes_nothing(paper_record) -> None:
+    delays = identify(paper_record(phase=2.0)).delays
+    assert delays.input.value == pytest.approx(0.04, abs=0.5e-3)
+    assert delays.measurement.value == pytest.approx(0.05, abs=0.5e-3)
+
+
+def test_two_records_of_one_machine_are_averaged(paper_record) -> None:
+    both = identify([paper_record(), paper_record(noise=2e-6)])
+    assert both.delays.sum.value == pytest.approx(0.09, abs=0.1e-3)
+    assert len(both.paper) == 2
+
+
+def test_a_command_that_does_not_repeat_is_noted(paper_record) -> None:
+    notes = identify(paper_record(warm_up=0)).notes
+    assert any("does not repeat" in note for note in notes)
+
+
+def test_delays_are_added_to_a_model_that_has_none() -> None:
+    bare = paper_hopper().without("input_delay")
+    made = with_delays(bare, 0.01, 0.02)
+    assert made.value("input_delay.delay") == 0.01
+    assert made.value("measurement_delay.delay") == 0.02
+
+
+def test_nothing_to_identify_from_is_refused() -> None:
+    with pytest.raises(InputError, match="at least one record"):
+        identify([])
+
+
+def test_a_silent_record_is_refused(paper_record) -> None:
+    made = paper_record()
+    assert made.input is not None
+    with pytest.raises(InputError, match="silent"):
+        identify(replace(made, input=replace(made.input, value=np.zeros(len(made.input)))))
