@@ -1,0 +1,122 @@
+"""What a diagnosis found, as plain data for its report."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.report.quantity import pretty_name
+from rhythmid.report.record_quality import RecordQuality
+from rhythmid.report.run import Run
+from rhythmid.report.sections import Estimates
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ElementWords:
+    """What the catalogue says of an element; `parameters` are the meanings of its parameters by name, `contained_in` the
+    richer elements of which it is a special case."""
+
+    title: str
+    parameters: Mapping[str, str]
+    contained_in: tuple[str, ...] = ()
+    also_known_as: tuple[str, ...] = ()
+    reference: str = ""
+
+
+@dataclass(frozen=True)
+class ElementScore:
+    """Best score of one element in the first round: chi-squared of the score test."""
+
+    element: str
+    slot: str
+    statistic: float
+
+
+@dataclass(frozen=True, eq=False)
+class FreeFunction:
+    """The missing force (or sensor error) as an unknown smooth function of one quantity, before and after the repair.
+
+    `explained` is the share of the mismatch that it explains in blocks left out of its fit; `grid`, `force` (k,) draw it.
+    """
+
+    quantity: str
+    explained: float
+    grid: Array
+    force: Array
+    grid_unit: str
+    force_unit: str
+    explained_after: float | None = None
+    grid_after: Array | None = None
+    force_after: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class TransferChange:
+    """Harmonic transfer functions of the refitted nominal and of the final model: complex128[h, n] of the harmonics
+    `indices` (h,) at `frequency` [Hz] (n,); `unit` of output over input; `pumping` frequency [Hz], None without forcing."""
+
+    frequency: Array
+    indices: tuple[int, ...]
+    before: NDArray[np.complex128]
+    after: NDArray[np.complex128]
+    unit: str
+    pumping: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """All that the page shows, as plain data.
+
+    Attributes
+    ----------
+    result : the diagnosis as its JSON has it.
+    source : the nominal model's name and the records' names in words.
+    slots : elements of the nominal model by slot; `forced` if a forcing was recorded.
+    runs : records beside their simulations, those held out last.
+    noise, slow_noise : standard deviation of the noise of the compared averages, and of slow averages of it per sample.
+    scores : best score of every element, best first; `threshold` above which chance is no explanation.
+    functions : free functions, the most explaining first.
+    transfer : change of the transfer functions, or the reason why there is none.
+    nominal, refitted, refitted_delays : the nominal model's parameters as given and refitted, and its delays.
+    at_bound : parameters of the final model that ended at a bound; `unconverged` models whose refit did not settle.
+    words : what the catalogue says of the elements that are mentioned, by name.
+    hints : (element, other element, what tells them apart).
+    worth : difference of the criterion that counts as decided.
+    """
+
+    result: Mapping[str, Any]
+    source: str
+    slots: Mapping[str, tuple[str, ...]]
+    forced: bool
+    runs: tuple[Run, ...]
+    output_unit: str
+    noise: float
+    slow_noise: float
+    scores: tuple[ElementScore, ...]
+    threshold: float
+    functions: tuple[FreeFunction, ...]
+    transfer: TransferChange | str
+    nominal: Estimates
+    refitted: Estimates
+    refitted_delays: Mapping[str, Any]
+    records: tuple[RecordQuality, ...]
+    words: Mapping[str, ElementWords]
+    command: str
+    models: Mapping[str, str]
+    worth: float
+    at_bound: tuple[str, ...] = ()
+    unconverged: tuple[tuple[str, ...], ...] = ()
+    hints: tuple[tuple[str, str, str], ...] = ()
+
+    @property
+    def repaired(self) -> bool:
+        """Whether anything was added to the nominal model."""
+        return bool(self.result["missing"])
+
+    def title(self, element: str) -> str:
+        """The element's name as a heading has it."""
+        return self.words[element].title if element in self.words else pretty_name(element).capitalize()

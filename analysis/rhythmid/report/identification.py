@@ -1,0 +1,190 @@
+"""The report of an identification: parameters, delays, transfer functions, and how well they explain the records."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rhythmid.report.blocks import Block, Bullets, Fold, Paragraph, Section, Table, Tile, Tiles
+from rhythmid.report.page import Page
+from rhythmid.report.quantity import NONE, number, percent, pretty_name, sentence, with_unit
+from rhythmid.report.record_quality import RecordQuality, quality_section
+from rhythmid.report.sections import MILLISECONDS, delays_section, parameters_table, reproduce_section, told
+from rhythmid.report.transfer_figures import TransferFunction, transfer_grid
+
+SHOWN = 1  # |m| up to which transfer functions are shown at once; others are folded away
+METHODS = ("G0", "G-1", "G+1")
+
+
+def identification_page(
+    result: Mapping[str, Any],
+    source: str,
+    records: Sequence[RecordQuality],
+    command: str,
+    models: Mapping[str, str],
+    transfer: Sequence[TransferFunction] | None = None,
+    unit: str = "m/N",
+) -> Page:
+    """The report of `identify`.
+
+    `result` is what `identify --json` writes; `source` names model and records; `models` are YAML texts by title; `unit` that of
+    the transfer functions. `transfer` replaces the functions in `result` where more is known of them, such as the fitted
+    model's.
+    """
+    functions = list(transfer) if transfer is not None else functions_of(result)
+    return Page(
+        title="rhythmid identification",
+        kicker=f"Identification of {source}",
+        verdict="Identified" if result["delays"].get("separable") else "Identified, but for the split of the delays",
+        words=_words(result),
+        tone="good" if result["delays"].get("separable") else "open",
+        tiles=_tiles(result),
+        sections=(
+            Section("Parameters", (parameters_table(result["parameters"]),)),
+            _delays(result),
+            transfer_section(functions, unit),
+            *_paper(result),
+            _remarks(result),
+            quality_section(records),
+            reproduce_section(command, models),
+        ),
+    )
+
+
+def functions_of(result: Mapping[str, Any]) -> list[TransferFunction]:
+    """Transfer functions from the JSON's "harmonics"."""
+    return [
+        TransferFunction(
+            int(one["m"]),
+            np.asarray(one["frequency"], dtype=float),
+            np.asarray(one["magnitude"], dtype=float) * np.exp(1j * np.asarray(one["phase"], dtype=float)),
+            np.asarray(one["std"], dtype=float) if one.get("std") else None,
+        )
+        for one in result.get("harmonics") or ()
+    ]
+
+
+def _words(result: Mapping[str, Any]) -> str:
+    delays = result["delays"]
+    if delays.get("separable"):
+        first = (
+            f"The command acts {told(delays['input'], MILLISECONDS)} late, and the measurement arrives "
+            f"{told(delays['measurement'], MILLISECONDS)} late."
+        )
+    elif delays.get("sum"):
+        first = f"Command and measurement are {told(delays['sum'], MILLISECONDS)} late together; the records do not say which by how much."
+    else:
+        first = "No delay was estimated."
+    error = (result.get("quality") or {}).get("nrmse")
+    return f"{first} Running on its own, the identified model misses {percent(error)} of the motion."
+
+
+def _tiles(result: Mapping[str, Any]) -> Tiles:
+    delays = result["delays"]
+    keys = ("input", "measurement") if delays.get("separable") else ("sum",)
+    names = {"input": "input delay", "measurement": "measurement delay", "sum": "sum of the delays"}
+    tiles = [Tile(names[key], told(delays[key], MILLISECONDS), "95 % interval") for key in keys if delays.get(key)]
+    tiles += [Tile(pretty_name(n), told(one), "95 % interval") for n, one in list(result["parameters"].items())[:3]]
+    return Tiles(tuple(tiles))
+
+
+def _delays(result: Mapping[str, Any]) -> Section:
+    section = delays_section(result["delays"])
+    aliases = result["delays"].get("aliases") or ()
+    if not aliases:
+        return section
+    pairs = "; ".join(f"{number(1e3 * a)} and {number(1e3 * b)} ms" for a, b in aliases)
+    said = Paragraph(f"The phases repeat every cycle, so these pairs of τ_u and τ_y would fit as well: {pairs}.")
+    return Section(section.title, (*section.blocks, said))
+
+
+def transfer_section(functions: Sequence[TransferFunction], unit: str = "m/N") -> Section:
+    """Magnitude and phase of harmonic transfer functions, the principal ones at once."""
+    drawn = sorted((f for f in functions if len(f.frequency) > 1), key=lambda f: (abs(f.m), f.m))
+    if not drawn:
+        return Section("Transfer functions", (Paragraph("None could be estimated from these records."),))
+    first = [f for f in drawn if abs(f.m) <= SHOWN]
+    blocks: list[Block] = [
+        Paragraph(
+            "On its limit cycle the machine answers a small input at one frequency at that frequency (G₀) and at frequencies "
+            "shifted by multiples of the pumping frequency (G₊₁, G₋₁, …)."
+        ),
+        transfer_grid(first, unit),
+    ]
+    further = [f for f in drawn if abs(f.m) > SHOWN]
+    if further:
+        blocks.append(Fold("Further harmonics", (transfer_grid(further, unit),)))
+    return Section("Transfer functions", tuple(blocks))
+
+
+def _paper(result: Mapping[str, Any]) -> tuple[Section, ...]:
+    methods = (result.get("methods") or {}).get("paper") or {}
+    if not methods:
+        return ()
+    rows = tuple((f"from {_harmonic(name)} alone", *_triple(found)) for name, found in methods.items())
+    table = Table(
+        "Delays from the phase of one transfer function at a time. G₀ shows the sum only.",
+        ("estimate", "input delay", "measurement delay", "sum"),
+        rows,
+    )
+    return (Section("Delays from single transfer functions", (table,)),)
+
+
+def _harmonic(name: str) -> str:
+    return name.replace("G0", "G₀").replace("G-1", "G₋₁").replace("G+1", "G₊₁")
+
+
+def _triple(found: Mapping[str, float]) -> tuple[str, str, str]:
+    """Input, measurement and sum in milliseconds."""
+    known = dict(found)
+    if "sum" not in known and {"input", "measurement"} <= set(known):
+        known["sum"] = known["input"] + known["measurement"]
+    first, second, total = (_milliseconds(known.get(key)) for key in ("input", "measurement", "sum"))
+    return first, second, total
+
+
+def _milliseconds(value: float | None) -> str:
+    return NONE if value is None else with_unit(f"{1e3 * value:.2f}".replace("-", "−"), "ms")
+
+
+def _remarks(result: Mapping[str, Any]) -> Section:
+    quality = result.get("quality") or {}
+    lines = [f"In free run the identified model's error is {percent(quality.get('nrmse'))} of the motion's standard deviation."]
+    lines += [sentence(str(note)) for note in result.get("notes") or ()]
+    return Section("How far to trust this", (Bullets(tuple(lines)),))
+
+
+def comparison_section(experiments: Sequence[Mapping[str, Any]], names: Sequence[str] | None = None) -> Section:
+    """Actual and estimated delays of several experiments, in the manner of the paper's Table 1.
+
+    `experiments` are results of `identify --json` with their "actual" delays added, as `table1 --json` lists them.
+    """
+    rows, worst = [], 0.0
+    for index, one in enumerate(experiments):
+        actual, methods, delays = one["actual"], one["methods"]["paper"], one["delays"]
+        row = [names[index] if names else f"experiment {index + 1}", _pair(actual)]
+        row += [_pair(methods.get(key) or {}) for key in METHODS]
+        rows.append((*row, f"{told(delays['input'], MILLISECONDS)} / {told(delays['measurement'], MILLISECONDS)}"))
+        for key in ("input", "measurement"):
+            value = (delays.get(key) or {}).get("value")
+            if value is not None:
+                worst = max(worst, abs(value - actual[key]))
+    return Section(
+        "Delays in all experiments",
+        (
+            Paragraph(f"The largest error of the final estimates is {_milliseconds(worst)}."),
+            Table(
+                "Input delay / measurement delay. G₀ alone shows only their sum. The last column is the final estimate, with 95 % "
+                "intervals.",
+                ("experiment", "actual", "from G₀ (sum)", "from G₋₁", "from G₊₁", "all together"),
+                tuple(rows),
+            ),
+        ),
+    )
+
+
+def _pair(found: Mapping[str, float]) -> str:
+    """Two delays in milliseconds, or their sum where only that is known."""
+    if "input" in found and "measurement" in found:
+        return f"{1e3 * found['input']:.1f} / {1e3 * found['measurement']:.1f} ms".replace("-", "−")
+    return _milliseconds(found.get("sum"))

@@ -1,0 +1,168 @@
+"""Where model and machine part, and what stays unexplained: sections of a diagnosis' report."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rhythmid.report.blocks import Block, Bullets, Columns, Drawing, Fold, Paragraph, Section, drawing
+from rhythmid.report.chart import Chart, Curve
+from rhythmid.report.findings import ElementScore, Findings, FreeFunction
+from rhythmid.report.quantity import number, percent, plain, pretty_unit, scaled, sentence, with_unit
+from rhythmid.report.row_chart import Bar, draw_bars
+from rhythmid.report.run import worst_place
+from rhythmid.report.signal_path import SlotContent, draw_signal_path
+SHARE = 0.2  # of the mismatch from which a quantity is said to go with it
+TELLING = 0.05  # share of the mismatch from which a free function is worth a look
+
+
+def location_section(found: Findings) -> Section:
+    result = found.result
+    slot = result["location"]["slot"]
+    missing: dict[str, list[str]] = {}
+    for effect in result["missing"]:
+        missing.setdefault(effect["slot"], []).append(found.title(effect["element"]))
+    slots = {
+        name: SlotContent(tuple(map(found.title, found.slots.get(name, ()))), tuple(missing.get(name, ())), not missing and name == slot)
+        for name in ("command", "actuator", "force", "sensor", "timing")
+    }
+    faulty = [name for name, content in slots.items() if content.faulty]
+    alt = "Signal path from the command u through command, actuator, force and sensor to the output y. " + (
+        f"Marked as faulty: {', '.join(faulty)}." if faulty else "No slot is marked."
+    )
+    sure = result["verdict"] == "missing_physics"
+    note = "missing here" if sure else "suspected here"
+    blocks: list[Block] = [
+        Paragraph(sentence(f"the fault is {result['location']['where']}" if faulty else result["location"]["where"]), "lead"),
+        Drawing(
+            "The signal path",
+            draw_signal_path(slots, found.forced, alt, note),
+            "The machine as a chain from command u to output y. Red: the slot that the nominal model gets wrong."
+            if faulty
+            else "The machine as a chain from command u to output y, with the elements of the nominal model.",
+            wide=True,
+        ),
+    ]
+    place = worst_place(found.runs)
+    if place is not None and faulty:
+        phase = f", {place.phase:.2f} of a cycle after the forcing's peak" if place.phase is not None else ""
+        factor, unit = scaled(abs(place.position), found.output_unit)
+        blocks.append(
+            Paragraph(
+                f"Model and record part most in {place.run.name}, around {number(place.time, 3)} s{phase}, at x = "
+                f"{with_unit(number(factor * place.position, 3), unit)} and v = "
+                f"{with_unit(number(place.velocity, 2), f'{found.output_unit}/s')}; the mismatch is strongest at "
+                f"{number(place.frequency, 3)} Hz, which carries {percent(place.share)} of its power."
+            )
+        )
+    blocks.append(Columns(tuple(_slot_scores(found, slot))))
+    evidence = tuple(result["location"]["evidence"])
+    if evidence:
+        blocks.append(Fold("The evidence in words", (Bullets(tuple(map(plain, evidence))),)))
+    return Section("Where model and machine part", tuple(blocks))
+
+
+def _slot_scores(found: Findings, slot: str | None) -> list[Block]:
+    best: dict[str, ElementScore] = {}
+    for one in found.scores:
+        if one.slot not in best or one.statistic > best[one.slot].statistic:
+            best[one.slot] = one
+    if not best:
+        return []
+    bars = [
+        Bar(one.slot, one.statistic, number(one.statistic, 3), "after" if one.slot == slot else "measured", one.slot == slot)
+        for one in sorted(best.values(), key=lambda s: -s.statistic)
+    ]
+    blocks: list[Block] = [
+        Drawing(
+            "Best score in each slot",
+            draw_bars(
+                "Best score test in each slot: " + ", ".join(f"{b.label} {b.text}" for b in bars), bars,
+                found.threshold, "chance",
+            ),
+            "How strongly the best element of each slot would explain the mismatch (χ² of its score test). Beyond the dotted line "
+            "chance is no explanation. The final say is with the refits below.",
+        )
+    ]  # fmt: skip
+    telling = list(found.functions)
+    if telling:
+        bars = [Bar(f.quantity, 100.0 * max(f.explained, 0.0), f"{100.0 * max(f.explained, 0.0):.0f}\u202f%", "measured") for f in telling]
+        blocks.append(
+            Drawing(
+                "What the mismatch depends on",
+                draw_bars(
+                    "Share of the mismatch that a free function explains: " + ", ".join(f"{b.label} {b.text}" for b in bars),
+                    bars, full=100.0,
+                ),
+                "Share of the mismatch that a free function of each quantity explains in stretches it was not fitted to. "
+                + (
+                    "Nothing that is left goes with any of them."
+                    if found.result["verdict"] == "consistent"
+                    else "The long bars say what the missing force goes with."
+                    if max(f.explained for f in telling) > SHARE
+                    else "No long bar: the fault is no force that depends on the present state alone, or too large to be mapped."
+                ),
+            )
+        )
+    return blocks
+
+
+def unknown_section(found: Findings) -> Section:
+    remainder = found.result.get("remainder")
+    blocks: list[Block] = []
+    if remainder is None:
+        blocks.append(
+            Paragraph(
+                "The final model leaves nothing that depends on position, velocity, actuator force, time or the measured "
+                "position beyond noise. Effects smaller than the noise, or in states that the records never reached, "
+                "stay unseen."
+            )
+        )
+    else:
+        share = 100.0 * max(float(remainder["explained"]), 0.0)
+        blocks.append(
+            Paragraph(
+                f"The final model leaves a mismatch that depends on {remainder['quantity']}: a free function of it "
+                f"explains {share:.0f} % of what is left in stretches it was not fitted to (p = "
+                f"{number(remainder['p_value'], 2)}). No element of the catalogue is this function; its curve can stand in."
+            )
+        )
+    figures = [_force_map(f, found.repaired) for f in _most_telling(found.functions, remainder)]
+    if figures:
+        blocks.append(Columns(tuple(figures)))
+    for line in found.result.get("notes") or ():
+        blocks.append(Paragraph(sentence(line)))
+    return Section("What remains unknown", tuple(blocks))
+
+
+def _most_telling(functions: Sequence[FreeFunction], remainder: Mapping[str, Any] | None) -> list[FreeFunction]:
+    """The function that explains most, and the one of the remainder where that is another."""
+    drawn = [f for f in functions if len(f.force)]
+    chosen = [f for f in drawn[:1] if f.explained > TELLING]
+    if remainder is not None:
+        chosen += [f for f in drawn if f.quantity == remainder["quantity"] and f not in chosen]
+    return chosen
+
+
+def _force_map(one: FreeFunction, repaired: bool) -> Drawing:
+    largest = float(np.max(np.abs(one.force), initial=0.0))
+    if one.force_after is not None:
+        largest = max(largest, float(np.max(np.abs(one.force_after), initial=0.0)))
+    factor, unit = scaled(largest, one.force_unit)
+    along, grid_unit = scaled(float(np.max(np.abs(one.grid), initial=0.0)), one.grid_unit)
+    curves = [Curve(along * one.grid, factor * one.force, "missing before", "before")]
+    words = f"explains {100.0 * max(one.explained, 0.0):.0f} % of the mismatch before"
+    if repaired and one.grid_after is not None and one.force_after is not None and len(one.force_after):
+        curves.append(Curve(along * one.grid_after, factor * one.force_after, "missing after", "after"))
+        words += f", {100.0 * max(one.explained_after or 0.0, 0.0):.0f} % after"
+    kind = "sensor error" if "sensor" in one.quantity else "force"
+    return drawing(
+        f"Missing {kind} over {one.quantity}",
+        Chart(
+            f"Missing {kind} as a free function of {one.quantity}.", f"{one.quantity} [{pretty_unit(grid_unit)}]",
+            f"{kind} [{pretty_unit(unit)}]", tuple(curves),
+        ),
+        f"The mismatch as a free function of {one.quantity}, no formula assumed; it {words}. Left out: what the nominal "
+        f"model's own parameters can take up (an offset; a slope over position or velocity). A curve that comes down to zero has "
+        f"been accounted for.",
+    )  # fmt: skip

@@ -1,0 +1,95 @@
+"""A report as one self-contained HTML page: no script, nothing fetched, readable on a phone, in print, light and dark."""
+
+import re
+from dataclasses import dataclass
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import Literal
+
+from rhythmid import __version__
+from rhythmid.output import write_text
+from rhythmid.report.blocks import Section, Tiles, joined, markup
+
+Tone = Literal["good", "found", "open", "plain"]
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+
+
+@dataclass(frozen=True)
+class Page:
+    """A report.
+
+    `kicker` says what kind of report of what, `verdict` is the answer in a few words, `words` the same in about two
+    sentences, `tiles` its most important numbers. `tone` colours the verdict; it is never the only bearer of meaning.
+    """
+
+    title: str
+    kicker: str
+    verdict: str
+    words: str
+    tone: Tone
+    tiles: Tiles
+    sections: tuple[Section, ...]
+
+
+def render(page: Page) -> str:
+    """The page as HTML text."""
+    style = files("rhythmid.report").joinpath("style.css").read_text(encoding="utf-8")
+    names = _anchors([section.title for section in page.sections])
+    contents = "".join(
+        f'<li><a href="#{name}">{escape(section.title)}</a></li>' for name, section in zip(names, page.sections)
+    )
+    body = "\n".join(
+        f'<section id="{name}" aria-labelledby="{name}-title"><h2 id="{name}-title">{escape(section.title)}</h2>\n'
+        f"{joined(section.blocks)}\n</section>"
+        for name, section in zip(names, page.sections)
+    )
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="{POLICY}">
+<meta name="color-scheme" content="light dark">
+<meta name="generator" content="rhythmid {escape(__version__)}">
+<title>{escape(page.title)}</title>
+<style>
+{style}</style>
+</head>
+<body>
+<a class="skip" href="#report">Skip to the report</a>
+<header>
+<p class="kicker">{escape(page.kicker)}</p>
+<div class="verdict {page.tone}">
+<h1>{escape(page.verdict)}</h1>
+<p>{escape(page.words)}</p>
+</div>
+{markup(page.tiles) if page.tiles.items else ""}
+</header>
+<nav aria-label="Contents"><ol>{contents}</ol></nav>
+<main id="report">
+{body}
+</main>
+<footer><p>rhythmid {escape(__version__)}. Intervals are 95 % unless said otherwise.</p></footer>
+</body>
+</html>
+"""
+
+
+def write_page(path: Path, page: Page) -> None:
+    """Write the page whole or not at all. Raises InputError when the place is not writable."""
+    write_text(path, render(page))
+
+
+def _anchors(titles: list[str]) -> list[str]:
+    """Distinct names for links to sections."""
+    taken: list[str] = []
+    for title in titles:
+        plain = re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "section"
+        name = plain
+        for number in range(2, len(titles) + 2):
+            if name not in taken:
+                break
+            name = f"{plain}-{number}"
+        taken.append(name)
+    return taken

@@ -1,0 +1,111 @@
+"""Numbers as people read them: value ± half-width of the 95 % interval, with its unit."""
+
+import math
+import re
+
+NORMAL_95 = 1.959963984540054  # standard deviations to either side that hold 95 % of a normal distribution
+MINUS = "\u2212"
+NONE = "—"
+PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
+PREFIXED = {"m", "s", "N", "rad", "V", "A", "Hz", "N*m"}
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def pretty_unit(unit: str) -> str:
+    """The unit as printed: N·s/m², nothing for a pure number."""
+    if unit in ("", "1", "-"):
+        return ""
+    for power in "23456":
+        unit = unit.replace(f"^{power}", power.translate(_SUPERSCRIPT))
+    return unit.replace("*", "·")
+
+
+def pretty_name(name: str) -> str:
+    """An element's or parameter's name in words: "coulomb_friction.force" is "coulomb friction: force"."""
+    return name.replace(".", ": ").replace("_", " ")
+
+
+def plain(text: str) -> str:
+    """A line of the command's output as the page says it: names without underscores, χ² and powers of ten spelled out."""
+    text = re.sub(r"\b[a-z][a-z0-9]*(?:_[a-z0-9]+)+\b", lambda found: found[0].replace("_", " "), text)
+    text = re.sub(r"(?<=[a-z0-9])\.(?=[a-z])", ": ", text)
+    return re.sub(r"\b\d+(?:\.\d+)?e[+-]?\d+\b", lambda found: number(float(found[0])), text).replace("chi2", "χ²")
+
+
+def sentence(text: str) -> str:
+    """The text as a sentence: capital letter, full stop."""
+    text = text.strip()
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}." if text else ""
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A number with this many significant digits; very large and very small ones with a power of ten."""
+    if value is None or math.isnan(value):
+        return NONE
+    if math.isinf(value):
+        return "∞" if value > 0 else f"{MINUS}∞"
+    if value == 0.0:
+        return "0"
+    text = f"{value:.{digits - 1}e}"
+    mantissa, _, power = text.partition("e")
+    exponent = int(power)
+    if -4 < exponent < max(digits, 6):
+        text = f"{value:.{max(digits - 1 - exponent, 0)}f}"
+        text = text.rstrip("0").rstrip(".") if "." in text else text
+        return text.replace("-", MINUS)
+    mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
+    return f"{mantissa} × 10{str(exponent).translate(_SUPERSCRIPT)}".replace("-", MINUS)
+
+
+def with_unit(text: str, unit: str) -> str:
+    """The text, a narrow space and the printed unit."""
+    return f"{text}\u202f{pretty_unit(unit)}" if pretty_unit(unit) else text
+
+
+def plus_minus(value: float, half: float) -> str:
+    """value ± half, both to the second significant digit of half."""
+    if not (math.isfinite(value) and math.isfinite(half)) or half <= 0.0:
+        return number(value)
+    size = max(abs(value), half)
+    exponent = math.floor(math.log10(size))
+    shift = exponent if exponent >= 6 or exponent < -3 else 0
+    value, half = value / 10.0**shift, half / 10.0**shift
+    decimals = 1 - math.floor(math.log10(half))
+    if decimals < 0:
+        value, half, decimals = round(value, decimals), round(half, decimals), 0
+    decimals = min(decimals, 12)
+    text = f"{value:.{decimals}f} ±\u00a0{half:.{decimals}f}".replace("-", MINUS)
+    return f"({text}) × 10{str(shift).translate(_SUPERSCRIPT)}" if shift else text
+
+
+def estimate(value: float | None, std: float | None, unit: str, factor: float = 1.0) -> str:
+    """An estimate with its 95 % interval, both multiplied by `factor` to reach `unit`.
+
+    `std` 0 is a number that was not estimated, None one that the records do not determine.
+    """
+    if value is None:
+        return NONE
+    if std == 0.0:
+        return f"{with_unit(number(value * factor, 6), unit)} (fixed)"
+    if std is None or not math.isfinite(std):
+        return f"{with_unit(number(value * factor), unit)} (not determined)"
+    return with_unit(plus_minus(value * factor, NORMAL_95 * std * factor), unit)
+
+
+def percent(ratio: float | None, half: float | None = None) -> str:
+    """A ratio in percent, with the half-width of its interval where known."""
+    if ratio is None or math.isnan(ratio):
+        return NONE
+    if math.isinf(ratio):
+        return "diverges"
+    if half is not None and math.isfinite(half) and half > 0.0:
+        return f"{plus_minus(100.0 * ratio, 100.0 * half)}\u202f%"
+    return f"{number(100.0 * ratio, 3)}\u202f%"
+
+
+def scaled(size: float, unit: str) -> tuple[float, str]:
+    """Factor and unit in which numbers of about this size read best: (1e6, "µm") for 3e-5 m."""
+    if unit not in PREFIXED or not (math.isfinite(size) and size > 0.0):
+        return 1.0, unit
+    step, prefix = next(((s, p) for s, p in PREFIXES if size >= s), PREFIXES[-1])
+    return 1.0 / step, f"{prefix}{unit}"

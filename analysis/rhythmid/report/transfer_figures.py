@@ -1,0 +1,139 @@
+"""Figures of harmonic transfer functions: magnitude, phase, and how they change from one model to another."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.report.blocks import Columns, Drawing, drawing
+from rhythmid.report.chart import Chart, Curve
+from rhythmid.report.quantity import number, pretty_unit, scaled
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+FAINT = 0.02  # of the peak, below which a phase means nothing
+STYLES = ("measured", "after", "before", "third")  # of |m| = 0, 1, 2, 3
+
+
+@dataclass(frozen=True, eq=False)
+class TransferFunction:
+    """One harmonic transfer function: index `m`, frequency [Hz] and complex value (n,), standard deviation (n,) of the
+    value where known, and a model's value (n,) to compare with where there is one."""
+
+    m: int
+    frequency: Array
+    value: Complex
+    std: Array | None = None
+    model: Complex | None = None
+
+
+def harmonic_name(m: int) -> str:
+    """G₀, G₊₁, G₋₁, …"""
+    sign = "₊" if m > 0 else "₋" if m < 0 else ""
+    return f"G{sign}{str(abs(m)).translate(str.maketrans('0123456789', '₀₁₂₃₄₅₆₇₈₉'))}"
+
+
+def style_of(m: int) -> str:
+    return STYLES[min(abs(m), len(STYLES) - 1)]
+
+
+def transfer_grid(functions: Sequence[TransferFunction], unit: str) -> Columns:
+    """Magnitude and phase of each function, with 95 % bands and the model's curve."""
+    figures: list[Drawing] = []
+    for one in functions:
+        name = harmonic_name(one.m)
+        magnitude = np.abs(one.value)
+        factor, shown = scaled(float(magnitude.max(initial=0.0)), unit.split("/")[0])
+        label = f"{pretty_unit(shown)}/{pretty_unit(unit.split('/', 1)[1])}" if "/" in unit else pretty_unit(shown)
+        band = None if one.std is None else 1.96 * one.std
+        low = None if band is None else factor * np.maximum(magnitude - band, 0.0)
+        high = None if band is None else factor * (magnitude + band)
+        curves = [Curve(one.frequency, factor * magnitude, "measured", "after", low=low, high=high)]
+        if one.model is not None:
+            curves.append(Curve(one.frequency, factor * np.abs(one.model), "fitted model", "before", dashed=True))
+        figures.append(
+            drawing(
+                f"|{name}|, magnitude",
+                Chart(f"Magnitude of {name} over frequency.", "output frequency [Hz]", f"[{label}]", tuple(curves), from_zero=True),
+                f"How strongly an input {_shift(one.m)}. Band: 95 %.",
+            )
+        )
+        figures.append(_phase(one, name, band, magnitude))
+    return Columns(tuple(figures))
+
+
+def _shift(m: int) -> str:
+    if m == 0:
+        return "appears at its own frequency"
+    side = "above" if m > 0 else "below"
+    return f"appears {'' if abs(m) == 1 else f'{abs(m)} × '}the pumping frequency {side} its own"
+
+
+def _phase(one: TransferFunction, name: str, band: Array | None, magnitude: Array) -> Drawing:
+    strong = magnitude > FAINT * magnitude.max(initial=0.0)
+    if band is not None:
+        strong &= magnitude > band
+    guide = one.value if one.model is None else one.model
+    turns = np.degrees(np.unwrap(np.angle(guide)))
+    phase = turns + np.degrees(np.angle(one.value * guide.conj()))  # on the model's own turn, however noisy it is
+    phase[~strong] = np.nan
+    half = None if band is None else np.degrees(np.arctan2(band, np.maximum(magnitude, 1e-300)))
+    curves = [
+        Curve(
+            one.frequency, phase, "measured", "after",
+            low=None if half is None else phase - half, high=None if half is None else phase + half,
+        )
+    ]  # fmt: skip
+    if one.model is not None:
+        curves.append(Curve(one.frequency, turns, "fitted model", "before", dashed=True))
+    return drawing(
+        f"∠{name}, phase",
+        Chart(f"Phase of {name} over frequency.", "output frequency [Hz]", "[degrees]", tuple(curves)),
+        "Its slope is the delay. Not drawn where the magnitude is below 2 % of its peak or less than its own interval.",
+    )
+
+
+def change_figures(
+    frequency: Array, indices: Sequence[int], before: Complex, after: Complex, unit: str, pumping: float | None
+) -> Columns:
+    """What an effect does to the transfer functions of a model.
+
+    `before` and `after` complex[h, n] of the harmonics `indices` (h,) at `frequency` [Hz] (n,).
+    """
+    top = np.abs(after)
+    main = list(indices).index(0)
+    largest = float(top[main].max())
+    factor, shown = scaled(largest, unit.split("/")[0])
+    label = f"{pretty_unit(shown)}/{pretty_unit(unit.split('/', 1)[1])}" if "/" in unit else pretty_unit(shown)
+    magnitudes, changes = [], []
+    for row, m in enumerate(indices):
+        style, dashed = style_of(m), m < 0
+        if abs(m) <= 1:
+            magnitudes.append(Curve(frequency, factor * top[row], f"|{harmonic_name(m)}|", style, dashed))
+        change = 100.0 * np.abs(after[row] - before[row]) / largest
+        changes.append(Curve(frequency, change, harmonic_name(m), style, dashed))
+    at = int(np.argmax(np.abs(after - before).max(axis=0)))
+    most = int(np.argmax(np.abs(after - before)[:, at]))
+    peak = 100.0 * float(np.abs(after - before)[most, at]) / largest
+    if peak < 2.0:
+        words = "Small everywhere: small-signal transfer functions alone would hardly have shown the effect."
+    else:
+        words = f"Largest in {harmonic_name(indices[most])} near {number(float(frequency[at]), 2)} Hz: {number(peak, 2)} %."
+    pumped = f" Pumped at {pumping:.4g} Hz." if pumping is not None else ""
+    return Columns(
+        (
+            drawing(
+                "Transfer functions of the final model",
+                Chart("Magnitudes of the final model's harmonic transfer functions over frequency.",
+                      "output frequency [Hz]", f"magnitude [{label}]", tuple(magnitudes), from_zero=True),
+                f"How the output answers a small input at its own frequency (G₀) and shifted by the pumping (G₊₁, G₋₁).{pumped}",
+            ),
+            drawing(
+                "What the effect changes in them",
+                Chart("Change of each harmonic transfer function from the refitted nominal model to the final model, in percent of "
+                      "the peak of G₀.", "output frequency [Hz]", "change [% of the peak of |G₀|]", tuple(changes), from_zero=True),
+                f"Distance between the functions of the refitted nominal and the final model, delays included. {words}",
+            ),
+        )
+    )  # fmt: skip
