@@ -1,0 +1,181 @@
+"""Data-quality report of a recording: every topic's rate, jitter, gaps and lateness, and the mapped channels."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.errors import InputError
+from rhythmid.record.bag import Bag, is_bag
+from rhythmid.record.block import Block
+from rhythmid.record.columns import Columns, read_columns
+from rhythmid.record.message_types import stamp_path
+from rhythmid.record.quality import ChannelQuality
+from rhythmid.record.read import read_record
+from rhythmid.record.signals import Signals
+from rhythmid.record.timing import Timing
+
+
+@dataclass(frozen=True)
+class TopicReport:
+    """One topic: its type, the timing of its receive times and of its header stamps, and receive minus stamp [s]."""
+
+    name: str
+    type: str
+    received: Timing
+    stamped: Timing | None = None
+    lateness_mean: float | None = None
+    lateness_max: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON: the timing by header stamp where there is one, else by receive time."""
+        timing = self.stamped or self.received
+        return {
+            "name": self.name,
+            "type": self.type,
+            "count": self.received.count,
+            "clock": "header" if self.stamped else "receive",
+            "rate": timing.rate,
+            "receive_rate": self.received.rate,
+            "jitter_std": timing.jitter_std,
+            "gaps": timing.gaps,
+            "lost": timing.lost,
+            "longest_gap": timing.longest_gap,
+            "duplicates": timing.duplicates,
+            "late": timing.late,
+            "lateness_mean": self.lateness_mean,
+            "lateness_max": self.lateness_max,
+        }
+
+
+@dataclass(frozen=True)
+class BagReport:
+    """Report on one recording.
+
+    Attributes
+    ----------
+    path, size : where it is and how large [bytes].
+    duration : from the first to the last message received [s].
+    topics : one report each, in order of name; empty for tables.
+    channels : quality of the mapped channels by role; empty if they cannot be read.
+    problems : why the recording cannot be used as mapped, one line each; empty if it can.
+    notes : what is wrong with the files, one line each.
+    """
+
+    path: Path
+    size: int = 0
+    duration: float = 0.0
+    topics: tuple[TopicReport, ...] = ()
+    channels: dict[str, ChannelQuality] = field(default_factory=dict)
+    truncated: bool = False
+    problems: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def usable(self) -> bool:
+        """Whether a record can be read from it."""
+        return not self.problems
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "path": str(self.path),
+            "size": self.size,
+            "duration": self.duration,
+            "truncated": self.truncated,
+            "usable": self.usable,
+            "topics": [topic.to_dict() for topic in self.topics],
+            "channels": {role: channel.to_dict() for role, channel in self.channels.items()},
+            "problems": list(self.problems),
+            "notes": list(self.notes),
+        }
+
+    def lines(self) -> list[str]:
+        """The report as plain text."""
+        found = [f"{self.path}: {self.size / 1e6:.1f} MB, {self.duration:.3f} s, {len(self.topics)} topics"]
+        width = max((len(topic.name) for topic in self.topics), default=0)
+        for topic in self.topics:
+            timing = topic.stamped or topic.received
+            late = "" if topic.lateness_mean is None else (
+                f", received {1e3 * topic.lateness_mean:.3f} ms after the stamp (at most {1e3 * topic.lateness_max:.3f})"
+                if topic.lateness_max is not None else ""
+            )  # fmt: skip
+            found.append(
+                f"  {topic.name:{width}}  {topic.type}  {timing.count} messages, {timing.rate:.4g} Hz, "
+                f"jitter {1e6 * timing.jitter_std:.3g} us, {timing.gaps} gaps, {timing.duplicates} duplicates{late}"
+            )
+        for role, channel in self.channels.items():
+            found.append(f"  {role}: {channel.source}: " + ("; ".join(channel.complaints()) or "flawless"))
+        found += [f"  note: {note}" for note in self.notes]
+        found += [f"  problem: {problem}" for problem in self.problems]
+        return found
+
+
+def quality_report(source: str | Path, signals: Signals | str | Path | None = None) -> BagReport:
+    """Report on a bag, or on the tables that a signals.yaml names.
+
+    What makes the recording unusable as a record is reported, not raised: InputError is left for a source that is no
+    recording at all.
+    """
+    source = Path(source)
+    channels: dict[str, ChannelQuality] = {}
+    problems: list[str] = []
+    notes: list[str] = []
+    duration = 0.0
+    try:
+        record = read_record(source, signals)
+        channels, duration = dict(record.quality.channels), record.duration
+        notes += record.quality.notes
+    except InputError as error:
+        if not is_bag(source) or not source.exists():
+            raise
+        problems.append(str(error))
+    if not is_bag(source):
+        return BagReport(source, source.stat().st_size, duration, (), channels, notes=tuple(notes))
+    bag = Bag(source)
+    received, stamped = _times(bag)
+    notes += [note for note in bag.notes if note not in notes]
+    times = [log_ns for log_ns in received.values() if len(log_ns)]
+    if times:
+        duration = (max(int(log_ns.max()) for log_ns in times) - min(int(log_ns.min()) for log_ns in times)) * 1e-9
+    topics = tuple(
+        _topic_report(name, topic.type, received.get(name, np.empty(0, dtype=np.int64)), stamped.get(name))
+        for name, topic in sorted(bag.topics.items())
+    )
+    size = sum(file.stat().st_size for file in bag.files)
+    return BagReport(source, size, duration, topics, channels, bag.truncated, tuple(problems), tuple(notes))
+
+
+def _times(bag: Bag) -> tuple[dict[str, NDArray[np.int64]], dict[str, Columns]]:
+    """Receive times [ns] of every topic, and the columns of those whose messages bear a stamp."""
+    received: dict[str, list[NDArray[np.int64]]] = {}
+    for block in bag.blocks():
+        received.setdefault(block.topic.name, []).append(block.log_ns)
+    stamped: dict[str, Columns] = {}
+    for name, topic in bag.topics.items():
+        try:
+            if stamp_path(topic) is not None:
+                stamped |= read_columns(_only(Bag(bag.path), name), {name: []})
+        except InputError:
+            continue  # of unknown type or damaged: its receive times still count
+    return {name: np.concatenate(parts) for name, parts in received.items()}, stamped
+
+
+def _only(bag: Bag, name: str) -> Iterator[Block]:
+    return bag.blocks(lambda topic: topic.name == name)
+
+
+def _topic_report(name: str, msgtype: str, log_ns: NDArray[np.int64], columns: Columns | None) -> TopicReport:
+    def seconds(times: NDArray[np.int64]) -> NDArray[np.float64]:
+        return (times - times.min()) * 1e-9 if len(times) else np.empty(0)
+
+    received = Timing.of(seconds(log_ns))
+    if columns is None or columns.stamp_ns is None or not len(log_ns):
+        return TopicReport(name, msgtype, received)
+    lateness = (columns.log_ns - columns.stamp_ns) * 1e-9
+    return TopicReport(
+        name, msgtype, received, Timing.of(seconds(columns.stamp_ns)), float(lateness.mean()), float(lateness.max())
+    )

@@ -1,0 +1,148 @@
+"""Data quality of a record: what a user should know before trusting what was identified from it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.record.timing import Timing
+
+CLIPPED_RUN = 4  # samples in a row at the extreme value
+CLIPPED_EXCESS = 5  # times as many samples in such runs as at the next value
+
+
+@dataclass(frozen=True)
+class ChannelQuality:
+    """Quality of one channel.
+
+    Attributes
+    ----------
+    source : where it comes from.
+    timing : of its samples, as recorded.
+    nan : number of samples that are not finite. A record has none; a report may.
+    clipped : samples in runs at the largest or smallest value, as a limit leaves them.
+    missing : messages that do not carry the channel's entry, such as those of another joint.
+    conflicts : duplicates whose values differ.
+    lateness_mean, lateness_max : receive time minus header stamp [s]; None where there is none.
+    """
+
+    source: str
+    timing: Timing
+    nan: int = 0
+    clipped: int = 0
+    missing: int = 0
+    conflicts: int = 0
+    lateness_mean: float | None = None
+    lateness_max: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON, the timing's among them."""
+        values = asdict(self)
+        return {"source": values.pop("source"), "rate": self.timing.rate, **values.pop("timing"), **values}
+
+    def complaints(self) -> list[str]:
+        """What deserves mention, one phrase each; empty for a flawless channel."""
+        timing = self.timing
+        found = {
+            f"{timing.gaps} gaps, {timing.lost} samples lost, longest {timing.longest_gap:.4g} s": timing.gaps,
+            f"{timing.duplicates} duplicates, {self.conflicts} of them with other values": timing.duplicates,
+            f"{timing.late} messages out of order": timing.late,
+            f"{self.nan} samples are not finite": self.nan,
+            f"{self.clipped} samples look clipped": self.clipped,
+            f"{self.missing} messages without this entry": self.missing,
+        }
+        return [phrase for phrase, count in found.items() if count]
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Quality of a record, channel by channel; `truncated` if the recording breaks off; `notes` one line each."""
+
+    channels: Mapping[str, ChannelQuality]
+    truncated: bool = False
+    notes: tuple[str, ...] = field(default_factory=tuple)
+
+    @property
+    def rate(self) -> float:
+        """Nominal rate of the output [Hz]."""
+        return self.channels["output"].timing.rate
+
+    @property
+    def jitter_std(self) -> float:
+        """Jitter of the output's times [s]."""
+        return self.channels["output"].timing.jitter_std
+
+    @property
+    def gaps(self) -> int:
+        """Gaps in all channels."""
+        return sum(channel.timing.gaps for channel in self.channels.values())
+
+    @property
+    def lost(self) -> int:
+        """Samples lost in all channels."""
+        return sum(channel.timing.lost for channel in self.channels.values())
+
+    @property
+    def duplicates(self) -> int:
+        """Duplicates dropped in all channels."""
+        return sum(channel.timing.duplicates for channel in self.channels.values())
+
+    @property
+    def clipped(self) -> int:
+        """Samples that look clipped in all channels."""
+        return sum(channel.clipped for channel in self.channels.values())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON."""
+        return {
+            "rate": self.rate,
+            "gaps": self.gaps,
+            "lost": self.lost,
+            "duplicates": self.duplicates,
+            "jitter_std": self.jitter_std,
+            "clipped": self.clipped,
+            "truncated": self.truncated,
+            "notes": list(self.notes),
+            "channels": {role: channel.to_dict() for role, channel in self.channels.items()},
+        }
+
+    def warnings(self) -> list[str]:
+        """What deserves mention, one line each."""
+        return [
+            *self.notes,
+            *(
+                f"{role}: {phrase}"
+                for role, channel in self.channels.items()
+                for phrase in channel.complaints()
+            ),
+        ]
+
+
+def clipped(value: NDArray[np.float64]) -> int:
+    """Number of samples in runs of at least 4 at the largest or smallest value.
+
+    Coarse rounding and plateaus also make such runs; it is clipping only if the next value inwards is far rarer than
+    the extreme one, for a signal that passes through has no reason to be. Signals of few levels have no such next value.
+    """
+    if len(value) < CLIPPED_RUN:
+        return 0
+    return sum(_at_limit(side) for side in (value, -value))
+
+
+def _at_limit(value: NDArray[np.float64]) -> int:
+    top = value.max()
+    at_top = value == top
+    if at_top.sum() < CLIPPED_RUN:
+        return 0
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], at_top, [False]])))
+    runs = edges[1::2] - edges[::2]
+    count = int(runs[runs >= CLIPPED_RUN].sum())
+    below = value.max(where=~at_top, initial=-math.inf)
+    at_ends = (
+        at_top[0] and at_top[-1] and len(runs) <= 2
+    )  # at rest before and after: a limit would act in between
+    few_levels = below == -math.inf or value.min() == below
+    return count if not (few_levels or at_ends) and count > CLIPPED_EXCESS * np.sum(value == below) else 0

@@ -1,0 +1,276 @@
+"""Records read: from bags and from tables, by what signals.yaml says the channels are."""
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.errors import InputError
+from rhythmid.record.bag import Bag, is_bag
+from rhythmid.record.block import Block, Topic
+from rhythmid.record.columns import Columns, read_columns
+from rhythmid.record.quality import ChannelQuality, Quality, clipped
+from rhythmid.record.record import SHORTEST, Channel, Record
+from rhythmid.record.signals import Signals, Sinusoid, Source
+from rhythmid.record.table import Table
+from rhythmid.record.timing import Timing, put_in_order
+from rhythmid.signal import Hold
+
+RUN_CLOCK = 10.0  # seconds; a clock that reads less at the first sample started with the run
+SAMPLES_PER_CYCLE = 100  # of a forcing that is given by formula
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples of one channel as recorded: time [s] and value in the order of recording, and how late they came [s]."""
+
+    source: Source
+    time: NDArray[np.float64]
+    value: NDArray[np.float64]
+    lateness: NDArray[np.floating] | None = None
+    missing: int = 0
+
+
+def load_records(paths: Iterable[str | Path], signals: Signals | str | Path | None = None) -> list[Record]:
+    """Read several records; see `read_record`."""
+    if isinstance(signals, (str, Path)):
+        signals = Signals.load(signals)
+    return [read_record(path, signals) for path in paths]
+
+
+def read_record(source: str | Path, signals: Signals | str | Path | None = None) -> Record:
+    """Read one record.
+
+    Parameters
+    ----------
+    source : a bag directory, an .mcap or .db3 file, or a signals.yaml that names tables.
+    signals : which channel is what; by default the topics of rhythmid's own nodes.
+
+    Times are relative to the first sample of any channel; a clock that began with the run (simulated time) and the
+    time column of a table keep their own zero. Messages that overtook one another are put back in order, duplicates
+    are dropped, and both are counted in the record's quality.
+
+    Raises InputError, one line, when there is no such recording, a topic or field is missing or empty, a used sample is
+    not finite, time goes backwards, or too little is recorded.
+    """
+    if isinstance(signals, (str, Path)):
+        signals = Signals.load(signals)
+    source = Path(source)
+    if source.suffix in (".yaml", ".yml"):
+        given = Signals.load(source)
+        if not given.from_tables:
+            raise InputError(f"{source}: names topics of a bag; give the bag, and this file with --signals")
+        return read_tables(given)
+    if not source.exists():
+        raise InputError(f"{source}: no such file or directory")
+    if not is_bag(source):
+        raise InputError(
+            f"{source}: is neither a bag (directory, .mcap, .db3) nor a signals.yaml that names tables"
+        )
+    if signals is not None and signals.from_tables:
+        raise InputError(f"{signals.path}: names tables, so it takes the place of the bag {source}")
+    return read_bag(Bag(source), signals)
+
+
+def read_bag(bag: Bag, signals: Signals | None = None) -> Record:
+    """Read a record from a bag. Raises InputError as `read_record` does."""
+    chosen = signals or Signals.default()
+    wanted = _fields(chosen)
+    run: list[bytes] = []
+    blocks = bag.blocks(lambda topic: topic.name in wanted or is_run(topic))
+    columns = read_columns(_divert_run(blocks, run), wanted)
+    description, notes = _description(run)
+    if signals is None and chosen.channels["output"].topic not in bag.topics and description is not None:
+        # our own recordings say under which namespace and for which joint they were made
+        named = Signals.default(str(description.get("namespace")), str(description.get("joint")))
+        if named.channels["output"].topic in bag.topics:
+            return read_bag(Bag(bag.path), named)
+    samples = [
+        (role, *_from_columns(bag, source, columns, chosen))
+        for role, source in chosen.channels.items()
+        if not (role in chosen.optional and source.topic not in bag.topics)
+    ]
+    first = min(int(stamp_ns.min()) for _, stamp_ns, _ in samples)
+    start_ns = 0 if 0 <= first < RUN_CLOCK * 1e9 else first
+    made = {role: replace(part, time=(stamp_ns - start_ns) * 1e-9) for role, stamp_ns, part in samples}
+    mend = "use  time: receive" if chosen.time.kind == "header" else "split the recording there"
+    quality = Quality({}, bag.truncated, (*bag.notes, *notes))
+    record = _record(bag.name, made, chosen, mend, quality)
+    return _finish(replace(record, start_ns=start_ns, hold=chosen.hold or "zero", run=description), chosen)
+
+
+def read_tables(signals: Signals) -> Record:
+    """Read a record from the tables that `signals` names. Raises InputError as `read_record` does."""
+    tables = {
+        file: Table.load(file) for source in signals.channels.values() if (file := source.file) is not None
+    }
+    made: dict[str, Samples] = {}
+    for role, source in signals.channels.items():
+        assert source.file is not None
+        table = tables[source.file]
+        try:
+            value = table.column(source.column)
+            if signals.time.kind == "column":
+                time = table.column(signals.time.column)
+            else:
+                time = np.arange(len(value)) / signals.time.rate
+        except InputError as error:
+            raise InputError(f"{source.place}{error}") from None
+        if len(time) != len(value):
+            raise InputError(f"{source.place}{source} has {len(value)} rows, its time column {len(time)}")
+        if not np.isfinite(time).all():
+            raise InputError(
+                f"{source.place}{table.path}: time is not finite in row {int(np.argmin(np.isfinite(time)))}"
+            )
+        made[role] = Samples(source, time, value * source.scale + source.offset)
+    assert signals.path is not None
+    record = _record(signals.path.stem, made, signals, "sort or split the table", Quality({}))
+    return _finish(replace(record, hold=signals.hold or _measured_hold(record)), signals)
+
+
+def is_run(topic: Topic) -> bool:
+    """Whether the topic carries descriptions of the experiment."""
+    return topic.type == "std_msgs/msg/String" and topic.name.rsplit("/", 1)[-1] == "run"
+
+
+def _divert_run(blocks: Iterable[Block], run: list[bytes]) -> Iterator[Block]:
+    for block in blocks:
+        if is_run(block.topic):
+            run.extend(block)
+        else:
+            yield block
+
+
+def _description(run: Sequence[bytes]) -> tuple[Mapping[str, Any] | None, list[str]]:
+    """The newest description of the experiment, and a note if it cannot be read."""
+    if not run:
+        return None, []
+    try:
+        said = json.loads(run[-1][8:].rstrip(b"\0").decode())
+    except ValueError:
+        said = None
+    return (said, []) if isinstance(said, dict) else (None, ["the topic run does not carry a JSON object"])
+
+
+def _fields(signals: Signals) -> dict[str, list[Any]]:
+    wanted: dict[str, list[Any]] = {}
+    for source in signals.channels.values():
+        wanted.setdefault(source.topic, []).append(source.field)
+    return wanted
+
+
+def _from_columns(
+    bag: Bag, source: Source, columns: Mapping[str, Columns], signals: Signals
+) -> tuple[NDArray[np.int64], Samples]:
+    """Times [ns] and samples of one channel, in the order of recording."""
+    if source.topic not in bag.topics:
+        listed = ", ".join(sorted(bag.topics)) or "none"
+        raise InputError(f"{source.place}topic {source.topic} is not in {bag.path}; its topics: {listed}")
+    if source.topic not in columns:
+        raise InputError(
+            f"{source.place}topic {source.topic} in {bag.path} is empty: no message was recorded"
+        )
+    found = columns[source.topic]
+    assert source.field is not None
+    missing = found.missing[source.field]
+    if missing.all():
+        raise InputError(
+            f"{source.place}no message of {source.topic} in {bag.path} has {source.field.text}: "
+            f"{found.reason[source.field]}"
+        )
+    if signals.time.kind == "header" and found.stamp_ns is None:
+        raise InputError(
+            f"{source.place}{source.topic}: {found.topic.type} has no time stamp; use  time: receive"
+        )
+    stamp_ns = found.stamp_ns if signals.time.kind == "header" else found.log_ns
+    assert stamp_ns is not None
+    kept = ~missing
+    lateness = np.asarray((found.log_ns - stamp_ns)[kept] * 1e-9) if signals.time.kind == "header" else None
+    value = found.values[source.field][kept] * source.scale + source.offset
+    return stamp_ns[kept], Samples(source, np.empty(0), value, lateness, int(missing.sum()))
+
+
+def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str, quality: Quality) -> Record:
+    """Channels in order of time without duplicates, and their quality as recorded."""
+    channels: dict[str, Any] = {}
+    judged: dict[str, ChannelQuality] = {}
+    for role, samples in made.items():
+        label = f"{samples.source.place}{samples.source}"
+        if len(samples.time) == 0:
+            raise InputError(f"{label}: is empty")
+        timing = Timing.of(samples.time)
+        kept = put_in_order(samples.time, label, mend)
+        time, value = samples.time[kept], samples.value[kept]
+        judged[role] = ChannelQuality(
+            str(samples.source),
+            timing,
+            nan=int(np.count_nonzero(~np.isfinite(samples.value))),
+            clipped=clipped(value),
+            missing=samples.missing,
+            conflicts=_conflicts(samples, time, value),
+            lateness_mean=None if samples.lateness is None else float(samples.lateness.mean()),
+            lateness_max=None if samples.lateness is None else float(samples.lateness.max()),
+        )
+        channels[role] = Channel(time, value, samples.source.unit, str(samples.source))
+    return Record(
+        name, input_kind=signals.input_kind, forcing_law=signals.forcing_law,
+        quality=replace(quality, channels=judged), **channels,
+    )  # fmt: skip
+
+
+def _conflicts(samples: Samples, time: NDArray[np.float64], value: NDArray[np.float64]) -> int:
+    """Number of samples whose value differs from the one that was kept for their time."""
+    kept = value[np.searchsorted(time, samples.time)]
+    return int(np.count_nonzero((samples.value != kept) & np.isfinite(samples.value)))
+
+
+def _finish(record: Record, signals: Signals) -> Record:
+    """Cut to what is used, refuse what cannot be used, and add a forcing that is known by formula."""
+    if signals.use != (-np.inf, np.inf):
+        record = record.cut(*signals.use)
+    for role, channel in record.channels.items():
+        finite = np.isfinite(channel.value)
+        if not finite.all():
+            raise InputError(
+                f"{signals.channels[role].place}{channel.source}: {np.count_nonzero(~finite)} of {len(channel)} samples "
+                f"are NaN or infinite, the first at {channel.time[np.argmin(finite)]:.6f} s"
+            )
+    if len(record.output) < SHORTEST:
+        raise InputError(
+            f"{record.name}: {record.output.source} has only {len(record.output)} samples: too short"
+        )
+    frequency = _pumping_frequency(record)
+    if frequency > 0.0 and record.duration * frequency < 1.0:
+        raise InputError(
+            f"{record.name}: lasts {record.duration:.4g} s, less than one period of the forcing ({1 / frequency:.4g} s)"
+        )
+    if record.forcing_law is None:
+        return record
+    step = min(record.output.period, 1.0 / (SAMPLES_PER_CYCLE * frequency))
+    ends = [(channel.time[0], channel.time[-1]) for channel in record.channels.values()]
+    start = min(first for first, _ in ends)
+    time = start + np.arange(np.ceil((max(last for _, last in ends) - start) / step) + 1) * step
+    return replace(record, forcing=Channel(time, record.forcing_law(time), "N", "formula"))
+
+
+def _pumping_frequency(record: Record) -> float:
+    """Frequency of the forcing [Hz] as far as formula or description tell, else 0."""
+    law = record.forcing_law
+    if law is None and record.run is not None:
+        try:
+            law = Sinusoid(**{key: float(value) for key, value in record.run["forcing"].items()})
+        except (KeyError, TypeError, ValueError, AttributeError):
+            return 0.0
+    return law.frequency if law is not None and law.amplitude != 0.0 else 0.0
+
+
+def _measured_hold(record: Record) -> Hold:
+    """How a tabulated, measured input continues: band-limited if evenly spaced, else by straight lines."""
+    if record.input is None:
+        return "zero"
+    step = np.diff(record.input.time)
+    return "band_limited" if len(step) > 2 and np.ptp(step) < 2e-9 else "linear"

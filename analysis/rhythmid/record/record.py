@@ -1,0 +1,209 @@
+"""Record: the channels of one recording, each with its own times, and the same on one uniform grid."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from rhythmid.errors import InputError
+from rhythmid.record.quality import Quality
+from rhythmid.record.signals import ROLES, InputKind, Sinusoid
+from rhythmid.record.timing import GAP, SAME, nominal_period
+from rhythmid.signal import Hold, continuous
+
+Array = NDArray[np.float64]
+SHORTEST = 8  # samples that a record must have in common
+OFTEN = 0.1  # share of steps longer than 1.5 periods, beyond which a channel is not periodic
+NEAR = 0.1  # periods; samples that follow another sooner are left out of an interpolation
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """Samples of one signal: `time` [s] relative to the record's start, increasing, and `value` [unit]; float64[n]."""
+
+    time: Array
+    value: Array
+    unit: str
+    source: str = ""
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def period(self) -> float:
+        """Nominal time between samples [s]; infinite for a single sample."""
+        return nominal_period(np.diff(self.time)) if len(self) > 1 else np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Uniform:
+    """Channels of a record at common, evenly spaced times.
+
+    Attributes
+    ----------
+    time : float64[n], relative to the record's start [s].
+    input, output, forcing, velocity, effort, reference : float64[n] or None, in the units of the record's channels.
+    period, rate : of the grid [s, Hz].
+    valid : bool[n]; False where a channel has a gap, so that its value is no more than a bridge.
+    """
+
+    time: Array
+    output: Array
+    period: float
+    valid: NDArray[np.bool_]
+    input: Array | None = None
+    forcing: Array | None = None
+    velocity: Array | None = None
+    effort: Array | None = None
+    reference: Array | None = None
+
+    @property
+    def rate(self) -> float:
+        return 1.0 / self.period
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One recording, cut to what is used of it.
+
+    Attributes
+    ----------
+    input : what drives the machine; None in a free decay.
+    output : the measured motion.
+    forcing, velocity, effort, reference : where recorded; `effort` is the total actuator force.
+    start_ns : time of the record's zero on the recording's clock [ns].
+    hold : how the input continues between its samples. With 'zero', a value holds from its stamp until the next one.
+    input_kind : force, base_displacement or base_acceleration.
+    forcing_law : the forcing's formula, if that is how it is known; `forcing` then holds samples of it.
+    run : the description of the experiment that the recording itself carries.
+    """
+
+    name: str
+    output: Channel
+    input: Channel | None = None
+    forcing: Channel | None = None
+    velocity: Channel | None = None
+    effort: Channel | None = None
+    reference: Channel | None = None
+    start_ns: int = 0
+    hold: Hold = "zero"
+    input_kind: InputKind = "force"
+    quality: Quality = field(default_factory=lambda: Quality({}))
+    forcing_law: Sinusoid | None = None
+    run: Mapping[str, Any] | None = None
+
+    @property
+    def channels(self) -> dict[str, Channel]:
+        """Channels that the record has, by role."""
+        return {role: channel for role in ROLES if (channel := getattr(self, role)) is not None}
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last output sample [s]."""
+        return float(self.output.time[-1] - self.output.time[0])
+
+    def cut(self, start: float, end: float) -> "Record":
+        """The part with start <= time < end [s]; of a held input, also the value in force at the start.
+
+        Raises InputError when fewer than 8 samples of the output, or none of another channel, are left.
+        """
+        parts: dict[str, Channel] = {}
+        for role, channel in self.channels.items():
+            first, last = np.searchsorted(channel.time, [start - SAME, end - SAME])
+            if role == "input" and self.hold == "zero" and first > 0 and (
+                first == len(channel) or channel.time[first] > start + SAME
+            ):  # fmt: skip
+                first -= 1
+            parts[role] = replace(channel, time=channel.time[first:last], value=channel.value[first:last])
+            if len(parts[role]) < (SHORTEST if role == "output" else 1):
+                raise InputError(
+                    f"{self.name}: {role} has {len(parts[role])} samples within use: [{start:g}, {end:g}] s; "
+                    f"it lasts from {channel.time[0]:g} to {channel.time[-1]:g} s"
+                )
+        return replace(self, **parts)
+
+    def uniform(self, rate: float | None = None) -> Uniform:
+        """All channels on one grid that spans what they have in common.
+
+        The rate [Hz] is that of the output unless given. The grid passes through the samples of the most important
+        channel that is evenly spaced. Samples that lie on the grid (within 1 ns) are copied. Elsewhere the input and
+        reference follow their hold, other channels a cubic spline; there is no low-pass filter in front of a lower
+        rate. A formula for the forcing is evaluated. Raises InputError when the channels have too little in common.
+        """
+        if rate is not None and not (np.isfinite(rate) and rate > 0.0):
+            raise InputError(f"{self.name}: a rate of {rate} Hz is impossible")
+        period = 1.0 / rate if rate is not None else self.output.period
+        channels = self.channels
+        if self.forcing_law is not None:
+            del channels["forcing"]
+        start = max(channel.time[0] for channel in channels.values())
+        end = min(self._last(role, channel) for role, channel in channels.items())
+        anchor = next((c.time[0] for role in ("output", "input", "forcing") if (c := channels.get(role)) is not None
+                       and _on_grid(c.time, c.time[0], period).all()), self.output.time[0])  # fmt: skip
+        low = int(np.ceil((start - anchor - SAME) / period))
+        high = int(np.floor((end - anchor + SAME) / period))
+        if high - low + 1 < SHORTEST:
+            spans = ", ".join(f"{role} {c.time[0]:.6g} to {c.time[-1]:.6g} s" for role, c in channels.items())
+            raise InputError(
+                f"{self.name}: the channels have less than {SHORTEST} samples in common ({spans})"
+            )
+        grid = anchor + np.arange(low, high + 1) * period
+        values = {role: self._resample(role, channel, grid) for role, channel in channels.items()}
+        if self.forcing_law is not None:
+            values["forcing"] = self.forcing_law(grid)
+        valid = np.ones(len(grid), dtype=bool)
+        for channel in channels.values():
+            valid &= ~_within_gap(channel, grid)
+        return Uniform(grid, values.pop("output"), period, valid, **values)
+
+    def _last(self, role: str, channel: Channel) -> float:
+        """Until when the channel has a value: a held one keeps its last for one more period, a lone one for ever."""
+        held = (role == "input" and self.hold == "zero") or role == "reference"
+        return channel.time[-1] + (channel.period if held else 0.0)
+
+    def _resample(self, role: str, channel: Channel, grid: Array) -> Array:
+        time, value = channel.time, channel.value
+        if (role == "input" and self.hold == "zero") or role == "reference":
+            return value[np.searchsorted(time, grid + SAME, side="right") - 1]
+        nearest = np.clip(np.searchsorted(time, grid - SAME), 0, len(time) - 1)
+        hit = np.abs(time[nearest] - grid) <= SAME
+        result = value[nearest]
+        if hit.all():
+            return result
+        if role == "input":
+            if self.hold == "band_limited" and not _on_grid(time, time[0], channel.period).all():
+                raise InputError(
+                    f"{self.name}: input is not evenly spaced, which hold: band_limited needs; use linear"
+                )
+            between = continuous(time, value, self.hold)
+        else:
+            apart = np.concatenate([[True], np.diff(time) >= NEAR * channel.period])
+            if apart.sum() < 4:
+                raise InputError(f"{self.name}: {role} has only {apart.sum()} samples to interpolate between")
+            between = CubicSpline(time[apart], value[apart])
+        result[~hit] = between(grid[~hit])
+        return result
+
+
+def _on_grid(time: Array, anchor: float, period: float) -> NDArray[np.bool_]:
+    return np.abs(time - anchor - np.rint((time - anchor) / period) * period) <= SAME
+
+
+def _within_gap(channel: Channel, grid: Array) -> NDArray[np.bool_]:
+    """Whether grid times lie strictly between two samples of the channel that are more than 1.5 periods apart.
+
+    A channel in which that is common, such as a command that is sent when it changes, has no gaps.
+    """
+    time = channel.time
+    wide = np.diff(time, prepend=-np.inf, append=np.inf) > GAP * channel.period
+    if wide[1:-1].mean() > OFTEN if len(time) > 1 else True:
+        return np.zeros(len(grid), dtype=bool)
+    after = np.searchsorted(time, grid - SAME)
+    hit = np.abs(time[np.minimum(after, len(time) - 1)] - grid) <= SAME
+    return wide[after] & ~hit & (after > 0) & (after < len(time))

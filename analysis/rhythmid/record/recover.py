@@ -1,0 +1,80 @@
+"""Recovery of a recording whose recorder was killed: what is readable becomes a complete bag."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import ReaderError
+from rosbags.rosbag2.metadata import parse_qos
+
+from rhythmid.errors import InputError
+from rhythmid.record.bag import Bag
+from rhythmid.record.bag_writer import BagWriter, Storage, new_bag
+from rhythmid.record.block import Topic
+from rhythmid.record.message_types import typestore
+
+
+@dataclass(frozen=True)
+class Recovered:
+    """The new bag, how many messages of each topic it holds, and what was found wrong with the old one."""
+
+    path: Path
+    counts: Mapping[str, int]
+    notes: tuple[str, ...]
+
+
+def recover(path: str | Path, out: str | Path, storage: Storage = "mcap") -> Recovered:
+    """Write every whole message of the bag `path`, broken off or damaged as it may be, to the new bag `out`.
+
+    Topics, types, receive times and QoS are kept; the old bag is not touched. Raises InputError when nothing can be
+    read, or `out` exists or cannot be written.
+    """
+    bag = Bag(path)
+    connections: dict[str, Connection] = {}
+    counts: dict[str, int] = {}
+    left_out: dict[str, str] = {}
+    with new_bag(out, storage) as writer:
+        # blocks of one buffer belong together: their messages are put back in the order of recording
+        for _, together in groupby(bag.blocks(), key=lambda block: id(block.buffer)):
+            blocks = [block for block in together if block.topic.name not in left_out]
+            for block in blocks:
+                name = block.topic.name
+                if name not in connections:
+                    try:
+                        connections[name] = _declare(writer, block.topic)
+                    except InputError as error:
+                        left_out[name] = f"left out: {error}"
+            blocks = [block for block in blocks if block.topic.name in connections]
+            messages = [
+                (connections[block.topic.name], time, data)
+                for block in blocks
+                for time, data in zip(block.log_ns.tolist(), block)
+            ]
+            starts = [block.start for block in blocks] or [np.empty(0, dtype=np.int64)]
+            for index in np.argsort(np.concatenate(starts), kind="stable").tolist():
+                writer.write(*messages[index])
+            for block in blocks:
+                counts[block.topic.name] = counts.get(block.topic.name, 0) + len(block)
+        if not counts:
+            raise InputError(f"{path}: holds no readable message; nothing was recovered")
+    return Recovered(Path(out), counts, (*bag.notes, *left_out.values()))
+
+
+def _declare(writer: BagWriter, topic: Topic) -> Connection:
+    store = typestore(topic)
+    definition = topic.definition or store.generate_msgdef(topic.type, ros_version=2)[0]
+    try:
+        profiles = parse_qos(topic.qos)
+    except (ReaderError, KeyError, TypeError):
+        profiles = []
+    return writer.add_connection(
+        topic.name,
+        topic.type,
+        msgdef=definition,
+        rihs01=store.hash_rihs01(topic.type),
+        serialization_format=topic.encoding,
+        offered_qos_profiles=profiles,
+    )

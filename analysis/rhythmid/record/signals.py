@@ -1,0 +1,252 @@
+"""signals.yaml: which recorded channel is what.
+
+    time: header                      # header | receive | {column: t} | {sample_rate: 610.3515625}
+    input:   {topic: /hopper/excitation,   field: "effort[leg]"}
+    output:  {topic: /hopper/joint_states, field: "position[leg]"}
+    forcing: {topic: /hopper/forcing,      field: "effort[leg]"}
+    use: [10, 90]                     # seconds of the record's time, the end excluded
+
+A channel is a field of a topic, or a `column` of a `file` (.mat, .csv, .npz; relative to signals.yaml; `tables: {file: …}`
+names one file for all). Its value is `scale` * recorded + `offset`, in `unit`. `input: none` says that nothing but the
+forcing, if that, drives the machine. `forcing: {amplitude: 1.0, frequency: 1.0, phase: 0.0}` states
+amplitude * cos(2π frequency t + phase) in the record's time.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.document import Node, parse, read
+from rhythmid.errors import InputError
+from rhythmid.record.field import Field
+from rhythmid.signal import Hold
+
+InputKind = Literal["force", "base_displacement", "base_acceleration"]
+ROLES = ("input", "output", "forcing", "velocity", "effort", "reference")
+UNITS = {"input": "N", "output": "m", "forcing": "N", "velocity": "m/s", "effort": "N", "reference": "m"}
+INPUT_UNITS: dict[InputKind, str] = {"force": "N", "base_displacement": "m", "base_acceleration": "m/s^2"}
+HOLDS: tuple[Hold, ...] = ("zero", "linear", "band_limited")
+NOT_SI = {
+    "mm": (1e-3, "m"), "cm": (1e-2, "m"), "um": (1e-6, "m"), "µm": (1e-6, "m"), "km": (1e3, "m"), "in": (0.0254, "m"),
+    "mm/s": (1e-3, "m/s"), "cm/s": (1e-2, "m/s"), "deg": (math.pi / 180, "rad"), "deg/s": (math.pi / 180, "rad/s"),
+    "rpm": (math.pi / 30, "rad/s"), "mN": (1e-3, "N"), "kN": (1e3, "N"), "lbf": (4.4482216152605, "N"),
+    "mNm": (1e-3, "N*m"), "g": (9.80665, "m/s^2"), "mm/s^2": (1e-3, "m/s^2"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Where times come from: `header` stamps, `receive` times, a `column` of the table, or a sample `rate` [Hz]."""
+
+    kind: Literal["header", "receive", "column", "rate"] = "header"
+    column: str | int = ""
+    rate: float = 0.0
+
+
+@dataclass(frozen=True)
+class Sinusoid:
+    """Forcing known by formula: amplitude * cos(2π frequency [Hz] t [s] + phase [rad])."""
+
+    amplitude: float
+    frequency: float
+    phase: float = 0.0
+
+    def __call__(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.amplitude * np.cos(2.0 * np.pi * self.frequency * time + self.phase)
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where one channel comes from: `field` of `topic`, or `column` of `file`."""
+
+    unit: str
+    topic: str = ""
+    field: Field | None = None
+    file: Path | None = None
+    column: str | int = ""
+    scale: float = 1.0
+    offset: float = 0.0
+    place: str = ""  # "signals.yaml:3: input: ", to begin a complaint with
+
+    def __str__(self) -> str:
+        if self.file is not None:
+            return f"{self.file.name} column {self.column}"
+        return f"{self.topic} {self.field.text if self.field else ''}"
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Contents of a signals.yaml.
+
+    Attributes
+    ----------
+    channels : role (`input`, `output`, `forcing`, `velocity`, `effort`, `reference`) -> source.
+    forcing_law : the forcing where it is given by formula.
+    input_kind : what the input is.
+    hold : how the input continues between its samples; None stands for the default of its kind of record.
+    use : [t0, t1) in seconds of the record's time.
+    optional : roles that may be absent from the bag (the forcing of the default signals).
+    """
+
+    channels: Mapping[str, Source]
+    time: Clock = Clock()
+    forcing_law: Sinusoid | None = None
+    input_kind: InputKind = "force"
+    hold: Hold | None = None
+    use: tuple[float, float] = (-math.inf, math.inf)
+    optional: frozenset[str] = field(default_factory=frozenset)
+    path: Path | None = None
+
+    @property
+    def from_tables(self) -> bool:
+        """Whether the channels are columns of files, so that no bag is needed."""
+        return self.channels["output"].file is not None
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Signals":
+        """The signals.yaml at `path`. Raises InputError naming line and key of what is wrong."""
+        return _signals(read(path), Path(path))
+
+    @classmethod
+    def from_text(cls, text: str, path: str | Path = "signals.yaml") -> "Signals":
+        """The signals in a YAML text that stands for the file `path`."""
+        return _signals(parse(text, str(path)), Path(path))
+
+    @classmethod
+    def default(cls, namespace: str = "/hopper", joint: str = "leg") -> "Signals":
+        """The topics that rhythmid's own nodes publish; the forcing may be absent."""
+        topics = {"input": "excitation", "output": "joint_states", "forcing": "forcing"}
+        fields = {"input": "effort", "output": "position", "forcing": "effort"}
+        channels = {
+            role: Source(
+                UNITS[role], f"{namespace.rstrip('/')}/{topic}", Field.parse(f"{fields[role]}[{joint}]")
+            )
+            for role, topic in topics.items()
+        }
+        return cls(channels, optional=frozenset({"forcing"}))
+
+
+def _signals(document: Node, path: Path) -> Signals:
+    keys = document.mapping(["time", *ROLES, "use", "tables"])
+    file = _default_file(keys.get("tables"), path.parent)
+    channels: dict[str, Source] = {}
+    law: Sinusoid | None = None
+    kind: InputKind = "force"
+    hold: Hold | None = None
+    for role in ROLES:
+        if role not in keys or keys[role].value in (None, "none"):
+            continue
+        node = keys[role]
+        options = node.mapping()
+        if role == "forcing" and "amplitude" in options:
+            law = _sinusoid(node)
+            continue
+        unit = UNITS[role]
+        if role == "input":
+            if "kind" in options:
+                kind = cast(InputKind, options["kind"].choice(INPUT_UNITS))
+            if "hold" in options:
+                hold = cast(Hold, options["hold"].choice(HOLDS))
+            unit = INPUT_UNITS[kind]
+        channels[role] = _source(node, role, unit, path.parent, file)
+    if "output" not in channels:
+        document.fail("'output:' is missing: which channel is the measured motion?")
+    output = channels["output"]
+    for role, source in channels.items():
+        if (source.file is None) != (output.file is None):
+            keys[role].fail("topics and files cannot be mixed in one record")
+    if "use" in keys:
+        ends = [end.number() for end in keys["use"].items()]
+        if len(ends) != 2 or not ends[0] < ends[1]:
+            keys["use"].fail("two times [t0, t1] in seconds are expected, t0 < t1")
+        use = ends[0], ends[1]
+    else:
+        use = -math.inf, math.inf
+    clock = _clock(keys.get("time"), document, output.file is not None)
+    return Signals(channels, clock, law, kind, hold, use, path=path)
+
+
+def _default_file(node: Node | None, folder: Path) -> Path | None:
+    if node is None:
+        return None
+    keys = node.mapping(["file", "column"])
+    if "column" in keys:
+        keys["column"].fail("a column belongs to a channel, as in  input: {file: data.mat, column: V1}")
+    if "file" not in keys:
+        node.fail("'file:' is missing")
+    return folder / keys["file"].text()
+
+
+def _source(node: Node, role: str, unit: str, folder: Path, default_file: Path | None) -> Source:
+    known = ["topic", "field", "file", "column", "unit", "scale", "offset"]
+    keys = node.mapping([*known, "kind", "hold"] if role == "input" else known)
+    if "unit" in keys:
+        unit = keys["unit"].text()
+        if unit in NOT_SI:
+            factor, si = NOT_SI[unit]
+            keys["unit"].fail(f"{unit} is not an SI unit: write  scale: {factor:.10g}, unit: {si}")
+    scale = keys["scale"].number() if "scale" in keys else 1.0
+    offset = keys["offset"].number() if "offset" in keys else 0.0
+    if scale == 0.0 or not math.isfinite(scale) or not math.isfinite(offset):
+        node.fail("scale must be finite and other than 0, offset finite")
+    place = f"{node.place}: {role}: "
+    if "topic" in keys:
+        if "file" in keys or "column" in keys:
+            node.fail("give either topic and field, or file and column")
+        if "field" not in keys:
+            node.fail("'field:' is missing, such as  field: position[leg]  or  field: wrench.force.z")
+        topic = keys["topic"].text()
+        try:
+            wanted = Field.parse(str(keys["field"].value))
+        except InputError as error:
+            keys["field"].fail(str(error))
+        return Source(unit, "/" + topic.lstrip("/"), wanted, scale=scale, offset=offset, place=place)
+    if "field" in keys:
+        node.fail("'topic:' is missing: whose field is it?")
+    if "column" not in keys:
+        node.fail("give topic and field (of a bag) or file and column (of a .mat, .csv or .npz table)")
+    file = folder / keys["file"].text() if "file" in keys else default_file
+    if file is None:
+        node.fail("'file:' is missing: whose column is it?")
+    return Source(unit, file=file, column=_column(keys["column"]), scale=scale, offset=offset, place=place)
+
+
+def _column(node: Node) -> str | int:
+    if isinstance(node.value, bool) or not isinstance(node.value, (str, int)):
+        node.fail("a column's name, or its number counted from 0, is expected")
+    return node.value
+
+
+def _sinusoid(node: Node) -> Sinusoid:
+    keys = node.mapping(["amplitude", "frequency", "phase"])
+    if "frequency" not in keys:
+        node.fail("'frequency:' [Hz] is missing")
+    phase = keys["phase"].number(-1e6, 1e6) if "phase" in keys else 0.0
+    return Sinusoid(keys["amplitude"].number(-1e12, 1e12), keys["frequency"].number(1e-9, 1e9), phase)
+
+
+def _clock(node: Node | None, document: Node, tables: bool) -> Clock:
+    if node is None:
+        if tables:
+            document.fail("'time:' is missing; for a table it is {sample_rate: 1000} in Hz or {column: t}")
+        return Clock()
+    if isinstance(node.value, dict):
+        keys = node.mapping(["column", "sample_rate"])
+        if not tables:
+            node.fail(
+                "column and sample_rate are for tables; the messages of a bag have times: header or receive"
+            )
+        if len(keys) != 1:
+            node.fail("either sample_rate or column is expected")
+        if "column" in keys:
+            return Clock("column", column=_column(keys["column"]))
+        return Clock("rate", rate=keys["sample_rate"].number(1e-6, 1e12))
+    kind = node.choice(["header", "receive"])
+    if tables:
+        node.fail("a table has no message times: give {sample_rate: 1000} in Hz or {column: t}")
+    return Clock("receive" if kind == "receive" else "header")

@@ -1,0 +1,118 @@
+"""Times of samples: order, duplicates, nominal period, gaps, jitter."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.errors import InputError
+
+GAP = 1.5  # periods between two samples, beyond which at least one is missing
+LATE = 10.0  # periods by which a message may arrive late and still be put back in order
+SAME = 1e-9  # seconds; times that differ by less are one
+
+Times = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What the times of a channel or topic look like.
+
+    Attributes
+    ----------
+    count : number of samples, duplicates included.
+    start, end : first and last time [s].
+    period : nominal time between samples [s]; 0 where there are fewer than two.
+    jitter_std : standard deviation of the time between neighbours [s], gaps left out.
+    gaps, lost : number of gaps (> 1.5 periods) and of samples that are missing in them.
+    longest_gap : [s]; 0 without gaps.
+    duplicates : samples with the time of another.
+    late : samples that were recorded after one with a later time.
+    """
+
+    count: int
+    start: float = 0.0
+    end: float = 0.0
+    period: float = 0.0
+    jitter_std: float = 0.0
+    gaps: int = 0
+    lost: int = 0
+    longest_gap: float = 0.0
+    duplicates: int = 0
+    late: int = 0
+
+    @property
+    def rate(self) -> float:
+        """Nominal samples per second [Hz]."""
+        return 1.0 / self.period if self.period > 0.0 else 0.0
+
+    @classmethod
+    def of(cls, time: Times) -> "Timing":
+        """Timing of samples in the order of recording, float64[n] in seconds; any n, any order."""
+        if len(time) == 0:
+            return cls(0)
+        late = int(np.count_nonzero(time < np.maximum.accumulate(time)))
+        ordered = np.sort(time) if late else time
+        step = np.diff(ordered)
+        duplicates = int(np.count_nonzero(step == 0.0))
+        step = step[step > 0.0] if duplicates else step
+        start, end = float(ordered[0]), float(ordered[-1])
+        if len(step) == 0:
+            return cls(len(time), start, end, duplicates=duplicates, late=late)
+        period = nominal_period(step)
+        gap = step > GAP * period
+        regular = step[~gap]
+        missing = int(np.rint(step[gap] / period - 1.0).sum())
+        # late samples look like gaps, but nothing is missing then over the whole
+        missing = min(missing, max(0, round((end - start) / period) - len(step)))
+        return cls(
+            len(time), start, end, period,
+            round(float(np.sqrt(np.mean((regular - period) ** 2))), 10) if len(regular) else 0.0,
+            int(gap.sum()), missing, float(step[gap].max()) if gap.any() else 0.0, duplicates, late,
+        )  # fmt: skip
+
+
+def nominal_period(step: Times) -> float:
+    """Nominal period from the positive times between samples [s].
+
+    The median, refined by the mean of all steps within half of it (times that were rounded to, say, a millisecond
+    have a median that is off by up to half of one), and rounded to whole nanoseconds, the resolution of stamps;
+    not rounded where the steps are even and the rounding would lead away from them.
+    """
+    median = float(np.median(step))
+    near = step[np.abs(step - median) < 0.5 * median]
+    mean = float(np.mean(near))
+    whole = round(mean * 1e9) * 1e-9
+    even = float(np.abs(near - mean).max()) < 2.0 * SAME
+    return mean if whole == 0.0 or (even and abs(whole - mean) * len(step) > 0.5 * SAME) else whole
+
+
+def put_in_order(time: Times, label: str, mend: str) -> NDArray[np.int64]:
+    """Indices that put samples in order of time; of samples with one time, only the first is kept.
+
+    Messages may overtake one another on their way to the recorder. Such a message is put back where it belongs: it is
+    at most 10 periods late and fills a hole, so that no two samples come closer than half a period. Any other step
+    backwards means that the clock was set back, and then the recording cannot be trusted.
+
+    Raises InputError, beginning with `label` and ending with `mend`, when time goes backwards or stands still.
+    """
+    if len(time) > 1 and time.min() == time.max():
+        raise InputError(f"{label}: all {len(time)} samples have the same time, {time[0]:g} s; {mend}")
+    newest = np.maximum.accumulate(time)
+    late = np.flatnonzero(time < newest)
+    if len(late) == 0:
+        return np.flatnonzero(np.diff(time, prepend=-np.inf) > 0.0)
+    order = np.argsort(time, kind="stable")
+    kept = order[np.diff(time[order], prepend=-np.inf) > 0.0]
+    step = np.diff(time[kept])
+    period = nominal_period(step)
+    moved = np.flatnonzero(np.isin(kept, late))
+    near = np.concatenate([step[moved[moved > 0] - 1], step[moved[moved < len(step)]]])
+    fills = len(moved) == len(late) and (near >= 0.5 * period).all()
+    if not fills or (newest[late] - time[late]).max() > LATE * period:
+        first = late[0]
+        raise InputError(
+            f"{label}: time goes backwards by {newest[first] - time[first]:.6g} s at {newest[first]:.6f} s "
+            f"(sample {first} of {len(time)}): the clock was set back; {mend}"
+        )
+    return kept
