@@ -9,25 +9,32 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
 from rhythmid.identify.series import Series, dominant_frequency, split
 from rhythmid.model import Model
-from rhythmid.signal import band_limited
+from rhythmid.signal import band_limited, first_order_hold
 
 INPUT_DELAY = "input_delay.delay"
 Tell = Callable[[str], None]
+EVEN = 1e-3  # of the period; spread of the times between samples that still counts as even
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """The refitted nominal model, its series (with the input as it turned out to be held), and what was noticed."""
+    """The refitted nominal model, its series, and what was noticed.
+
+    The input of the series is as it turned out to be: held, or `reconstructed` between its samples.
+    """
 
     fit: Fit
     series: tuple[Series, ...]
     notes: tuple[str, ...]
     late_by: float | None  # [samples] how late a held input acts, where that shows it is not held
+    reconstructed: bool = False
 
 
 def with_delays(model: Model, series: Sequence[Series], catalogue: Catalogue) -> Model:
@@ -110,30 +117,39 @@ def _scan_delays(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | 
     return best if best is fit else estimate(best.model, series, pool=pool)
 
 
+def reconstructed(series: Series) -> Series:
+    """The series with a held input reconstructed from its samples: band-limited where they are evenly spaced, else by
+    straight lines. One that is not held stays as it is."""
+    command = series.command
+    if command is None or command.c.shape[0] > 1 or len(command.x) < 10:
+        return series
+    time, value = command.x[:-1], command.c[-1]
+    even = np.ptp(np.diff(time)) < EVEN * float(np.median(np.diff(time)))
+    return replace(series, command=band_limited(time, value) if even else first_order_hold(time, value))
+
+
 def _hold(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None, tell: Tell) -> Calibration:
-    """Notice an input that acts earlier than its samples: it was not held, and is reconstructed as band-limited."""
-    kept = tuple(series)
-    if INPUT_DELAY not in fit.names:
-        return Calibration(fit, kept, (), None)
-    delay, std = fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY]
+    """Notice an input that acts earlier than its samples: it was not held, and is reconstructed.
+
+    No machine answers before it is asked, so a delay that comes out negative speaks against holding; which of the two
+    predicts the next sample better decides, as far as a model can that may lack something.
+    """
+    kept = Calibration(fit, tuple(series), (), None)
     held = [one for one in series if one.command is not None and one.command.c.shape[0] == 1]
-    if not held or delay > -max(4.0 * std, 0.05 * held[0].period) or not math.isfinite(std):
-        return Calibration(fit, kept, (), None)
-    period = held[0].period
+    if INPUT_DELAY not in fit.names or not held:
+        return kept
+    delay, std, period = fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY], held[0].period
+    if not math.isfinite(std) or delay > -max(4.0 * std, 0.05 * period):
+        return kept
     late = -delay / period
-    tell(f"the held input is late by {late:.2f} sample; reconstructing it as band-limited")
-    smooth = []
-    for one in series:
-        if one.command is not None and one.command.c.shape[0] == 1 and len(one.command.x) > 8:
-            one = replace(one, command=band_limited(one.command.x[:-1], one.command.c[-1]))
-        smooth.append(one)
-    model = fit.model.with_values({INPUT_DELAY: 0.0})
-    again = estimate(model, smooth, pool=pool)
+    tell(f"the held input is late by {late:.2f} sample; reconstructing it between its samples")
     note = (
         f"Input about {'half a' if 0.35 < late < 0.65 else f'{late:.2f}'} sample late when held: a free delay comes out "
         f"at {delay * 1e3:.3f} ± {std * 1e3:.3f} ms ({-late:.2f} sample)."
     )
-    if sum(float(r @ r) for r in again.residuals) < sum(float(r @ r) for r in fit.residuals) * (1 + 1e-3):
-        note += " The input is band-limited, not held; it is reconstructed so in all that follows."
-        return Calibration(again, tuple(smooth), (note,), late)
-    return Calibration(fit, kept, (note + " Holding it fits better all the same.",), late)
+    smooth = [reconstructed(one) for one in series]
+    again = estimate(fit.model.with_values({INPUT_DELAY: 0.0}), smooth, pool=pool)
+    if again.noise.std > fit.noise.std:
+        return replace(kept, notes=(note + " Holding it fits better all the same.",), late_by=late)
+    note += " The input is not held but band-limited; it is reconstructed so in all that follows."
+    return Calibration(again, tuple(smooth), (note,), late, reconstructed=True)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from rhythmid.diagnose.calibrate import Calibration, calibrate
+from rhythmid.diagnose.calibrate import Calibration, calibrate, reconstructed
 from rhythmid.diagnose.confidence import probabilities
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.heldout import HeldOut, tail_error
@@ -38,7 +38,7 @@ from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.repeats import noise_from_repeats
-from rhythmid.identify.series import Series, hold_out_tail, prepare
+from rhythmid.identify.series import Series, hold_out_tail, prepare, scales
 from rhythmid.model import Model
 from rhythmid.parallel import cores
 from rhythmid.record.record import Record
@@ -97,6 +97,9 @@ def diagnose(
     with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
         calibration = calibrate(model, seen, known, pool, tell)
         seen = list(calibration.series)
+        if calibration.reconstructed:
+            unseen = [reconstructed(one) for one in unseen]
+        known = known.within(scales(seen, calibration.fit.model))
         found = search(seen, calibration.fit, known, pool, tell)
         tell("locating the mismatch")
         before = dependences(trajectories(found.nominal), pool)

@@ -13,7 +13,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from types import CodeType, ModuleType
 
-from rhythmid.elements.element import SLOTS, Element
+from rhythmid.elements.element import SLOTS, Element, Scales
 from rhythmid.errors import InputError
 
 ENTRY_POINT_GROUP = "rhythmid.elements"
@@ -83,6 +83,10 @@ class Catalogue(Mapping[str, Element]):
     def without(self, *names: str) -> "Catalogue":
         """The catalogue less the named elements."""
         return Catalogue({name: element for name, element in self.elements.items() if name not in names})
+
+    def within(self, scales: Scales) -> "Catalogue":
+        """The catalogue with every element kept to what its name says in records of these scales."""
+        return Catalogue({name: element.within(scales) for name, element in self.elements.items()})
 
 
 def load_catalogue(folders: Iterable[str | Path] = ()) -> Catalogue:

@@ -16,7 +16,7 @@ A file in `elements/<slot>/` defines one `ELEMENT`. Exactly one of these says wh
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, pi
 from typing import Any, Literal
 
@@ -91,6 +91,8 @@ class Element:
     other parameters. `starts` proposes first guesses of physical size from the record's scales, several where the shape
     matters. `special_case_of` names richer elements that contain this one, exactly or in a limit of their parameters;
     `confusable` maps another element's name to what tells the two apart. A `rotational` effect needs an angle for x.
+    `ranges` bounds parameters by the record's scales to where the effect still is what its name says: a ripple repeats
+    within the travel, or it is but another spring.
     """
 
     name: str
@@ -116,6 +118,7 @@ class Element:
     needless_with: tuple[str, ...] = ()  # elements beside which another candidate says the same
     rotational: bool = False  # makes sense only where the position is an angle
     starts: Callable[[Scales], list[dict[str, float]]] | None = None
+    ranges: Callable[[Scales], Mapping[str, tuple[float, float]]] | None = None
     source: str = ""  # file that defines it
 
     def __post_init__(self) -> None:
@@ -131,6 +134,25 @@ class Element:
             if parameter.name == name:
                 return parameter
         raise KeyError(name)
+
+    def within(self, scales: Scales) -> "Element":
+        """The element with its parameters' bounds, and its first guesses, narrowed to its `ranges` for these scales."""
+        if self.ranges is None:
+            return self
+        ranges, propose = self.ranges(scales), self.starts
+
+        def narrowed(parameter: Parameter) -> Parameter:
+            (low, high), (least, most) = parameter.bounds, ranges.get(parameter.name, (-inf, inf))
+            return replace(parameter, bounds=(max(low, least), min(high, most)))
+
+        def inside(start: dict[str, float]) -> bool:
+            return all(low <= start.get(name, low) <= high for name, (low, high) in ranges.items())
+
+        return replace(
+            self,
+            parameters=tuple(narrowed(parameter) for parameter in self.parameters),
+            starts=propose and (lambda sizes: [start for start in propose(sizes) if inside(start)]),
+        )
 
     @property
     def deterministic(self) -> bool:

@@ -1,7 +1,8 @@
 """Position ripple: F = A sin(2 pi x / lambda + phi), for instance the cogging of a linear motor or an eccentric gear.
 
 (A, phi) and (-A, phi + pi) are the same ripple, so A is kept positive. A fit in lambda has one minimum for every
-period that fits into the range of motion: it needs a grid of starts.
+period that fits into the range of motion: it needs a grid of starts. A period about as long as the whole travel makes
+it but a spring with a cubic term, so the search keeps to shorter ones.
 """
 
 import math
@@ -35,6 +36,7 @@ ELEMENT = Element(
     acts="body",
     size="amplitude",
     starts=starts,
+    ranges=lambda s: {"wavelength": (0.0, 0.75 * (s.high - s.low))},
     also_known_as=("cogging", "detent force", "torque ripple", "gear eccentricity"),
     family="ripple",
     confusable={
