@@ -54,11 +54,11 @@ def main() -> None:
     default = ROOT / "out" / datetime.now().strftime("demo-%Y%m%d-%H%M%S")
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else default
     folder.mkdir(parents=True)
-    bag, answer, report = folder / "bag", folder / "result.json", folder / "report.html"
+    bag, answer = folder / "bag", folder / "result.json"
     rhythmid("run", EXPERIMENT, "--out", bag)
-    rhythmid("identify", bag, "--model", MODEL, "--json", answer, "--report", report)
+    rhythmid("identify", bag, "--model", MODEL, "--json", answer)
     Console().print(compare(Experiment.load(EXPERIMENT), json.loads(answer.read_text(encoding="utf-8"))))
-    print(f"bag: {bag}\nresult: {answer}\nreport with plots: {report}")
+    print(f"bag: {bag}\nresult: {answer}")
 
 
 if __name__ == "__main__":
