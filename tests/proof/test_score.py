@@ -1,0 +1,144 @@
+"""Answers held against opened truths, and the card made of the scores."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.proof.card import Rate, confusion, coverage, markdown, rate, summary
+from rhythmid.proof.score import Estimated, score
+
+CATALOGUE = load_catalogue()
+
+
+def truth(*names: str, ratio: float = 1.0, **more) -> dict:
+    concealed = [{"effect": {"name": name, "parameters": {"force": 0.1}}, "ratio": ratio} for name in names]
+    return {
+        "name": "single-0000", "kind": "single", "concealed": concealed, "ratio": ratio, "noise": {"kind": "white"},
+        "nominal_error": 0.1, "floors": {"5": 0.01}, "absent": [], "input_delay": 0.02, "measurement_delay": 0.03,
+        "machine": {"stiffness": 200.0, "rest_length": 0.2, "damping": 2.0},
+    } | more  # fmt: skip
+
+
+def answer(
+    verdict: str, *names: str, families=(), value: float = 0.1, std: float = 0.01, heldout: float = 0.0105
+) -> dict:
+    missing = [
+        {
+            "element": name,
+            "slot": CATALOGUE[name].slot,
+            "parameters": {"force": {"value": value, "std": std, "unit": "N"}},
+        }
+        for name in names
+    ]
+    return {
+        "verdict": verdict, "missing": missing, "indistinguishable": [list(group) for group in families], "block": 5,
+        "location": {"slot": missing[0]["slot"] if missing else None}, "fit": {"augmented": {"heldout_nrmse": heldout}},
+        "parameters": {"linear_spring.stiffness": {"value": 201.0, "std": 1.0, "unit": "N/m"}},
+        "seconds": 10.0, "processor_seconds": 15.0,
+    }  # fmt: skip
+
+
+def judged(true: dict, said: dict):
+    return score(true, said, CATALOGUE)
+
+
+def test_the_very_name_is_exact():
+    one = judged(truth("coulomb_friction"), answer("missing_physics", "coulomb_friction"))
+    assert one.outcome == "exact" and one.slot_right and one.right_within_family
+    assert one.heldout == pytest.approx(1.05)
+
+
+def test_another_name_is_wrong_though_the_slot_be_right():
+    one = judged(truth("coulomb_friction"), answer("missing_physics", "stribeck_friction"))
+    assert one.outcome == "wrong" and one.slot_right and not one.right_within_family
+
+
+def test_one_name_too_many_is_wrong():
+    said = answer("missing_physics", "coulomb_friction", "backlash")
+    assert judged(truth("coulomb_friction"), said).outcome == "wrong"
+
+
+def test_a_declared_family_of_two_holds_the_name():
+    said = answer("missing_physics", "delay_drift", families=[("delay_drift", "clock_skew")])
+    assert judged(truth("clock_skew"), said).outcome == "family"
+
+
+def test_a_family_of_three_is_no_answer():
+    group = ("delay_drift", "clock_skew", "backlash")
+    assert (
+        judged(truth("clock_skew"), answer("missing_physics", "delay_drift", families=[group])).outcome
+        == "wrong"
+    )
+
+
+@pytest.mark.parametrize(
+    ("verdict", "outcome"),
+    [("unknown_physics", "unknown"), ("undecided", "undecided"), ("consistent", "consistent")],
+)
+def test_a_name_counts_only_under_the_verdict_that_physics_is_missing(verdict, outcome):
+    assert judged(truth("coulomb_friction"), answer(verdict, "coulomb_friction")).outcome == outcome
+
+
+def test_pairs_need_both_names_and_both_slots():
+    both = truth("coulomb_friction", "backlash", kind="pairs")
+    assert judged(both, answer("missing_physics", "backlash", "coulomb_friction")).outcome == "exact"
+    half = judged(both, answer("missing_physics", "backlash"))
+    assert half.outcome == "wrong" and not half.slot_right
+
+
+def test_a_diagnosis_that_fails_is_scored_as_failed():
+    failed = {"failure": "refused: no", "seconds": 1.0, "processor_seconds": 1.0}
+    assert judged(truth("backlash"), failed).outcome == "failed"
+
+
+def test_nothing_concealed_and_something_claimed_is_a_false_alarm():
+    nothing = truth(kind="null")
+    assert judged(nothing, answer("missing_physics", "backlash")).false_alarm
+    assert judged(nothing, answer("unknown_physics")).false_alarm
+    assert not judged(nothing, answer("consistent")).false_alarm
+
+
+def test_a_left_out_effect_must_not_get_a_confident_name():
+    left_out = truth("coulomb_friction", kind="left-out")
+    assert judged(left_out, answer("unknown_physics", "backlash")).honest
+    assert not judged(left_out, answer("missing_physics", "backlash")).honest
+    declared = answer("missing_physics", "backlash", families=[("backlash", "actuator_deadband")])
+    assert judged(left_out, declared).honest
+    assert not judged(left_out, answer("consistent")).honest
+
+
+def test_deviations_are_in_standard_deviations_and_angles_wrap():
+    assert Estimated("a.force", 1.0, 1.2, 0.1).deviation == pytest.approx(2.0)
+    assert Estimated("a.phase", 3.1, 3.2 - 2 * math.pi, 0.1).deviation == pytest.approx(1.0)
+
+
+def test_only_parameters_of_an_exact_name_are_held_against_their_intervals():
+    one = judged(truth("coulomb_friction"), answer("missing_physics", "coulomb_friction", value=0.13))
+    assert [e.name for e in one.effects] == ["coulomb_friction.force"]
+    assert coverage(one.effects).hits == 0
+    assert coverage(one.machine).hits == 1
+    assert judged(truth("coulomb_friction"), answer("missing_physics", "backlash")).effects == ()
+
+
+def test_the_interval_of_a_rate_is_wilsons():
+    low, high = Rate(9, 10).interval
+    assert (low, high) == pytest.approx((0.5958, 0.9821), abs=1e-4)
+    assert Rate(0, 0).interval == (0.0, 1.0)
+
+
+def test_the_card_counts_by_size_and_tells_what_was_confused():
+    right = judged(truth("coulomb_friction", ratio=0.5), answer("missing_physics", "coulomb_friction"))
+    mixed = judged(truth("coulomb_friction", ratio=2.0), answer("missing_physics", "backlash"))
+    silent = judged(truth(kind="null"), answer("consistent"))
+    scores = [right, mixed, replace(silent, case="null-0000")]
+    assert confusion([right, mixed]) == {"coulomb_friction": {"coulomb_friction": 1, "backlash": 1}}
+    card = summary(scores)
+    assert card["single"]["by_size"]["0.3–1"]["exact name"]["share"] == 1.0
+    assert card["single"]["by_size"]["1–3"]["exact name"]["share"] == 0.0
+    assert card["null"]["rates"]["false alarms"]["hits"] == 0
+    text = markdown(scores, "rhythmid proof --seed 1")
+    assert "rhythmid proof --seed 1" in text
+    assert "| coulomb_friction | coulomb_friction 1, backlash 1 |" in text
+    assert rate(scores, lambda s: s.outcome == "exact").share == pytest.approx(1 / 3)
