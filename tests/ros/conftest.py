@@ -133,9 +133,10 @@ class Graph:
     def close(self) -> None:
         for node in self.nodes:
             node.close()
-            node.destroy_node()
         end(self.processes)
-        self.probe.destroy_node()
+        self.executor.shutdown()  # while it lives, so do the nodes' connections, and a later test might hear them
+        for node in (*self.nodes, self.probe):
+            node.destroy_node()
 
 
 @pytest.fixture
@@ -158,3 +159,9 @@ def graph(domain: int, tmp_path: Path) -> Iterator[Graph]:
         made = Graph(tmp_path)
         stack.callback(made.close)
         yield made
+
+
+@pytest.fixture
+def no_shared_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For processes that are going to be killed: they would leave their shared memory behind."""
+    monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")

@@ -107,7 +107,7 @@ def test_what_does_not_fit_the_queue_is_dropped_and_counted(graph, tmp_path):
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
-def test_after_kill_9_all_but_the_last_moment_is_readable(graph, tmp_path, storage):
+def test_after_kill_9_all_but_the_last_moment_is_readable(no_shared_memory, graph, tmp_path, storage):
     bag = tmp_path / "bag"
     process = graph.spawn(
         "recorder", "recorder", path=str(bag), topics=["joint_states"], storage=storage, flush_period=0.2

@@ -206,7 +206,7 @@ def test_stopped_by_the_user_it_leaves_a_valid_bag(started, tmp_path, layout, nu
 
 
 @pytest.mark.parametrize("victim", ["plant", "recorder"])
-def test_a_nodes_death_ends_the_run_with_a_valid_bag(started, tmp_path, victim):
+def test_a_nodes_death_ends_the_run_with_a_valid_bag(no_shared_memory, started, tmp_path, victim):
     path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"}, duration=60.0)
     run = started(path)
     run.wait_for_samples(tmp_path / "experiment_bag")
@@ -219,7 +219,7 @@ def test_a_nodes_death_ends_the_run_with_a_valid_bag(started, tmp_path, victim):
     assert not any(Path(f"/proc/{pid}").exists() for pid in children.values())
 
 
-def test_the_nodes_end_when_the_supervisor_is_killed(started, tmp_path):
+def test_the_nodes_end_when_the_supervisor_is_killed(no_shared_memory, started, tmp_path):
     run = started(experiment_file(tmp_path, time={"mode": "realtime", "layout": "composed"}, duration=60.0))
     run.wait_for_samples(tmp_path / "experiment_bag")
     children = run.children()

@@ -82,6 +82,7 @@ class Supervisor:
         finally:
             for process in self._processes:
                 process.signal(signal.SIGKILL)
+            self._executor.shutdown()
             observer.destroy_node()
             try_shutdown()
         return outcome

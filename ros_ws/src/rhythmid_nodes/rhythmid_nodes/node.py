@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
+from rclpy.executors import Executor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -105,11 +106,14 @@ def serve(build: Sequence[Callable[[], GraphNode]], arguments: list[str]) -> int
     _end_with_supervisor()
     sys.setswitchinterval(2e-4)  # a waiting clock thread gets the interpreter within 0.2 ms
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    executor = EventsExecutor()
     nodes: list[GraphNode] = []
     problems: list[BaseException] = []
     try:
-        nodes.extend(make() for make in build)
-        _spin(nodes, asked)
+        for make in build:
+            nodes.append(make())
+            executor.add_node(nodes[-1])
+        _spin(executor, nodes, asked)
     except Exception as problem:
         problems.append(problem)
     for node in nodes:
@@ -119,6 +123,7 @@ def serve(build: Sequence[Callable[[], GraphNode]], arguments: list[str]) -> int
             problems.append(problem)
         if node.failure is not None and node.failure not in problems:
             problems.append(node.failure)
+    executor.shutdown()
     for node in nodes:
         node.destroy_node()
     try_shutdown()
@@ -130,12 +135,9 @@ def serve(build: Sequence[Callable[[], GraphNode]], arguments: list[str]) -> int
     return 0 if not problems else 2 if isinstance(problems[0], InputError) else 1
 
 
-def _spin(nodes: Sequence[GraphNode], asked: list[int]) -> None:
+def _spin(executor: Executor, nodes: Sequence[GraphNode], asked: list[int]) -> None:
     """Serve callbacks until `asked` is filled by a signal or a node is done, and a moment more for what has been
     delivered but not yet served; raises what a worker died of."""
-    executor = EventsExecutor()
-    for node in nodes:
-        executor.add_node(node)
     gc.collect()
     gc.freeze()  # later collections look at young objects only, which takes microseconds
     for node in nodes:
