@@ -7,7 +7,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from rhythmid.commands.options import Bags, Elements, JsonFile, ReportFile, SignalsFile
+from rhythmid.commands.options import Bags, Elements, JsonFile, ReportFile, SignalsFile, command_line
 from rhythmid.output import require_new, write_json
 
 Model_ = Annotated[Path, typer.Option("--model", help="Nominal model, the one that may lack something.")]
@@ -51,9 +51,10 @@ def diagnose(
     if save_model is not None:
         answer.model.save(save_model)
     if report is not None:
+        from rhythmid.diagnose.present import present
         from rhythmid.report.page import write_page
 
-        write_page(report, answer, bags, holdout or [], model)
+        write_page(report, present(answer, nominal, records, unseen, command_line(), model.name))
         typer.echo(f"report: {report}")
 
 

@@ -1,5 +1,7 @@
 """Arguments and options that several commands share."""
 
+import shlex
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -12,3 +14,8 @@ ReportFile = Annotated[Path | None, typer.Option("--report", help="Write a self-
 Elements = Annotated[
     list[Path] | None, typer.Option("--elements", help="Folder with elements of your own; may be repeated.")
 ]
+
+
+def command_line() -> str:
+    """This call of the command as it can be typed again."""
+    return shlex.join(["rhythmid", *sys.argv[1:]])

@@ -61,7 +61,9 @@ def findings(
     if evidence.unseen_nominal is not None:
         after = evidence.unseen_augmented or evidence.unseen_nominal
         repaired = bool(found.best.added) and evidence.unseen_augmented is not None
-        runs += _runs(evidence.unseen_nominal, after, [pumpings[id(r)] for r in holdout], repaired, heldout=True)
+        runs += _runs(
+            evidence.unseen_nominal, after, [pumpings[id(r)] for r in holdout], repaired, heldout=True
+        )
     models = {"Nominal model": nominal.to_yaml(), "Nominal model, refitted": found.nominal.model.to_yaml()}
     if found.best.added:
         models["Augmented model"] = answer.model.to_yaml()
@@ -70,7 +72,9 @@ def findings(
     return Findings(
         result=answer.diagnosis.to_dict(),
         source=f"{name} against {_listed([r.name for r in records])}",
-        slots={slot: tuple(t.element.name for t in nominal.terms if t.element.slot == slot) for slot in SLOTS},
+        slots={
+            slot: tuple(t.element.name for t in nominal.terms if t.element.slot == slot) for slot in SLOTS
+        },
         forced=any(one.forcing is not None for one in evidence.series),
         runs=tuple(runs),
         output_unit=nominal.units.position,
@@ -79,7 +83,9 @@ def findings(
         scores=_scores(found),
         threshold=float(chi2_distribution.isf(LEVEL / count, 1)),
         functions=_functions(evidence.before, evidence.after if found.best.added else (), nominal),
-        transfer=_transfer(found, [p for r in records if (p := pumpings[id(r)]) is not None], evidence.series, nominal),
+        transfer=_transfer(
+            found, [p for r in records if (p := pumpings[id(r)]) is not None], evidence.series, nominal
+        ),
         nominal={n: {"value": v.value, "std": None, "unit": v.unit} for n, v in nominal.parameters.items()},
         refitted=_estimates(found.nominal),
         refitted_delays=delays_of(found.nominal),
@@ -160,11 +166,15 @@ def _scores(found: Search) -> tuple[ElementScore, ...]:
     """The best score of each element in the first round, best first."""
     best: dict[str, ElementScore] = {}
     for score in found.rounds[0].scores:
-        best.setdefault(score.element.name, ElementScore(score.element.name, score.element.slot, score.statistic))
+        best.setdefault(
+            score.element.name, ElementScore(score.element.name, score.element.slot, score.statistic)
+        )
     return tuple(best.values())
 
 
-def _functions(before: Sequence[Dependence], after: Sequence[Dependence], model: Model) -> tuple[FreeFunction, ...]:
+def _functions(
+    before: Sequence[Dependence], after: Sequence[Dependence], model: Model
+) -> tuple[FreeFunction, ...]:
     later = {one.quantity: one for one in after}
 
     def shape(one: Dependence) -> Array:
@@ -173,7 +183,9 @@ def _functions(before: Sequence[Dependence], after: Sequence[Dependence], model:
             return one.force
         inside = slice(0, -1)  # the splines end before the last point
         degree = 1 if one.quantity in ("position", "velocity") else 0
-        return (one.force - np.polyval(np.polyfit(one.grid[inside], one.force[inside], degree), one.grid))[inside]
+        return (one.force - np.polyval(np.polyfit(one.grid[inside], one.force[inside], degree), one.grid))[
+            inside
+        ]
 
     units = {"velocity": f"{model.units.position}/s", "time": "s", "actuator force": model.units.force}
     made = []
@@ -197,7 +209,9 @@ def _transfer(
 ) -> TransferChange | str:
     """Transfer functions of the refitted nominal and the final model around the cycle of the first forced record."""
     if not pumpings:
-        return "no periodic forcing was recorded, so there is no cycle around which to state transfer functions"
+        return (
+            "no periodic forcing was recorded, so there is no cycle around which to state transfer functions"
+        )
     pumping = pumpings[0]
     highest = max(bandwidth(one.value, one.period) for one in series)
     frequency = np.linspace(0.02, 1.0, POINTS) * min(highest, 20.0 * pumping.frequency)
@@ -231,7 +245,13 @@ def _words(answer: Answer, nominal: Model) -> dict[str, ElementWords]:
     elements += [score.element for score in answer.evidence.search.rounds[0].scores]
     elements += [term.element for trial in answer.evidence.search.trials for term in trial.model.terms]
     return {
-        e.name: ElementWords(e.title, {p.name: p.description for p in e.parameters}, e.also_known_as, e.reference)
+        e.name: ElementWords(
+            e.title,
+            {p.name: p.description for p in e.parameters},
+            e.special_case_of,
+            e.also_known_as,
+            e.reference,
+        )
         for e in elements
     }
 

@@ -50,7 +50,9 @@ class Chart:
     @property
     def legend(self) -> tuple[tuple[str, str], ...]:
         """(style, label) of every labelled curve."""
-        found = {curve.label: f"{curve.style} dashed" if curve.dashed else curve.style for curve in self.curves}
+        found = {
+            curve.label: f"{curve.style} dashed" if curve.dashed else curve.style for curve in self.curves
+        }
         return tuple((style, label) for label, style in found.items() if label)
 
 
@@ -78,7 +80,9 @@ class Axis:
             first, last = math.floor(math.log10(self.low)), math.ceil(math.log10(self.high))
             for steps in ((1.0, 2.0, 5.0), (1.0,)):
                 found = [m * 10.0**k for k in range(first, last + 1) for m in steps]
-                found = [tick for tick in found if self.low <= tick * (1 + 1e-9) and tick <= self.high * (1 + 1e-9)]
+                found = [
+                    tick for tick in found if self.low <= tick * (1 + 1e-9) and tick <= self.high * (1 + 1e-9)
+                ]
                 if len(found) <= most + 1:
                     return found
             return found[:: math.ceil(len(found) / most)]
@@ -114,7 +118,9 @@ def extent(values: Sequence[Array], log: bool = False, from_zero: bool = False) 
         size = abs(low) or 1.0
         return low - 0.5 * size, high + 0.5 * size
     air = 0.05 * (high - low)
-    return low - (0.0 if from_zero and low == 0.0 else air), high + (0.0 if from_zero and high == 0.0 else air)
+    return low - (0.0 if from_zero and low == 0.0 else air), high + (
+        0.0 if from_zero and high == 0.0 else air
+    )
 
 
 def draw(chart: Chart) -> str:
@@ -144,7 +150,9 @@ def draw(chart: Chart) -> str:
     for level, label in chart.levels:
         at = float(y(level))
         parts.append(f'<line class="level" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{at:.1f}" y2="{at:.1f}"/>')
-        parts.append(f'<text class="note" x="{WIDTH - RIGHT - 3}" y="{at - 4:.1f}" text-anchor="end">{escape(label)}</text>')
+        parts.append(
+            f'<text class="note" x="{WIDTH - RIGHT - 3}" y="{at - 4:.1f}" text-anchor="end">{escape(label)}</text>'
+        )
     return "".join([*parts, "</svg>"])
 
 
@@ -163,12 +171,18 @@ def frame(x: Axis, y: Axis, x_label: str, y_label: str) -> list[str]:
     for tick in y.ticks(5):
         at = float(y(tick))
         parts.append(f'<line class="grid" x1="{x.begin:.1f}" x2="{x.end:.1f}" y1="{at:.1f}" y2="{at:.1f}"/>')
-        parts.append(f'<text x="{x.begin - 6:.1f}" y="{at + 4:.1f}" text-anchor="end">{_tick(tick, y)}</text>')
+        parts.append(
+            f'<text x="{x.begin - 6:.1f}" y="{at + 4:.1f}" text-anchor="end">{_tick(tick, y)}</text>'
+        )
     for tick in x.ticks(6):
         at = float(x(tick))
-        parts.append(f'<line class="tick" x1="{at:.1f}" x2="{at:.1f}" y1="{bottom:.1f}" y2="{bottom + 4:.1f}"/>')
+        parts.append(
+            f'<line class="tick" x1="{at:.1f}" x2="{at:.1f}" y1="{bottom:.1f}" y2="{bottom + 4:.1f}"/>'
+        )
         parts.append(f'<text x="{at:.1f}" y="{bottom + 16:.1f}" text-anchor="middle">{_tick(tick, x)}</text>')
-    parts.append(f'<line class="axis" x1="{x.begin:.1f}" x2="{x.end:.1f}" y1="{bottom:.1f}" y2="{bottom:.1f}"/>')
+    parts.append(
+        f'<line class="axis" x1="{x.begin:.1f}" x2="{x.end:.1f}" y1="{bottom:.1f}" y2="{bottom:.1f}"/>'
+    )
     parts.append(
         f'<text class="label" x="{(x.begin + x.end) / 2:.1f}" y="{bottom + 35:.1f}" text-anchor="middle">{escape(x_label)}</text>'
     )
@@ -179,7 +193,11 @@ def frame(x: Axis, y: Axis, x_label: str, y_label: str) -> list[str]:
 def _tick(value: float, axis: Axis) -> str:
     if abs(value) < 1e-9 * max(abs(axis.low), abs(axis.high)) and not axis.log:
         return "0"
-    return number(value, 3).replace(" × ", "·").removeprefix("1·") if abs(value) >= 1e5 or abs(value) < 1e-3 else number(value, 5)
+    return (
+        number(value, 3).replace(" × ", "·").removeprefix("1·")
+        if abs(value) >= 1e5 or abs(value) < 1e-3
+        else number(value, 5)
+    )
 
 
 def _points(x: Array, y: Array) -> str:

@@ -23,7 +23,13 @@ from rhythmid.report.record_quality import quality_section
 from rhythmid.report.residual_figures import cycle_harmonics, error_changes, error_table, residual_folds
 from rhythmid.report.row_chart import Bar, draw_bars
 from rhythmid.report.run import error_of
-from rhythmid.report.sections import compared_parameters, delays_section, parameters_table, reproduce_section, told
+from rhythmid.report.sections import (
+    compared_parameters,
+    delays_section,
+    parameters_table,
+    reproduce_section,
+    told,
+)
 from rhythmid.report.transfer_figures import change_figures
 
 VERDICTS: dict[str, tuple[str, Tone]] = {
@@ -92,7 +98,13 @@ def _tiles(found: Findings) -> Tiles:
     for effect in result["missing"]:
         first = next(iter(effect["parameters"].items()), None)
         if first is not None:
-            tiles.append(Tile(f"{found.title(effect['element'])}: {pretty_name(first[0])}", told(first[1]), "95 % interval"))
+            tiles.append(
+                Tile(
+                    f"{found.title(effect['element'])}: {pretty_name(first[0])}",
+                    told(first[1]),
+                    "95 % interval",
+                )
+            )
     held = fit["refitted_nominal"]["heldout_nrmse"], fit["augmented"]["heldout_nrmse"]
     unseen = [run for run in found.runs if run.heldout]
     hidden = not unseen
@@ -102,13 +114,29 @@ def _tiles(found: Findings) -> Tiles:
         value = percent(held[0], before.half if before else None)
         if found.repaired:
             value += f" → {percent(held[1], after.half if after else None)}"
-        tiles.append(Tile("error on held-out data, of the motion", value, "before → after" if found.repaired else ""))
-    tiles.append(Tile("least possible: noise alone", percent(detection["noise_floor_nrmse"]), "of the motion, in the fitted records"))
+        tiles.append(
+            Tile("error on held-out data, of the motion", value, "before → after" if found.repaired else "")
+        )
+    tiles.append(
+        Tile(
+            "least possible: noise alone",
+            percent(detection["noise_floor_nrmse"]),
+            "of the motion, in the fitted records",
+        )
+    )
     if result["verdict"] == "missing_physics":
         chance = min(effect["probability"] for effect in result["missing"])
-        tiles.append(Tile("such a name is right in", percent(chance), "of simulated machines whose truth was known"))
+        tiles.append(
+            Tile("such a name is right in", percent(chance), "of simulated machines whose truth was known")
+        )
     else:
-        tiles.append(Tile("chance of such a mismatch if nothing is missing", number(detection["p_value"], 2), "p-value of the score tests"))
+        tiles.append(
+            Tile(
+                "chance of such a mismatch if nothing is missing",
+                number(detection["p_value"], 2),
+                "p-value of the score tests",
+            )
+        )
     return Tiles(tuple(tiles))
 
 
@@ -173,7 +201,11 @@ def _better(found: Findings) -> Section:
             lead += f", and {percent(fit['refitted_nominal']['heldout_nrmse'])} on data that no fit has seen"
     scoring = result.get("scoring") or "free run"
     said = f"{sentence(str(result.get('heldout') or 'nothing was held out'))} Scored in {scoring}"
-    said += ": the model is started once and runs on its own for the whole record." if scoring == "free run" else "."
+    said += (
+        ": the model is started once and runs on its own for the whole record."
+        if scoring == "free run"
+        else "."
+    )
     as_given = result["detection"]["nominal_nrmse"]
     blocks: list[Block] = [
         Paragraph(f"{lead}.", "lead"),
@@ -190,7 +222,9 @@ def _residuals(found: Findings) -> Section:
         if found.repaired
         else "What the refitted nominal model fails to explain."
     )
-    return Section("What is left unexplained", (Paragraph(lead), *residual_folds(found.runs, found.output_unit)))
+    return Section(
+        "What is left unexplained", (Paragraph(lead), *residual_folds(found.runs, found.output_unit))
+    )
 
 
 def _harmonics(found: Findings) -> Section:
@@ -205,7 +239,9 @@ def _harmonics(found: Findings) -> Section:
         blocks.append(Paragraph(sentence(found.transfer)))
     else:
         one = found.transfer
-        blocks.append(change_figures(one.frequency, one.indices, one.before, one.after, one.unit, one.pumping))
+        blocks.append(
+            change_figures(one.frequency, one.indices, one.before, one.after, one.unit, one.pumping)
+        )
     return Section("Harmonics of the cycle and transfer functions", tuple(blocks))
 
 
@@ -243,12 +279,23 @@ def _ranking(found: Findings) -> Section:
     shown = found.scores[:SCORES_SHOWN]
     if shown:
         bars = [
-            Bar(found.title(s.element), s.statistic, number(s.statistic, 3), "after" if s.element in best else "measured", s.element in best)
+            Bar(
+                found.title(s.element),
+                s.statistic,
+                number(s.statistic, 3),
+                "after" if s.element in best else "measured",
+                s.element in best,
+            )
             for s in shown
         ]
         figure = Drawing(
             f"The {len(shown)} best scores of {len(found.scores)} elements",
-            draw_bars("Best scores: " + ", ".join(f"{b.label} {b.text}" for b in bars), bars, found.threshold, "chance"),
+            draw_bars(
+                "Best scores: " + ", ".join(f"{b.label} {b.text}" for b in bars),
+                bars,
+                found.threshold,
+                "chance",
+            ),
             "χ² of each element's best first guess. Relatives score alike; the refits above tell them apart. Dotted line: what chance "
             "reaches once in a hundred diagnoses.",
         )
@@ -265,7 +312,8 @@ def _richer(found: Findings, best: tuple[str, ...], other: tuple[str, ...]) -> b
     """Whether the other model differs from the chosen one by a richer element of which the chosen one is a special case."""
     gone, come = set(best) - set(other), set(other) - set(best)
     return len(gone) == len(come) == 1 and any(
-        name in found.words and found.words[name].contained_in and come <= set(found.words[name].contained_in) for name in gone
+        name in found.words and found.words[name].contained_in and come <= set(found.words[name].contained_in)
+        for name in gone
     )
 
 
@@ -282,5 +330,10 @@ def _calibration(found: Findings) -> Section:
         return Section("Calibration", (Paragraph("The records agree with the nominal model's parameters."),))
     return Section(
         "Calibration",
-        (Paragraph("Parameters that are merely wrong are not missing physics. These differ from the nominal model:"), Bullets(lines)),
+        (
+            Paragraph(
+                "Parameters that are merely wrong are not missing physics. These differ from the nominal model:"
+            ),
+            Bullets(lines),
+        ),
     )

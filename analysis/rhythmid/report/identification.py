@@ -35,7 +35,9 @@ def identification_page(
     return Page(
         title="rhythmid identification",
         kicker=f"Identification of {source}",
-        verdict="Identified" if result["delays"].get("separable") else "Identified, but for the split of the delays",
+        verdict="Identified"
+        if result["delays"].get("separable")
+        else "Identified, but for the split of the delays",
         words=_words(result),
         tone="good" if result["delays"].get("separable") else "open",
         tiles=_tiles(result),
@@ -83,8 +85,12 @@ def _tiles(result: Mapping[str, Any]) -> Tiles:
     delays = result["delays"]
     keys = ("input", "measurement") if delays.get("separable") else ("sum",)
     names = {"input": "input delay", "measurement": "measurement delay", "sum": "sum of the delays"}
-    tiles = [Tile(names[key], told(delays[key], MILLISECONDS), "95 % interval") for key in keys if delays.get(key)]
-    tiles += [Tile(pretty_name(n), told(one), "95 % interval") for n, one in list(result["parameters"].items())[:3]]
+    tiles = [
+        Tile(names[key], told(delays[key], MILLISECONDS), "95 % interval") for key in keys if delays.get(key)
+    ]
+    tiles += [
+        Tile(pretty_name(n), told(one), "95 % interval") for n, one in list(result["parameters"].items())[:3]
+    ]
     return Tiles(tuple(tiles))
 
 
@@ -94,7 +100,9 @@ def _delays(result: Mapping[str, Any]) -> Section:
     if not aliases:
         return section
     pairs = "; ".join(f"{number(1e3 * a)} and {number(1e3 * b)} ms" for a, b in aliases)
-    said = Paragraph(f"The phases repeat every cycle, so these pairs of τ_u and τ_y would fit as well: {pairs}.")
+    said = Paragraph(
+        f"The phases repeat every cycle, so these pairs of τ_u and τ_y would fit as well: {pairs}."
+    )
     return Section(section.title, (*section.blocks, said))
 
 
@@ -149,12 +157,16 @@ def _milliseconds(value: float | None) -> str:
 
 def _remarks(result: Mapping[str, Any]) -> Section:
     quality = result.get("quality") or {}
-    lines = [f"In free run the identified model's error is {percent(quality.get('nrmse'))} of the motion's standard deviation."]
+    lines = [
+        f"In free run the identified model's error is {percent(quality.get('nrmse'))} of the motion's standard deviation."
+    ]
     lines += [sentence(str(note)) for note in result.get("notes") or ()]
     return Section("How far to trust this", (Bullets(tuple(lines)),))
 
 
-def comparison_section(experiments: Sequence[Mapping[str, Any]], names: Sequence[str] | None = None) -> Section:
+def comparison_section(
+    experiments: Sequence[Mapping[str, Any]], names: Sequence[str] | None = None
+) -> Section:
     """Actual and estimated delays of several experiments, in the manner of the paper's Table 1.
 
     `experiments` are results of `identify --json` with their "actual" delays added, as `table1 --json` lists them.
@@ -164,7 +176,9 @@ def comparison_section(experiments: Sequence[Mapping[str, Any]], names: Sequence
         actual, methods, delays = one["actual"], one["methods"]["paper"], one["delays"]
         row = [names[index] if names else f"experiment {index + 1}", _pair(actual)]
         row += [_pair(methods.get(key) or {}) for key in METHODS]
-        rows.append((*row, f"{told(delays['input'], MILLISECONDS)} / {told(delays['measurement'], MILLISECONDS)}"))
+        rows.append(
+            (*row, f"{told(delays['input'], MILLISECONDS)} / {told(delays['measurement'], MILLISECONDS)}")
+        )
         for key in ("input", "measurement"):
             value = (delays.get(key) or {}).get("value")
             if value is not None:

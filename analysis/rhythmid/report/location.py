@@ -12,6 +12,7 @@ from rhythmid.report.quantity import number, percent, plain, pretty_unit, scaled
 from rhythmid.report.row_chart import Bar, draw_bars
 from rhythmid.report.run import worst_place
 from rhythmid.report.signal_path import SlotContent, draw_signal_path
+
 SHARE = 0.2  # of the mismatch from which a quantity is said to go with it
 TELLING = 0.05  # share of the mismatch from which a free function is worth a look
 
@@ -23,7 +24,11 @@ def location_section(found: Findings) -> Section:
     for effect in result["missing"]:
         missing.setdefault(effect["slot"], []).append(found.title(effect["element"]))
     slots = {
-        name: SlotContent(tuple(map(found.title, found.slots.get(name, ()))), tuple(missing.get(name, ())), not missing and name == slot)
+        name: SlotContent(
+            tuple(map(found.title, found.slots.get(name, ()))),
+            tuple(missing.get(name, ())),
+            not missing and name == slot,
+        )
         for name in ("command", "actuator", "force", "sensor", "timing")
     }
     faulty = [name for name, content in slots.items() if content.faulty]
@@ -33,7 +38,12 @@ def location_section(found: Findings) -> Section:
     sure = result["verdict"] == "missing_physics"
     note = "missing here" if sure else "suspected here"
     blocks: list[Block] = [
-        Paragraph(sentence(f"the fault is {result['location']['where']}" if faulty else result["location"]["where"]), "lead"),
+        Paragraph(
+            sentence(
+                f"the fault is {result['location']['where']}" if faulty else result["location"]["where"]
+            ),
+            "lead",
+        ),
         Drawing(
             "The signal path",
             draw_signal_path(slots, found.forced, alt, note),
@@ -70,7 +80,13 @@ def _slot_scores(found: Findings, slot: str | None) -> list[Block]:
     if not best:
         return []
     bars = [
-        Bar(one.slot, one.statistic, number(one.statistic, 3), "after" if one.slot == slot else "measured", one.slot == slot)
+        Bar(
+            one.slot,
+            one.statistic,
+            number(one.statistic, 3),
+            "after" if one.slot == slot else "measured",
+            one.slot == slot,
+        )
         for one in sorted(best.values(), key=lambda s: -s.statistic)
     ]
     blocks: list[Block] = [
@@ -86,13 +102,23 @@ def _slot_scores(found: Findings, slot: str | None) -> list[Block]:
     ]  # fmt: skip
     telling = list(found.functions)
     if telling:
-        bars = [Bar(f.quantity, 100.0 * max(f.explained, 0.0), f"{100.0 * max(f.explained, 0.0):.0f}\u202f%", "measured") for f in telling]
+        bars = [
+            Bar(
+                f.quantity,
+                100.0 * max(f.explained, 0.0),
+                f"{100.0 * max(f.explained, 0.0):.0f}\u202f%",
+                "measured",
+            )
+            for f in telling
+        ]
         blocks.append(
             Drawing(
                 "What the mismatch depends on",
                 draw_bars(
-                    "Share of the mismatch that a free function explains: " + ", ".join(f"{b.label} {b.text}" for b in bars),
-                    bars, full=100.0,
+                    "Share of the mismatch that a free function explains: "
+                    + ", ".join(f"{b.label} {b.text}" for b in bars),
+                    bars,
+                    full=100.0,
                 ),
                 "Share of the mismatch that a free function of each quantity explains in stretches it was not fitted to. "
                 + (
@@ -135,7 +161,9 @@ def unknown_section(found: Findings) -> Section:
     return Section("What remains unknown", tuple(blocks))
 
 
-def _most_telling(functions: Sequence[FreeFunction], remainder: Mapping[str, Any] | None) -> list[FreeFunction]:
+def _most_telling(
+    functions: Sequence[FreeFunction], remainder: Mapping[str, Any] | None
+) -> list[FreeFunction]:
     """The function that explains most, and the one of the remainder where that is another."""
     drawn = [f for f in functions if len(f.force)]
     chosen = [f for f in drawn[:1] if f.explained > TELLING]

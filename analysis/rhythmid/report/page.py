@@ -37,7 +37,8 @@ def render(page: Page) -> str:
     style = files("rhythmid.report").joinpath("style.css").read_text(encoding="utf-8")
     names = _anchors([section.title for section in page.sections])
     contents = "".join(
-        f'<li><a href="#{name}">{escape(section.title)}</a></li>' for name, section in zip(names, page.sections)
+        f'<li><a href="#{name}">{escape(section.title)}</a></li>'
+        for name, section in zip(names, page.sections)
     )
     body = "\n".join(
         f'<section id="{name}" aria-labelledby="{name}-title"><h2 id="{name}-title">{escape(section.title)}</h2>\n'

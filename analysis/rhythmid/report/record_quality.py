@@ -62,7 +62,9 @@ def quality_section(records: Sequence[RecordQuality]) -> Section:
     columns = ("record", "used for", "channels", "length", "jitter (std)", "gaps", "clipped")
     warnings = tuple(f"{one.name}: {line}" for one in records for line in one.warnings)
     remarks: Block = Bullets(warnings) if warnings else Paragraph("No remarks.", "note")
-    return Section("Quality of the records", (Table("As read, before any averaging.", columns, tuple(rows)), remarks))
+    return Section(
+        "Quality of the records", (Table("As read, before any averaging.", columns, tuple(rows)), remarks)
+    )
 
 
 def _count(value: int | None, what: str) -> str:

@@ -8,7 +8,7 @@ from rhythmid.report.blocks import Columns, Drawing, Fold, Paragraph, Table, dra
 from rhythmid.report.chart import Chart, Curve
 from rhythmid.report.quantity import number, percent, plus_minus, pretty_unit, scaled, with_unit
 from rhythmid.report.row_chart import Change, draw_changes
-from rhythmid.report.run import Error, Harmonic, Run, by_phase, density, error_of, harmonics
+from rhythmid.report.run import Error, Harmonic, Run, Which, by_phase, density, error_of, harmonics
 from rhythmid.report.state_map import draw_maps, state_map
 
 BEFORE, AFTER = "refitted nominal model", "with the added effect"
@@ -32,10 +32,19 @@ def residual_folds(runs: Sequence[Run], unit: str) -> list[Fold | Paragraph]:
         if run.after is not None:
             told += f" → {percent(after.ratio if after else None)}"
         role = HELD_OUT if run.heldout else "used in the fit"
-        blocks.append(Fold(f"{run.name} ({role}): error {told} of the motion", (residual_grid(run, unit),), run is ranked[0]))
+        blocks.append(
+            Fold(
+                f"{run.name} ({role}): error {told} of the motion",
+                (residual_grid(run, unit),),
+                run is ranked[0],
+            )
+        )
     if len(drawable) > len(ranked):
         blocks.append(
-            Paragraph(f"The {len(ranked)} records of {len(drawable)} that gain most are drawn; the table above has all.", "note")
+            Paragraph(
+                f"The {len(ranked)} records of {len(drawable)} that gain most are drawn; the table above has all.",
+                "note",
+            )
         )
     return blocks
 
@@ -65,8 +74,14 @@ def _curves(run: Run, factor: float) -> tuple[Curve, ...]:
 def _over_time(run: Run, factor: float, unit: str) -> Drawing:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], run.hidden.astype(np.int8), [0]])))
     last = len(run.time) - 1
-    shaded = tuple((float(run.time[a]), float(run.time[min(b, last)])) for a, b in zip(edges[::2], edges[1::2]))
-    change = " The second is the narrower, the more of the mismatch the effect explains." if run.after is not None else ""
+    shaded = tuple(
+        (float(run.time[a]), float(run.time[min(b, last)])) for a, b in zip(edges[::2], edges[1::2])
+    )
+    change = (
+        " The second is the narrower, the more of the mismatch the effect explains."
+        if run.after is not None
+        else ""
+    )
     hidden = " Shaded: hidden from the fit." if shaded else ""
     return drawing(
         "Over time",
@@ -88,7 +103,8 @@ def _rms_words(run: Run, factor: float, unit: str) -> str:
 
 def _over_cycle(run: Run, factor: float, unit: str) -> Drawing | None:
     curves = []
-    for which, label in (("before", BEFORE), ("after", AFTER)):
+    shown: tuple[tuple[Which, str], ...] = (("before", BEFORE), ("after", AFTER))
+    for which, label in shown:
         found = by_phase(run, which)
         if found is None or (which == "after" and run.after is None):
             continue
@@ -110,7 +126,12 @@ def _over_cycle(run: Run, factor: float, unit: str) -> Drawing | None:
 
 def _over_states(run: Run, output: str, factor: float, unit: str) -> Drawing:
     position, velocity = run.position[run.used], run.velocity[run.used]
-    maps = [("before" if run.after is not None else "", state_map(position, velocity, run.residual("before")[run.used]))]
+    maps = [
+        (
+            "before" if run.after is not None else "",
+            state_map(position, velocity, run.residual("before")[run.used]),
+        )
+    ]
     if run.after is not None:
         maps.append(("after", state_map(position, velocity, run.residual("after")[run.used])))
     rate = "m/s" if output == "m" else f"{output}/s"
@@ -165,10 +186,14 @@ def error_changes(runs: Sequence[Run], noise: float | None) -> Drawing:
         floor = 100.0 * noise / spread if noise is not None and spread > 0.0 else None
         name = f"{name}{' (held out)' if role == HELD_OUT else ''}"
         reached = 100.0 * after.ratio if after is not None and run.after is not None else None
-        rows.append(Change(name if len(name) <= 44 else f"…{name[-43:]}", 100.0 * before.ratio, reached, floor))
+        rows.append(
+            Change(name if len(name) <= 44 else f"…{name[-43:]}", 100.0 * before.ratio, reached, floor)
+        )
     shown = sorted(rows, key=lambda row: -row.before)[:30]
     repaired = any(row.after is not None for row in rows)
-    legend = (("square before", BEFORE), ("circle after", AFTER)) if repaired else (("square before", BEFORE),)
+    legend = (
+        (("square before", BEFORE), ("circle after", AFTER)) if repaired else (("square before", BEFORE),)
+    )
     return Drawing(
         "Error of every record",
         draw_changes(
@@ -222,7 +247,12 @@ def cycle_harmonics(run: Run, unit: str, noise: float) -> Table | None:
     repaired = run.after is not None
     columns = ("harmonic of the forcing", "measured", "missed before", "missed after")
     rows = [
-        (f"harmonic {h.number}", told(h.measured, h), told(h.before, h), *([told(h.after, h)] if repaired else []))
+        (
+            f"harmonic {h.number}",
+            told(h.measured, h),
+            told(h.before, h),
+            *([told(h.after, h)] if repaired else []),
+        )
         for h in found
     ]
     return Table(

@@ -44,7 +44,9 @@ def _label(text: str, x: float, middle: float, strong: str = "") -> str:
     """A row's name, right-aligned at x, on as many lines as it needs."""
     lines = wrap(text, WRAP) or [""]
     first = middle + 4.0 - 6.5 * (len(lines) - 1)
-    spans = "".join(f'<tspan x="{x:.1f}" y="{first + 13 * i:.1f}">{escape(line)}</tspan>' for i, line in enumerate(lines))
+    spans = "".join(
+        f'<tspan x="{x:.1f}" y="{first + 13 * i:.1f}">{escape(line)}</tspan>' for i, line in enumerate(lines)
+    )
     return f'<text class="label{strong}" text-anchor="end">{spans}</text>'
 
 
@@ -67,12 +69,18 @@ def draw_bars(
         parts.append(
             f'<rect class="bar {bar.style}" x="{left:.1f}" y="{y + 4:.1f}" width="{max(end - left, 1.0):.1f}" height="{ROW - 9:.1f}" rx="2"/>'
         )
-        parts.append(f'<text class="{strong.strip()}" x="{end + 5:.1f}" y="{y + 17:.1f}">{escape(bar.text)}</text>')
+        parts.append(
+            f'<text class="{strong.strip()}" x="{end + 5:.1f}" y="{y + 17:.1f}">{escape(bar.text)}</text>'
+        )
     if level is not None:
         at = float(axis(level))
-        parts.append(f'<line class="level" x1="{at:.1f}" x2="{at:.1f}" y1="{top - 2:.1f}" y2="{height - 4:.1f}"/>')
+        parts.append(
+            f'<line class="level" x1="{at:.1f}" x2="{at:.1f}" y1="{top - 2:.1f}" y2="{height - 4:.1f}"/>'
+        )
         anchor = "start" if at < WIDTH / 2 else "end"
-        parts.append(f'<text class="note" x="{at:.1f}" y="{top - 6:.1f}" text-anchor="{anchor}">{escape(level_label)}</text>')
+        parts.append(
+            f'<text class="note" x="{at:.1f}" y="{top - 6:.1f}" text-anchor="{anchor}">{escape(level_label)}</text>'
+        )
     return "".join([*parts, "</svg>"])
 
 
@@ -86,18 +94,26 @@ def draw_changes(alt: str, rows: Sequence[Change], label: str) -> str:
     for tick in axis.ticks(5):
         at = float(axis(tick))
         parts.append(f'<line class="grid" x1="{at:.1f}" x2="{at:.1f}" y1="4" y2="{bottom:.1f}"/>')
-        parts.append(f'<text x="{at:.1f}" y="{bottom + 15:.1f}" text-anchor="middle">{number(tick, 3)}</text>')
-    parts.append(f'<text class="label" x="{(left + WIDTH) / 2:.1f}" y="{bottom + 31:.1f}" text-anchor="middle">{escape(label)}</text>')
+        parts.append(
+            f'<text x="{at:.1f}" y="{bottom + 15:.1f}" text-anchor="middle">{number(tick, 3)}</text>'
+        )
+    parts.append(
+        f'<text class="label" x="{(left + WIDTH) / 2:.1f}" y="{bottom + 31:.1f}" text-anchor="middle">{escape(label)}</text>'
+    )
     for index, row in enumerate(rows):
         y = 6.0 + ROW * (index + 0.5)
         parts.append(_label(row.label, left - 4.0, y))
         start = float(axis(row.before))
         if row.floor is not None and row.floor > 0.0:
             at = float(axis(row.floor))
-            parts.append(f'<line class="floor" x1="{at:.1f}" x2="{at:.1f}" y1="{y - 9:.1f}" y2="{y + 9:.1f}"/>')
+            parts.append(
+                f'<line class="floor" x1="{at:.1f}" x2="{at:.1f}" y1="{y - 9:.1f}" y2="{y + 9:.1f}"/>'
+            )
         if row.after is not None:
             end = float(axis(row.after))
             parts.append(f'<line class="join" x1="{start:.1f}" x2="{end:.1f}" y1="{y:.1f}" y2="{y:.1f}"/>')
             parts.append(f'<circle class="dot after" cx="{end:.1f}" cy="{y:.1f}" r="5"/>')
-        parts.append(f'<rect class="dot before" x="{start - 4.5:.1f}" y="{y - 4.5:.1f}" width="9" height="9"/>')
+        parts.append(
+            f'<rect class="dot before" x="{start - 4.5:.1f}" y="{y - 4.5:.1f}" width="9" height="9"/>'
+        )
     return "".join([*parts, "</svg>"])

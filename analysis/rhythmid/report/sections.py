@@ -30,13 +30,17 @@ def _shown(one: Mapping[str, Any]) -> tuple[float, str]:
 
 
 def parameters_table(
-    found: Estimates, meanings: Mapping[str, str] | None = None, caption: str = "Parameters with 95 % intervals."
+    found: Estimates,
+    meanings: Mapping[str, str] | None = None,
+    caption: str = "Parameters with 95 % intervals.",
 ) -> Table:
     """Estimates by name, with what they mean where that is known."""
     if meanings:
         rows = tuple((pretty_name(name), told(one), meanings.get(name, "")) for name, one in found.items())
         return Table(caption, ("parameter", "value", "meaning"), rows, formulas=(2,))
-    return Table(caption, ("parameter", "value"), tuple((pretty_name(name), told(one)) for name, one in found.items()))
+    return Table(
+        caption, ("parameter", "value"), tuple((pretty_name(name), told(one)) for name, one in found.items())
+    )
 
 
 def compared_parameters(
@@ -96,7 +100,11 @@ def delays_section(delays: Mapping[str, Any], before: Mapping[str, Any] | None =
         rows.append((*row, told(delays[key], MILLISECONDS)))
     if not rows:
         return Section("Delays", (Paragraph("The model has no delay, so none was estimated."),))
-    columns = ("delay", "final model") if before is None else ("delay", "nominal model, refitted", "with the added effect")
+    columns = (
+        ("delay", "final model")
+        if before is None
+        else ("delay", "nominal model, refitted", "with the added effect")
+    )
     blocks: list[Block] = [Table("Delays with 95 % intervals.", columns, tuple(rows))]
     assumption = str(delays.get("assumption") or "")
     if delays.get("separable"):
@@ -144,5 +152,3 @@ def reproduce_section(command: str, models: Mapping[str, str]) -> Section:
             *folds,
         ),
     )
-
-

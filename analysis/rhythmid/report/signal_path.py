@@ -36,11 +36,15 @@ class SlotContent:
     @property
     def lines(self) -> list[tuple[str, str]]:
         """(class, text) of every line in the box."""
-        found = [("", line) for name in self.elements for line in wrap(name, WRAP)] or [("faint", "no element")]
+        found = [("", line) for name in self.elements for line in wrap(name, WRAP)] or [
+            ("faint", "no element")
+        ]
         return [*found, *(("missing", line) for name in self.missing for line in wrap(f"+ {name}", WRAP))]
 
 
-def draw_signal_path(slots: Mapping[str, SlotContent], forced: bool, alt: str, note: str = "missing here") -> str:
+def draw_signal_path(
+    slots: Mapping[str, SlotContent], forced: bool, alt: str, note: str = "missing here"
+) -> str:
     """The path u → command → (+ f0) → actuator → force → sensor → y, and the clocks below it.
 
     `slots` by name; `note` labels the ones that are faulty.
@@ -52,7 +56,9 @@ def draw_signal_path(slots: Mapping[str, SlotContent], forced: bool, alt: str, n
     )
 
 
-def _box(name: str, role: str, slot: SlotContent, x: float, y: float, width: float, height: float, note: str) -> str:
+def _box(
+    name: str, role: str, slot: SlotContent, x: float, y: float, width: float, height: float, note: str
+) -> str:
     faulty = " faulty" if slot.faulty else ""
     middle = x + width / 2
     parts = [
@@ -62,11 +68,17 @@ def _box(name: str, role: str, slot: SlotContent, x: float, y: float, width: flo
     ]
     for index, (kind, text) in enumerate(slot.lines):
         at = y + 60 + LINE * index
-        parts.append(f'<text class="{kind}" x="{middle:.0f}" y="{at:.0f}" text-anchor="middle">{escape(text)}</text>')
+        parts.append(
+            f'<text class="{kind}" x="{middle:.0f}" y="{at:.0f}" text-anchor="middle">{escape(text)}</text>'
+        )
     if slot.faulty:
         wide = 6.6 * len(note) + 16
-        parts.append(f'<rect class="flag" x="{middle - wide / 2:.0f}" y="{y - 15:.0f}" width="{wide:.0f}" height="20" rx="10"/>')
-        parts.append(f'<text class="flag-text" x="{middle:.0f}" y="{y - 1:.0f}" text-anchor="middle">{escape(note)}</text>')
+        parts.append(
+            f'<rect class="flag" x="{middle - wide / 2:.0f}" y="{y - 15:.0f}" width="{wide:.0f}" height="20" rx="10"/>'
+        )
+        parts.append(
+            f'<text class="flag-text" x="{middle:.0f}" y="{y - 1:.0f}" text-anchor="middle">{escape(note)}</text>'
+        )
     return "".join(parts)
 
 
@@ -92,8 +104,12 @@ def _clocks(slot: SlotContent, x: float, y: float, width: float, note: str) -> s
     ]
     if slot.faulty:
         wide = 6.6 * len(note) + 16
-        parts.append(f'<rect class="flag" x="{x + width - wide - 10:.0f}" y="{y - 11:.0f}" width="{wide:.0f}" height="20" rx="10"/>')
-        parts.append(f'<text class="flag-text" x="{x + width - 10 - wide / 2:.0f}" y="{y + 3:.0f}" text-anchor="middle">{escape(note)}</text>')
+        parts.append(
+            f'<rect class="flag" x="{x + width - wide - 10:.0f}" y="{y - 11:.0f}" width="{wide:.0f}" height="20" rx="10"/>'
+        )
+        parts.append(
+            f'<text class="flag-text" x="{x + width - 10 - wide / 2:.0f}" y="{y + 3:.0f}" text-anchor="middle">{escape(note)}</text>'
+        )
     return "".join(parts)
 
 
@@ -111,11 +127,19 @@ def _lying(content: Mapping[str, SlotContent], forced: bool, alt: str, note: str
     parts.append(f'<text class="signal" x="14" y="{middle - 8:.0f}" text-anchor="middle">u</text>')
     parts.append(_arrow(4, middle, 44, middle))
     junction = 271.0
-    parts.append(_arrow(238, middle, junction - 11, middle) + _sum(junction, middle) + _arrow(junction + 10, middle, 304, middle))
+    parts.append(
+        _arrow(238, middle, junction - 11, middle)
+        + _sum(junction, middle)
+        + _arrow(junction + 10, middle, 304, middle)
+    )
     if forced:
         parts.append(_arrow(junction, 26, junction, middle - 11))
-        parts.append(f'<text class="signal" x="{junction:.0f}" y="18" text-anchor="middle">f0, the forcing</text>')
-    parts.append(_arrow(498, middle, 530, middle) + _arrow(724, middle, 756, middle) + _arrow(950, middle, 994, middle))
+        parts.append(
+            f'<text class="signal" x="{junction:.0f}" y="18" text-anchor="middle">f0, the forcing</text>'
+        )
+    parts.append(
+        _arrow(498, middle, 530, middle) + _arrow(724, middle, 756, middle) + _arrow(950, middle, 994, middle)
+    )
     parts.append(f'<text class="signal" x="976" y="{middle - 8:.0f}" text-anchor="middle">y</text>')
     parts += [_box(name, ROLES[name], content[name], places[name], top, width, tall, note) for name in ROLES]
     parts.append(_clocks(content["timing"], 46, top + tall + 22, 904, note))
@@ -126,7 +150,10 @@ def _standing(content: Mapping[str, SlotContent], forced: bool, alt: str, note: 
     x, width = 60.0, 240.0
     centre = x + width / 2
     y = 44.0
-    parts = [f'<text class="signal" x="{centre + 14:.0f}" y="18">u</text>', _arrow(centre, 4, centre, y - 2 - 10)]
+    parts = [
+        f'<text class="signal" x="{centre + 14:.0f}" y="18">u</text>',
+        _arrow(centre, 4, centre, y - 2 - 10),
+    ]
     y += 4.0
     for name in ROLES:
         tall = _height([content[name]])

@@ -45,7 +45,11 @@ def _edges(values: Array, count: int) -> Array:
 
 
 def draw_maps(
-    alt: str, maps: list[tuple[str, StateMap]], x_unit: tuple[float, str], v_unit: tuple[float, str], unit: tuple[float, str]
+    alt: str,
+    maps: list[tuple[str, StateMap]],
+    x_unit: tuple[float, str],
+    v_unit: tuple[float, str],
+    unit: tuple[float, str],
 ) -> str:
     """The maps side by side on one scale of colour; units are (factor, name) of position, velocity and signal."""
     sizes = np.concatenate([np.abs(one.mean[np.isfinite(one.mean)]) for _, one in maps])
@@ -60,16 +64,24 @@ def draw_maps(
         x = Axis(float(one.x[0]), float(one.x[-1]), begin, begin + wide)
         v = Axis(float(one.v[0]), float(one.v[-1]), top + tall, top)
         parts.append(f'<rect class="panel" x="{begin:.1f}" y="{top}" width="{wide:.1f}" height="{tall}"/>')
-        parts.append(f'<text class="label" x="{begin + wide / 2:.1f}" y="{top - 8}" text-anchor="middle">{name}</text>')
+        parts.append(
+            f'<text class="label" x="{begin + wide / 2:.1f}" y="{top - 8}" text-anchor="middle">{name}</text>'
+        )
         parts += _cells(one, x, v, largest)
         for tick in linear_ticks(float(one.x[0]) * x_unit[0], float(one.x[-1]) * x_unit[0], 5):
             at = float(x(tick / x_unit[0]))
-            parts.append(f'<text x="{at:.1f}" y="{top + tall + 14}" text-anchor="middle">{number(tick, 4)}</text>')
+            parts.append(
+                f'<text x="{at:.1f}" y="{top + tall + 14}" text-anchor="middle">{number(tick, 4)}</text>'
+            )
         if index == 0:
             for tick in linear_ticks(float(one.v[0]) * v_unit[0], float(one.v[-1]) * v_unit[0], 5):
                 at = float(v(tick / v_unit[0]))
-                parts.append(f'<text x="{begin - 6:.1f}" y="{at + 4:.1f}" text-anchor="end">{number(tick, 4)}</text>')
-    parts.append(f'<text class="label" x="{(left + 390) / 2:.0f}" y="{top + tall + 30}" text-anchor="middle">x [{x_unit[1]}]</text>')
+                parts.append(
+                    f'<text x="{begin - 6:.1f}" y="{at + 4:.1f}" text-anchor="end">{number(tick, 4)}</text>'
+                )
+    parts.append(
+        f'<text class="label" x="{(left + 390) / 2:.0f}" y="{top + tall + 30}" text-anchor="middle">x [{x_unit[1]}]</text>'
+    )
     parts += _scale(largest * unit[0], unit[1], left, top + tall + 44.0)
     return "".join([*parts, "</svg>"])
 
@@ -81,12 +93,12 @@ def _cells(one: StateMap, x: Axis, v: Axis, largest: float) -> list[str]:
     steps = one.mean[known] / largest * (SHADES + 0.5)
     shade[known] = np.clip(np.rint(steps), -SHADES, SHADES).astype(int)
     paths: dict[int, list[str]] = {}
-    for row in range(shade.shape[0]):
+    for row in range(ROWS):
         y0, y1 = float(v(one.v[row])), float(v(one.v[row + 1]))
         column = 0
-        while column < shade.shape[1]:
+        while column < COLUMNS:
             end = column + 1
-            while end < shade.shape[1] and shade[row, end] == shade[row, column]:
+            while end < COLUMNS and shade[row, end] == shade[row, column]:
                 end += 1
             level = int(shade[row, column])
             if level >= -SHADES:
@@ -109,5 +121,7 @@ def _scale(largest: float, unit: str, left: float, y: float) -> list[str]:
             f'<rect class="cell {_class(i - SHADES)} edge" x="{left + 62 + i * width:.1f}" y="{y:.1f}" width="{width}" height="12"/>'
         )
     parts.append(f'<text x="{left + 56:.1f}" y="{y + 10:.1f}" text-anchor="end">{number(-largest, 3)}</text>')
-    parts.append(f'<text x="{left + 68 + count * width:.1f}" y="{y + 10:.1f}">{number(largest, 3)} {unit}</text>')
+    parts.append(
+        f'<text x="{left + 68 + count * width:.1f}" y="{y + 10:.1f}">{number(largest, 3)} {unit}</text>'
+    )
     return parts

@@ -45,17 +45,29 @@ def transfer_grid(functions: Sequence[TransferFunction], unit: str) -> Columns:
         name = harmonic_name(one.m)
         magnitude = np.abs(one.value)
         factor, shown = scaled(float(magnitude.max(initial=0.0)), unit.split("/")[0])
-        label = f"{pretty_unit(shown)}/{pretty_unit(unit.split('/', 1)[1])}" if "/" in unit else pretty_unit(shown)
+        label = (
+            f"{pretty_unit(shown)}/{pretty_unit(unit.split('/', 1)[1])}"
+            if "/" in unit
+            else pretty_unit(shown)
+        )
         band = None if one.std is None else 1.96 * one.std
         low = None if band is None else factor * np.maximum(magnitude - band, 0.0)
         high = None if band is None else factor * (magnitude + band)
         curves = [Curve(one.frequency, factor * magnitude, "measured", "after", low=low, high=high)]
         if one.model is not None:
-            curves.append(Curve(one.frequency, factor * np.abs(one.model), "fitted model", "before", dashed=True))
+            curves.append(
+                Curve(one.frequency, factor * np.abs(one.model), "fitted model", "before", dashed=True)
+            )
         figures.append(
             drawing(
                 f"|{name}|, magnitude",
-                Chart(f"Magnitude of {name} over frequency.", "output frequency [Hz]", f"[{label}]", tuple(curves), from_zero=True),
+                Chart(
+                    f"Magnitude of {name} over frequency.",
+                    "output frequency [Hz]",
+                    f"[{label}]",
+                    tuple(curves),
+                    from_zero=True,
+                ),
                 f"How strongly an input {_shift(one.m)}. Band: 95 %.",
             )
         )
@@ -76,7 +88,9 @@ def _phase(one: TransferFunction, name: str, band: Array | None, magnitude: Arra
         strong &= magnitude > band
     guide = one.value if one.model is None else one.model
     turns = np.degrees(np.unwrap(np.angle(guide)))
-    phase = turns + np.degrees(np.angle(one.value * guide.conj()))  # on the model's own turn, however noisy it is
+    phase = turns + np.degrees(
+        np.angle(one.value * guide.conj())
+    )  # on the model's own turn, however noisy it is
     phase[~strong] = np.nan
     half = None if band is None else np.degrees(np.arctan2(band, np.maximum(magnitude, 1e-300)))
     curves = [
@@ -95,7 +109,12 @@ def _phase(one: TransferFunction, name: str, band: Array | None, magnitude: Arra
 
 
 def change_figures(
-    frequency: Array, indices: Sequence[int], before: Complex, after: Complex, unit: str, pumping: float | None
+    frequency: Array,
+    indices: Sequence[int],
+    before: Complex,
+    after: Complex,
+    unit: str,
+    pumping: float | None,
 ) -> Columns:
     """What an effect does to the transfer functions of a model.
 
@@ -105,7 +124,9 @@ def change_figures(
     main = list(indices).index(0)
     largest = float(top[main].max())
     factor, shown = scaled(largest, unit.split("/")[0])
-    label = f"{pretty_unit(shown)}/{pretty_unit(unit.split('/', 1)[1])}" if "/" in unit else pretty_unit(shown)
+    label = (
+        f"{pretty_unit(shown)}/{pretty_unit(unit.split('/', 1)[1])}" if "/" in unit else pretty_unit(shown)
+    )
     magnitudes, changes = [], []
     for row, m in enumerate(indices):
         style, dashed = style_of(m), m < 0
