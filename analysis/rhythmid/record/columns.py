@@ -82,7 +82,7 @@ class _Reader:
             except (Unsupported, LookupError):
                 continue
             names = [name for _, used in found for name in used]
-            if self.layout.fits(block, names):
+            if self.layout.fits(block, [number for number, _ in found], names):
                 return np.array([self.layout.read(block, number) for number, _ in found]).reshape(
                     len(found), -1
                 )
