@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.diagnose.calibrate import Calibration, calibrate, reconstructed
 from rhythmid.diagnose.confidence import probabilities
 from rhythmid.diagnose.delays import delays_of
+from rhythmid.diagnose.gate import admitted
 from rhythmid.diagnose.heldout import HeldOut, tail_error
 from rhythmid.diagnose.locate import Dependence, dependences
 from rhythmid.diagnose.next_experiment import next_experiment
@@ -101,12 +102,13 @@ def diagnose(
             unseen = [reconstructed(one) for one in unseen]
         known = known.within(scales(seen, calibration.fit.model))
         found = search(seen, calibration.fit, known, pool, tell)
+        tell("judging on held-out records")
+        found, harmful = admitted(found, unseen if holdout else None, pool)
         tell("locating the mismatch")
         before = dependences(trajectories(found.nominal), pool)
         after = dependences(trajectories(found.fit), pool) if found.best.added else before
-        tell("judging on held-out records")
         judge = HeldOut(found, unseen if holdout else None)
-        diagnosis = _conclude(model, found, calibration, before, after, judge, heldout)
+        diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful)
         nominal_run, augmented_run = judge.fit(found.nominal.model), judge.fit(found.fit.model)
     evidence = Evidence(
         tuple(seen),
@@ -152,6 +154,7 @@ def _conclude(
     after: Sequence[Dependence],
     judge: HeldOut,
     heldout: str,
+    harmful: Sequence[str],
 ) -> Diagnosis:
     """Put the verdict and its reasons together."""
     series = found.fit.run.series
@@ -222,7 +225,7 @@ def _conclude(
         delays=delays_of(found.fit),
         next_experiment=experiment,
         calibration=(*calibration.notes, *recalibrated(nominal, found.fit)),
-        excluded=tuple(f"{' + '.join(added)}: {why}" for added, why in found.excluded),
+        excluded=(*(f"{' + '.join(added)}: {why}" for added, why in found.excluded), *harmful),
         heldout=heldout,
         remainder=remainder,
     )

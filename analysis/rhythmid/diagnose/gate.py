@@ -1,0 +1,59 @@
+"""Held-out records as a gate: an effect that makes the prediction of what no fit has seen worse is not kept.
+
+Held-out error is a poor selector, for it hardly sees small effects; but where real machines differ from every model a
+little, an information criterion goes on adding effects, and those that only imitate the rest betray themselves here.
+"""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+from rhythmid.compiled import compile_model
+from rhythmid.diagnose.heldout import HeldOut
+from rhythmid.diagnose.refit import Proposal, run_trials, whole_fit
+from rhythmid.diagnose.search import Search
+from rhythmid.identify.series import Series
+
+HARM = 0.01  # share by which the held-out error has to fall without an effect for it to be dropped
+
+
+def admitted(
+    found: Search, separate: Sequence[Series] | None, pool: ThreadPoolExecutor | None = None
+) -> tuple[Search, tuple[str, ...]]:
+    """The search without the effects that do harm on held-out records, and a sentence about each that was dropped.
+
+    `separate` are held-out series; None means the hidden end of the searched ones.
+    """
+    dropped: list[str] = []
+    while found.best.added:
+        error = HeldOut(found, separate).nrmse(found.fit.model, found.fit)
+        if error is None:
+            break
+        without = [_without(found, label, pool) for label in found.best.added]
+        errors = [HeldOut(one, separate).nrmse(one.fit.model, one.fit) if one else None for one in without]
+        least, label, slim = min(
+            ((e, label, one) for e, label, one in zip(errors, found.best.added, without) if e is not None and one),
+            key=lambda case: case[0], default=(error, "", None),
+        )  # fmt: skip
+        if slim is None or least > (1.0 - HARM) * error:
+            break
+        dropped.append(f"{label}: the held-out error falls from {error:.3g} to {least:.3g} without it")
+        found = slim
+    return found, tuple(dropped)
+
+
+def _without(found: Search, label: str, pool: ThreadPoolExecutor | None) -> Search | None:
+    """The search with one effect of the chosen model left out and the rest refitted; None where that diverges."""
+    best = found.best
+    rest = tuple(name for name in best.added if name != label)
+    if not rest:
+        nominal = next(trial for trial in found.trials if not trial.added)
+        return replace(found, best=nominal, fit=found.nominal)
+    series, step = found.fit.run.series, found.fit.run.max_step
+    known = compile_model(best.model).layout.states
+    trials, _ = run_trials([Proposal(rest, best.model.without(label), ({},))], series, best.starts, known, found.noise, step)
+    if not trials:
+        return None
+    fit = whole_fit(trials[0], series, found.noise, step, pool=pool)
+    others = tuple(trial for trial in found.trials if set(trial.added) != set(rest))
+    return replace(found, best=trials[0], fit=fit, trials=tuple(sorted((trials[0], *others), key=lambda t: t.bic())))
