@@ -205,6 +205,11 @@ def search(
             noise = noise_of(whole_fit(best, series, noise, step, pool=pool), floor=floor)
     ranked = under_noise(_contenders(trials, best), series, noise, step)
     best = next(t for t in ranked if set(t.added) == set(best.added))
+    if ranked[0].bic() < best.bic() - WORTH and ranked[0].added:
+        best = ranked[0]  # a model set aside under an earlier noise model has overtaken the chosen one
+        noise = noise_of(whole_fit(best, series, noise, step, pool=pool), floor=floor)
+        ranked = under_noise(ranked, series, noise, step)
+        best = next(t for t in ranked if set(t.added) == set(best.added))
     fit = whole_fit(best, series, noise, step, pool=pool)
     return Search(
         under(nominal, noise, pool), best, fit, noise, tuple(ranked), tuple(rounds), tuple(excluded)
@@ -261,13 +266,14 @@ def _defend(
     swaps: list[Proposal] = []
     for label in best.added:
         element = best.model.term(label).element  # type: ignore[union-attr]
-        names = {e.name for e in catalogue.values() if element.name in e.special_case_of and e.candidate}
+        family = {e.name for e in catalogue.values() if element.name in e.special_case_of and e.candidate}
+        names = set(family)
         if len(best.added) > 1:
             names |= {score.element.name for score, _ in _distinct(rounds[0].scores, RIVALS)}
         rest = _rest(best, label)
         slim = best.model.without(label)
         for name in sorted(names - {best.model.term(x).element.name for x in best.added}):  # type: ignore[union-attr]
-            starts = _starts_for(catalogue, name, series, slim, rounds)
+            starts = _starts_for(catalogue, name, series, slim, rounds, 8 if name in family else 1)
             if starts and tuple(sorted((*rest, name))) not in trials:
                 swaps.append(propose(slim, catalogue[name], starts, rest))
     found = run(swaps)
@@ -300,10 +306,19 @@ def _states(trial: Trial) -> tuple[str, ...]:
 
 
 def _starts_for(
-    catalogue: Catalogue, name: str, series: Sequence[Series], model: Model, rounds: Sequence[Round]
+    catalogue: Catalogue,
+    name: str,
+    series: Sequence[Series],
+    model: Model,
+    rounds: Sequence[Round],
+    count: int,
 ) -> list[dict[str, float]]:
-    scored = [s for r in rounds for s in r.scores if s.element.name == name and s.statistic > 0.0]
+    """First guesses of an element for a refit: those that scored best in any round, or its own."""
+    scored = sorted(
+        (s for r in rounds for s in r.scores if s.element.name == name and s.statistic > 0.0),
+        key=lambda s: -s.statistic,
+    )
     if scored:
-        return [max(scored, key=lambda s: s.statistic).start]
+        return [one.start for one in scored[:count]]
     element = catalogue[name]
-    return [dict(s) for s in element.starts(scales(series, model))][:2] if element.starts else []
+    return [dict(s) for s in element.starts(scales(series, model))][:count] if element.starts else []

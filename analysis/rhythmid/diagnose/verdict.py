@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rhythmid.diagnose.line_test import strongest_line
 from rhythmid.diagnose.locate import Dependence
 from rhythmid.diagnose.refit import Trial
 from rhythmid.diagnose.result import Verdict
@@ -14,6 +15,7 @@ from rhythmid.identify.series import Series, dominant_frequency
 
 TWINS = 2  # a family of this many is an answer; a larger one is undecided
 REMAINDER_LEVEL = 1e-6  # p-value of a structured remainder
+LINE_SHARE = 0.05  # of the residual's power, from which a line in it is a matter
 PERIODS = 4  # of the dominant motion, below which a record says nothing
 
 
@@ -66,8 +68,14 @@ def verdict_of(
         ratio = float(np.mean(residual**2)) / repeats.variance
         colour = max(repeats.long_run_variance / repeats.variance, 1.0)
         too_big = ratio > 1.1 + 6.0 * math.sqrt(2.0 * colour / len(residual))
+    line = strongest_line(fit)
+    if line is not None and line.p_value < REMAINDER_LEVEL and line.share > LINE_SHARE:
+        return (
+            "unknown_physics",
+            f"a line at {line.frequency:.3g} Hz remains that nothing in the catalogue explains",
+        )
     if not found.best.added:
-        if too_big and remains:
+        if too_big:
             return "unknown_physics", "no element of the catalogue explains what the nominal model leaves"
         if remains and remains[0].explained > 0.2 and p_value < LEVEL:
             return "unknown_physics", "no element of the catalogue explains what the nominal model leaves"

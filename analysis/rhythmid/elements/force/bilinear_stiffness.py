@@ -31,6 +31,7 @@ ELEMENT = Element(
     starts=starts,
     also_known_as=("piecewise linear spring", "kinked spring", "helper spring"),
     family="stiffness",
+    special_case_of=("end_stop_contact",),  # undamped, pushing only
     confusable={
         "end_stop_contact": "a stop is stiff, damped and beyond the usual motion",
         "quadratic_stiffness": "kink against curve: vary the amplitude",
