@@ -1,7 +1,7 @@
 """`rhythmid identify`: parameters, delays and harmonic transfer functions from records."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import typer
 from rich.console import Console
@@ -20,26 +20,57 @@ def identify(
     elements: Elements = None,
     json: JsonFile = None,
     save_model: Annotated[Path | None, typer.Option("--save-model", help="Write the identified model.")] = None,
+    save: Annotated[Path | None, typer.Option("--save", help="Write delays and model for a controller.")] = None,
+    method: Annotated[
+        str, typer.Option("--method", help="joint (maximum likelihood) or paper (magnitudes, then phases).")
+    ] = "joint",
+    forcing: Annotated[
+        str | None,
+        typer.Option("--forcing", help="How the forcing reaches the machine: on_robot, delayed (like the command) or "
+                     "clock_unknown (its phase was recorded by another clock)."),
+    ] = None,
+    clock_offset: Annotated[
+        tuple[float, float] | None,
+        typer.Option("--clock-offset", help="Bounds [s] of that clock's offset, where it is unknown."),
+    ] = None,
+    clock_offset_std: Annotated[
+        float | None, typer.Option("--clock-offset-std", help="Or its standard deviation [s] about zero.", min=0.0)
+    ] = None,
 ) -> None:
     """Find a model's parameters, the command and measurement delays, and the harmonic transfer functions."""
     from rhythmid.elements.catalogue import load_catalogue
+    from rhythmid.errors import InputError
+    from rhythmid.identify.identifiability import Forcing, offset_of
+    from rhythmid.identify.identify import Method
     from rhythmid.identify.identify import identify as find
+    from rhythmid.identify.latency import save_latency
     from rhythmid.model import Model
     from rhythmid.record.read import load_records
 
-    for path in (json, save_model):
+    for path in (json, save_model, save):
         require_new(path)
+    if method not in get_args(Method):
+        raise InputError(f"--method {method}: one of {', '.join(get_args(Method))} is expected")
+    if forcing is not None and forcing not in get_args(Forcing):
+        raise InputError(f"--forcing {forcing}: one of {', '.join(get_args(Forcing))} is expected")
+    offset = offset_of(clock_offset, clock_offset_std)
+    if offset is not None and forcing not in (None, "clock_unknown"):
+        raise InputError(f"--clock-offset says that the forcing's clock is unknown, --forcing {forcing} that it is known")
     known = None if model is None else Model.load(model, load_catalogue(elements or ()))
     with Console(stderr=True).status("reading") as status:
         records = load_records(bags, signals)
         status.update("identifying")
-        found = find(records, known)
+        found = find(
+            records, known, method=method, forcing=forcing if offset is None else "clock_unknown", offset=offset
+        )  # type: ignore[arg-type]
     result = found.to_dict()
     show(result)
     if json is not None:
         write_json(json, result)
     if save_model is not None:
         found.model.save(save_model)
+    if save is not None:
+        save_latency(found, save)
 
 
 def show(result: dict[str, Any]) -> None:
@@ -62,6 +93,12 @@ def show(result: dict[str, Any]) -> None:
     console.print(f"assuming that {delays['assumption']}")
     if delays["closure"]["z"] is not None:
         console.print(f"closure of phase, offset and slope: {delays['closure']['z']:+.2f} standard deviations")
+    for name, (low, high) in (delays["intervals"] or {}).items():
+        console.print(f"{name} delay: between {1e3 * low:.3f} and {1e3 * high:.3f} ms (95 %)")
+    for first, second in delays["aliases"]:
+        console.print(f"the same record is given by {1e3 * first:.2f} ms (input) and {1e3 * second:.2f} ms (measurement)")
+    for words in delays["undetermined"]:
+        console.print(f"not determined: {words}")
     for name, estimates in result["methods"]["paper"].items():
         told = ", ".join(f"{which} {1e3 * value:.2f} ms" for which, value in estimates.items())
         console.print(f"paper's method, {name}: {told}")

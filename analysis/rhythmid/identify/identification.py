@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.identify.joint import JointFit
 from rhythmid.identify.paper import PaperResult
 from rhythmid.ltp.htf import HarmonicTransferFunctions
 from rhythmid.model import Model
@@ -32,12 +33,28 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class Observables:
+    """What the records show of the delays [s]: the limit cycle's `phase` A = τ_y + δ_f, the `slope` B = τ_u + τ_y, the
+    sidebands' `offset` C = τ_u − δ_f, and `z`, the closure A + C − B in its standard deviations."""
+
+    phase: Estimate
+    slope: Estimate
+    offset: Estimate
+    z: float
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"A": self.phase.to_dict(), "B": self.slope.to_dict(), "C": self.offset.to_dict()}
+
+
+@dataclass(frozen=True)
 class Delays:
     """Input delay τ_u, measurement delay τ_y and their sum [s].
 
     `separable` tells whether the two can be told apart; if not they have no value. `assumption` is what the split rests
     on. `closure` is (limit-cycle phase + sideband offset − slope of G_0) in its standard deviations, which a right model
     keeps near zero; None where one of the three cannot be had. `aliases` are further pairs that fit as well.
+    `intervals` (95 %) are what can be said of delays that cannot be told apart; `undetermined` says in words which
+    changes of parameters the records do not notice.
     """
 
     input: Estimate
@@ -47,6 +64,9 @@ class Delays:
     assumption: str
     closure: float | None = None
     aliases: tuple[tuple[float, float], ...] = ()
+    intervals: Mapping[str, tuple[float, float]] | None = None
+    observables: Observables | None = None
+    undetermined: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -57,6 +77,9 @@ class Delays:
             "assumption": self.assumption,
             "closure": {"z": self.closure},
             "aliases": [list(pair) for pair in self.aliases],
+            "intervals": None if self.intervals is None else {n: list(pair) for n, pair in self.intervals.items()},
+            "observables": None if self.observables is None else self.observables.to_dict(),
+            "undetermined": list(self.undetermined),
         }
 
 
@@ -72,6 +95,7 @@ class Identification:
     harmonics : Ĥ_m found in the first record, with standard deviations; `reached` bool[h, n] where they mean something.
     paper : the paper's method, record by record.
     quality : rate [Hz], gaps, jitter_std [s], nrmse and what else tells how far to trust the rest.
+    joint : the joint fit; None where another method was asked for.
     notes : what the user should know, one line each.
     """
 
@@ -84,6 +108,7 @@ class Identification:
     paper: tuple[PaperResult, ...]
     quality: Mapping[str, Any]
     notes: tuple[str, ...] = field(default_factory=tuple)
+    joint: JointFit | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `identify --json`; plain numbers, lists and strings."""

@@ -1,9 +1,9 @@
-"""Identify a model and its delays from records."""
+"""Identify a model and its delays from records: by joint maximum likelihood, with the paper's method beside it."""
 
 import math
 from collections.abc import Iterator, Sequence
 from importlib.resources import files
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,12 @@ from numpy.typing import NDArray
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.delay_fit import DelayEstimate
+from rhythmid.identify.harmonic_likelihood import DELAYS
+from rhythmid.identify.identifiability import Forcing, Offset, delays_of
 from rhythmid.identify.identification import Delays, Estimate, Identification
+from rhythmid.identify.joint import joint_likelihood
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
+from rhythmid.identify.timing import compensated, measurement_jitter
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
 from rhythmid.record.record import Record
@@ -20,6 +24,14 @@ from rhythmid.signal import continuous, spline
 from rhythmid.simulate import simulate
 
 Array = NDArray[np.float64]
+Method = Literal["joint", "paper"]
+UNKNOWN = 1e3  # times its value: a standard deviation beyond which a parameter is not determined at all
+CLOSED = 5.0  # standard deviations of the closure that call for a note
+SOURCES = {
+    "forcing channel": "the recorded forcing",
+    "stated formula": "the forcing stated by its formula",
+    "model": "the model's periodic_forcing, which was not recorded,",
+}
 ON_ROBOT = "the forcing acts on the machine undelayed"
 ASSUMPTIONS = {
     "forcing channel": f"{ON_ROBOT}, and the recorded forcing has the phase that acts, on the clock of the measurements",
@@ -126,7 +138,12 @@ def _delays(results: Sequence[PaperResult], source: str) -> Delays:
 
 
 def identify(
-    records: Record | Sequence[Record], model: Model | None = None, harmonics: int = HARMONICS
+    records: Record | Sequence[Record],
+    model: Model | None = None,
+    harmonics: int = HARMONICS,
+    method: Method = "joint",
+    forcing: Forcing | None = None,
+    offset: Offset | None = None,
 ) -> Identification:
     """Identify a model's free parameters and its delays from records.
 
@@ -135,8 +152,11 @@ def identify(
     records : one or more recordings of the same machine.
     model : what is known of it; the paper's hopper where None.
     harmonics : M, sidebands on either side that are estimated.
+    method : `joint` maximum likelihood, or the `paper`'s two steps.
+    forcing, offset : how the forcing reaches the machine, and what is known of its clock; see `delays_of`.
 
-    Raises InputError when a record has no input, is shorter than a period, or the model has no limit cycle.
+    Raises InputError when the joint search did not arrive (never is a stuck fit returned), and when a record has no
+    input, is shorter than a period, or the model has no limit cycle.
     """
     given = (records,) if isinstance(records, Record) else tuple(records)
     if not given:
@@ -148,6 +168,8 @@ def identify(
         own, pumping = forced_by(nominal, record)
         results.append(paper_method(record, own, pumping, harmonics if pumping.active else 0))
         pumpings.append(pumping)
+    if method == "joint":
+        return _joint(given, nominal, results, pumpings[0].source, forcing, offset)
     first = results[0]
     units = first.fit.model.parameters
     parameters = {
@@ -164,6 +186,46 @@ def identify(
     return Identification(
         fitted, given, parameters, delays, first.estimate.htf, first.estimate.reached, tuple(results),
         _quality(fitted, given, results), tuple(note for r, one in zip(given, results) for note in _notes(r, one)),
+    )  # fmt: skip
+
+
+def _joint(
+    records: tuple[Record, ...],
+    nominal: Model,
+    results: Sequence[PaperResult],
+    source: str,
+    forcing: Forcing | None,
+    offset: Offset | None,
+) -> Identification:
+    """Parameters and delays by joint maximum likelihood; HTFs as the paper's method found them."""
+    joint, notes = compensated(joint_likelihood(records, nominal))
+    fit = joint.fit
+    own = [name for name in fit.names if name not in DELAYS]
+    values = fit.model.parameters
+    parameters = {
+        name: Estimate(values[name].value, fit.std[name], values[name].unit)
+        if fit.std[name] < UNKNOWN * max(abs(values[name].value), 1e-9)
+        else Estimate(None, None, values[name].unit)
+        for name in own
+    }
+    first = results[0]
+    jitter = measurement_jitter(fit)
+    quality = _quality(None, records, results) | {
+        "nrmse": fit.nrmse(),
+        "unexplained_response": joint.search.response,
+        "noise_std": math.sqrt(fit.noise.variance * fit.run.series[0].block),
+        "measurement_jitter": jitter.to_dict(),
+    }
+    delays = delays_of(joint, forcing, offset, SOURCES.get(source, "the forcing"))
+    if delays.closure is not None and abs(delays.closure) > CLOSED:
+        notes += (
+            f"limit cycle and response to the command disagree about the delays by {delays.closure:+.1f} standard "
+            "deviations: the model lacks physics, or the forcing's phase is not the acting one; run `rhythmid diagnose`",
+        )
+    notes += tuple(note for result, one in zip(results, records) for note in _notes(one, result))
+    return Identification(
+        fit.model, records, parameters, delays, first.estimate.htf, first.estimate.reached, tuple(results), quality,
+        notes, joint,
     )  # fmt: skip
 
 
@@ -185,10 +247,10 @@ def _notes(record: Record, result: PaperResult) -> Iterator[str]:
         yield f"{record.name}: the model leaves {result.fit.misfit:.0%} of the HTFs' magnitudes unexplained"
 
 
-def _quality(model: Model, records: Sequence[Record], results: Sequence[PaperResult]) -> dict[str, Any]:
+def _quality(model: Model | None, records: Sequence[Record], results: Sequence[PaperResult]) -> dict[str, Any]:
     channels = [record.quality for record in records]
     nrmse = 0.0
-    for record, result in zip(records, results):
+    for record, result in zip(records, results) if model is not None else ():
         cycle, delay = result.fit.linearised.cycle, model.value("measurement_delay.delay")
         begin = (record.output.time[0] - delay - result.pumping.origin) % result.pumping.period
         nrmse = max(nrmse, free_run_nrmse(model, record, cycle.path(begin)))

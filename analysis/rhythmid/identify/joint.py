@@ -52,11 +52,13 @@ class Search:
 
 @dataclass(frozen=True)
 class JointFit:
-    """The answer: the time-domain `fit`, its `pumping` (None without forcing) and the `search` that led there."""
+    """The answer: the time-domain `fit` to the `records`, its `pumping` (None without forcing), and how the `search` for it
+    ended."""
 
     fit: Fit
     pumping: Pumping | None
     search: Search
+    records: tuple[Record, ...]
 
     @property
     def model(self) -> Model:
@@ -99,7 +101,7 @@ def prepared_model(model: Model, records: Sequence[Record]) -> tuple[Model, Pump
     return with_bounds(model, bounds), pumping
 
 
-def _without_forcing(model: Model) -> Model:
+def without_forcing(model: Model) -> Model:
     for term in model.terms:
         if term.element.name == "periodic_forcing":
             model = model.without(term.label)
@@ -116,7 +118,7 @@ def _begun(record: Record, delay: float) -> Record:
     return replace(record, output=replace(output, time=output.time[first:], value=output.value[first:]))
 
 
-def _cycle_columns(series: Series, pumping: Pumping) -> Array:
+def cycle_columns(series: Series, pumping: Pumping) -> Array:
     """Mean and harmonics of the limit cycle at the blocks' centres."""
     highest = int(0.5 / (series.period * series.block * pumping.frequency)) - 1
     n = np.arange(1, max(1, min(CYCLE_HARMONICS, highest)) + 1)
@@ -129,7 +131,7 @@ def _explained(fit: Fit, pumping: Pumping | None) -> Search:
     left = response = floor = count = 0.0
     for one, residual in zip(fit.run.series, fit.residuals):
         used = one.used
-        columns = np.ones((one.blocks, 1)) if pumping is None else _cycle_columns(one, pumping)
+        columns = np.ones((one.blocks, 1)) if pumping is None else cycle_columns(one, pumping)
         measured = one.averaged
         if one.ignored is not None:
             residual = residual - columns @ np.linalg.lstsq(columns[used], residual[used], rcond=1e-12)[0]
@@ -151,7 +153,7 @@ def _start(
 ) -> list[Model]:
     """Models with values from the harmonic likelihood of each record, best first; empty where it has nothing to see."""
     found: list[tuple[float, Model]] = []
-    plain = _without_forcing(model)
+    plain = without_forcing(model)
     for record in sorted(records, key=lambda r: -r.duration)[:3]:
         if record.input is None or np.ptp(record.input.value) == 0.0 or record.input_kind == "base_displacement":
             continue
@@ -239,7 +241,8 @@ def joint_likelihood(
     for start in starts:
         late = sum(max(start.value(name), 0.0) for name in DELAYS if name in start.parameters)
         try:
-            trial = _judged(estimate(start, _series(given, late, block, cycle, pumping), pool=pool), pumping)
+            series = _series(given, late, block, cycle, pumping)
+            trial = _judged(estimate(start, series, pool=pool, max_step=step_of(series)), pumping, given)
         except InputError:
             continue
         if best is None or trial.search.motion + trial.search.response < best.search.motion + best.search.response:
@@ -247,7 +250,7 @@ def joint_likelihood(
         if trial.search.arrived:
             return trial
     series = _series(given, 0.0 if pumping is None else 0.2, block, cycle, pumping)
-    trial = _judged(_search_in_time(model, series, longest, pool), pumping)
+    trial = _judged(_search_in_time(model, series, longest, pool), pumping, given)
     if trial.search.arrived:
         return trial
     if best is None or trial.search.motion < best.search.motion:
@@ -258,14 +261,21 @@ def joint_likelihood(
     )
 
 
+def step_of(series: Sequence[Series]) -> float | None:
+    """Integration step [s]: where the cycle is not data, its integration error must be small beside the response."""
+    if all(one.ignored is None for one in series):
+        return None
+    return 0.2 * min(one.period * one.block for one in series)
+
+
 def _series(
     records: Sequence[Record], delay: float, block: int | None, cycle: bool, pumping: Pumping | None
 ) -> list[Series]:
     series = prepare([_begun(record, delay + 0.05 if delay > 0.0 else 0.0) for record in records], block)
     if not cycle and pumping is not None:
-        series = [replace(one, ignored=_cycle_columns(one, pumping)) for one in series]
+        series = [replace(one, ignored=cycle_columns(one, pumping)) for one in series]
     return series
 
 
-def _judged(fit: Fit, pumping: Pumping | None) -> JointFit:
-    return JointFit(fit, pumping, _explained(fit, pumping))
+def _judged(fit: Fit, pumping: Pumping | None, records: Sequence[Record]) -> JointFit:
+    return JointFit(fit, pumping, _explained(fit, pumping), tuple(records))

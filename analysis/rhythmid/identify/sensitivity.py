@@ -13,7 +13,7 @@ from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-DEAD = 1e-5  # share of a sensitivity, below which what the projection leaves of it is taken for rounding
+DEAD = 3e-4  # share of a sensitivity, below which what the projection leaves of it is taken for rounding
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,306 @@
+"""What the records can tell and what they cannot: undetermined directions, the three observables of the delays, closure,
+aliases, and the honest answer about the two delays.
+
+A shift (τ_u, τ_y, δ_f) → (+a, −a, +a) changes nothing that is recorded, with δ_f the offset of the forcing's phase
+against the record's clock. Three things can be observed: the limit cycle's phase A = τ_y + δ_f, the slope of the
+response's phase B = τ_u + τ_y, and the sidebands' offset C = τ_u − δ_f. In a right model A + C = B.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from rhythmid.errors import InputError
+from rhythmid.identify.harmonic_likelihood import INPUT_DELAY, MEASUREMENT_DELAY, visible_sidebands
+from rhythmid.identify.identification import Delays, Estimate, Observables
+from rhythmid.identify.joint import JointFit, without_forcing
+from rhythmid.identify.output_error import Fit
+from rhythmid.identify.sensitivity import Problem
+from rhythmid.identify.series import dominant_frequency
+from rhythmid.ltp.limit_cycle import limit_cycle
+from rhythmid.ltp.pumping import pumping_of
+from rhythmid.simulate import physical_times
+
+Array = NDArray[np.float64]
+Forcing = Literal["on_robot", "delayed", "clock_unknown"]
+CERTAIN = 4.0  # standard deviations
+COVER = 1.96  # standard deviations on either side of a 95 % interval
+SEEN = 1e-3  # of the limit cycle's fundamental, from which a harmonic of it counts
+
+
+@dataclass(frozen=True)
+class Offset:
+    """What is known of δ_f [s], the clock offset of the forcing's reference: bounds, or a Gaussian prior about `mean`."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    mean: float = 0.0
+    std: float = math.inf
+
+
+def offset_of(bounds: tuple[float, float] | None, std: float | None) -> Offset | None:
+    """The clock offset as stated: bounds (low, high) [s] or a standard deviation [s]; None where neither is.
+
+    Raises InputError for bounds out of order, or for both.
+    """
+    if bounds is None:
+        return None if std is None else Offset(std=std)
+    if std is not None:
+        raise InputError("the clock offset is either bounded or has a standard deviation: give one of the two")
+    if not bounds[0] < bounds[1]:
+        raise InputError(f"bounds of the clock offset {bounds[0]:g} to {bounds[1]:g} s: the lower comes first")
+    return Offset(*bounds)
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A change of parameters (unit vector, in units of their size) that the records do not notice, in words."""
+
+    names: tuple[str, ...]
+    weights: Array
+    words: str
+
+
+def undetermined(fit: Fit) -> list[Direction]:
+    """Directions in parameter space whose standard deviation exceeds the parameters themselves.
+
+    Null space of the Fisher information, each parameter measured by its own size, a delay by the motion's period / 2π.
+    """
+    p = len(fit.names)
+    if p == 0:
+        return []
+    radian = 1.0 / (2 * np.pi * max(dominant_frequency(one) for one in fit.run.series))
+    parameters = fit.model.parameters
+    size = np.array([radian if parameters[n].unit == "s" else abs(v) or 1.0 for n, v in zip(fit.names, fit.values)])
+    information = (fit.linearisation.jacobian * size).T @ (fit.linearisation.jacobian * size)
+    for i, name in enumerate(fit.names):
+        prior = parameters[name].prior
+        if prior is not None:
+            information[i, i] += (size[i] / prior.std) ** 2
+    values, vectors = np.linalg.eigh(information)
+    floor = max(1.0, 1e-15 * float(values[-1]))
+    return [_direction(fit.names, vectors[:, i], size) for i in range(p) if values[i] < floor]
+
+
+def _direction(names: Sequence[str], vector: Array, size: Array) -> Direction:
+    large = np.flatnonzero(np.abs(vector) > 0.05 * np.abs(vector).max())
+    moved = [names[i] for i in large]
+    step = (vector * size)[large]
+    if len(moved) == 1:
+        words = f"nothing in the records determines {moved[0]}"
+    elif set(moved) == {INPUT_DELAY, MEASUREMENT_DELAY} and abs(step.sum()) < 0.05 * np.abs(step).max():
+        words = "only the sum of the input delay and the measurement delay shows, not how it divides"
+    else:
+        change = ", ".join(f"{name} by {s / step[0]:+.3g}" for name, s in zip(moved, step))
+        words = f"these can change together and nothing recorded would change: {change}"
+    return Direction(tuple(moved), vector[large], words)
+
+
+def _cycle_slope(joint: JointFit) -> Array | None:
+    """Whitened, projected change of the output when only the limit cycle comes later, (n,) [1/s]; None without cycle."""
+    fit = joint.fit
+    problem = Problem(fit.run, fit.names, fit.noise, None)
+    columns = []
+    for index, (one, record) in enumerate(zip(fit.run.series, joint.records)):
+        pumping = pumping_of(record) or joint.pumping
+        slope = np.zeros(one.blocks)
+        if pumping is not None and pumping.active:
+            try:
+                cycle = limit_cycle(without_forcing(fit.model), pumping)
+            except InputError:
+                return None
+            output = cycle.output.copy()
+            output[-1] = output[0]
+            rate = CubicSpline(cycle.time, output, bc_type="periodic").derivative()
+            physical = physical_times(fit.model, one.centres) - pumping.origin
+            slope = -rate(np.mod(physical, pumping.period))
+        white = problem.whitened(index, slope)
+        basis = fit.linearisation.bases[index]
+        columns.append(white - basis @ (basis.T @ white))
+    column = np.concatenate(columns)
+    return column if np.linalg.norm(column) > 0.0 else None
+
+
+def observables(joint: JointFit) -> Observables | None:
+    """A, B and C, each from its own part of the data, and the closure A + C − B in its standard deviations.
+
+    The limit cycle is given a delay of its own beside that of the response to the command; both are estimated, one
+    step from the joint optimum, together with everything else. None where there is no cycle or a delay is not free.
+    """
+    fit = joint.fit
+    if joint.pumping is None or INPUT_DELAY not in fit.names or MEASUREMENT_DELAY not in fit.names:
+        return None
+    extra = _cycle_slope(joint)
+    if extra is None:
+        return None
+    joined = np.column_stack([fit.linearisation.jacobian, extra])
+    norms = np.linalg.norm(joined, axis=0)
+    norms[norms == 0.0] = 1e-150
+    inverse = np.linalg.pinv((joined / norms).T @ (joined / norms), rcond=1e-13, hermitian=True)
+    covariance = inverse / np.outer(norms, norms)
+    step = -covariance @ (joined.T @ fit.linearisation.residual)
+    u, y, gap = fit.names.index(INPUT_DELAY), fit.names.index(MEASUREMENT_DELAY), len(fit.names)
+    delays = {u: fit.model.value(INPUT_DELAY), y: fit.model.value(MEASUREMENT_DELAY), gap: 0.0}
+
+    def of(*places: int) -> Estimate:
+        pick = np.zeros(gap + 1)
+        pick[list(places)] = 1.0
+        value = sum(delays[p] + float(step[p]) for p in places)
+        return Estimate(value, float(math.sqrt(max(pick @ covariance @ pick, 0.0))), "s")
+
+    closure = of(gap)
+    assert closure.value is not None and closure.std is not None
+    return Observables(of(y, gap), of(u, y), of(u), closure.value / closure.std if closure.std > 0.0 else 0.0)
+
+
+def aliases(joint: JointFit, cycle: bool = True) -> tuple[tuple[float, float], ...]:
+    """Pairs (τ_u, τ_y), not negative, that give the very same record: shifts by T/gcd of all harmonics that show."""
+    pumping, fit = joint.pumping, joint.fit
+    if pumping is None:
+        return ()
+    seen: list[int] = []
+    plain = without_forcing(fit.model)
+    one = fit.run.series[0]
+    if cycle and one.ignored is None:
+        lines = np.abs(limit_cycle(plain, pumping).harmonics(4)[1:])
+        seen += [n + 1 for n in range(len(lines)) if lines[n] > SEEN * lines.max()]
+    record = joint.records[0]
+    if record.input is not None and np.ptp(record.input.value) > 0.0:
+        density = fit.noise.long_run_variance * one.period * one.block
+        seen += visible_sidebands(record, plain, pumping, density)
+    if not seen:
+        return ()
+    shift = pumping.period / reduce(math.gcd, seen)
+    u, y = fit.model.value(INPUT_DELAY), fit.model.value(MEASUREMENT_DELAY)
+    slack = 4.0 * max(s for n, s in fit.std.items() if n in (INPUT_DELAY, MEASUREMENT_DELAY)) + one.period
+    steps = range(-int((u + slack) / shift), int((y + slack) / shift) + 1)
+    return tuple((u + j * shift, y - j * shift) for j in steps if j != 0)
+
+
+def _estimate(fit: Fit, *names: str) -> Estimate:
+    """Sum of parameters with its standard deviation; None where it is not determined."""
+    value = sum(fit.model.value(name) for name in names if name in fit.model.parameters)
+    pick = np.array([float(name in names) for name in fit.names])
+    places = pick > 0
+    norm = np.linalg.norm(fit.linearisation.jacobian[:, places].sum(axis=1)) if places.any() else 0.0
+    variance = float(pick @ fit.covariance @ pick)
+    if places.sum() > 1 and not 0.0 <= variance < 1.0:  # the sum of two undetermined ones is lost in their rounding
+        variance = 1.0 / max(_projected(fit, places) ** 2, 1e-300) if norm > 0.0 else math.inf
+    std = math.sqrt(variance) if variance >= 0.0 else math.inf
+    return Estimate(float(value), std if math.isfinite(std) and std < 1e6 else None, "s")
+
+
+def _projected(fit: Fit, places: NDArray[np.bool_]) -> float:
+    """Norm of the sensitivity to the first of the parameters `places`, all parameters that are not theirs projected out."""
+    column = fit.linearisation.jacobian[:, np.flatnonzero(places)[0]]
+    others = fit.linearisation.jacobian[:, ~places]
+    if others.shape[1]:
+        others = others / np.maximum(np.linalg.norm(others, axis=0), 1e-150)
+        column = column - others @ np.linalg.lstsq(others, column, rcond=1e-10)[0]
+    return float(np.linalg.norm(column))
+
+
+def stated_by(joint: JointFit) -> Forcing | None:
+    """Where the forcing acts, as the recordings themselves say: a run that names its forcing made it on the robot."""
+    runs_given = [record.run for record in joint.records]
+    if runs_given and all(run is not None and dict(run.get("forcing") or {}).get("amplitude") for run in runs_given):
+        return "on_robot"
+    return None
+
+
+def delays_of(
+    joint: JointFit, forcing: Forcing | None = None, offset: Offset | None = None, source: str = "the recorded forcing"
+) -> Delays:
+    """The answer about the delays, no firmer than what the records and the user's statement support.
+
+    `forcing` states how the forcing reaches the machine: `on_robot` (made there, its recorded phase is the acting one),
+    `delayed` (through the same delayed channel as the command), `clock_unknown` (made on the robot, its phase recorded
+    by a clock whose `offset` is not known). Without a statement it is taken as on the robot, unless the fit then finds
+    an input delay of zero: that is just what a forcing through the delayed channel looks like, and the split is refused.
+    """
+    fit = joint.fit
+    total = _estimate(fit, INPUT_DELAY, MEASUREMENT_DELAY)
+    nothing = Estimate(None, None, "s")
+    directions = tuple(d.words for d in undetermined(fit))
+    if joint.pumping is None or not joint.pumping.active:
+        words = "no forcing is known, so nothing tells when the cycle is at which phase: only the sum of the delays shows"
+        return Delays(nothing, nothing, total, False, words, undetermined=directions)
+    if INPUT_DELAY not in fit.model.parameters or MEASUREMENT_DELAY not in fit.model.parameters:
+        here = _estimate(fit, MEASUREMENT_DELAY)
+        words = f"{source} acts on the machine undelayed; there is no command, so its delay does not show"
+        return Delays(nothing, here, nothing, False, words, undetermined=directions)
+    first, second = _estimate(fit, INPUT_DELAY), _estimate(fit, MEASUREMENT_DELAY)
+    seen = observables(joint)
+    closure = None if seen is None else seen.z
+    told = forcing or stated_by(joint)
+    intervals = _intervals(first, second, total, None)
+
+    def only_sum(words: str, limits: dict[str, tuple[float, float]]) -> Delays:
+        return Delays(nothing, nothing, total, False, words, closure, (), limits, seen, directions)
+
+    if first.std is None or second.std is None:
+        return only_sum("the records do not tell the two delays apart", intervals)
+    if told == "delayed":
+        return only_sum(
+            "the forcing comes through the same delayed channel as the command: only the sum of the delays shows, "
+            "whatever a solver returns",
+            intervals,
+        )
+    if told == "clock_unknown":
+        known = offset or Offset()
+        if math.isfinite(known.std):
+            shifted = _shifted(first, second, known)
+            words = f"the forcing's clock is off by {known.mean:g} ± {known.std:g} s, as stated"
+            return Delays(*shifted, total, True, words, closure, (), None, seen, directions)
+        limits = f"between {known.low:g} and {known.high:g} s" if math.isfinite(known.high - known.low) else "unknown"
+        words = f"the offset of the forcing's clock is {limits}: each delay is only known to lie in an interval"
+        return only_sum(words, _intervals(first, second, total, known))
+    step = max(record.output.period for record in joint.records)
+    assert first.value is not None and second.value is not None
+    zero = abs(first.value) < CERTAIN * first.std + step
+    if told is None and zero and second.value > CERTAIN * second.std + 2.0 * step:
+        return only_sum(
+            "the input delay comes out at zero, which is also what a forcing through the same delayed channel looks like; "
+            "state --forcing on_robot if the forcing is made on the robot, or --forcing delayed if it is not",
+            intervals,
+        )
+    words = (
+        f"{source} acts on the machine undelayed, with its phase at its stamps (δ_f = 0)"
+        + ("" if told is None else "; so stated by " + ("the user" if forcing else "the recording"))
+    )  # fmt: skip
+    return Delays(first, second, total, True, words, closure, aliases(joint), None, seen, directions)
+
+
+def _shifted(first: Estimate, second: Estimate, offset: Offset) -> tuple[Estimate, Estimate]:
+    """Delays under a Gaussian prior of the offset δ_f: τ_u = C + δ_f, τ_y = A − δ_f."""
+    assert first.value is not None and first.std is not None and second.value is not None and second.std is not None
+    return (
+        Estimate(first.value + offset.mean, math.hypot(first.std, offset.std), "s"),
+        Estimate(second.value - offset.mean, math.hypot(second.std, offset.std), "s"),
+    )
+
+
+def _intervals(
+    first: Estimate, second: Estimate, total: Estimate, offset: Offset | None
+) -> dict[str, tuple[float, float]]:
+    """95 % intervals of the delays from causality (neither is negative) and from bounds on the clock offset."""
+    spread = COVER * (total.std or 0.0)
+    longest = max((total.value or 0.0) + spread, 0.0)
+    whole = (0.0, longest)
+    if offset is None or first.value is None or second.value is None:
+        return {"input": whole, "measurement": whole}
+    wide = (COVER * (first.std or 0.0), COVER * (second.std or 0.0))
+    ranges = (
+        (first.value + offset.low - wide[0], first.value + offset.high + wide[0]),
+        (second.value - offset.high - wide[1], second.value - offset.low + wide[1]),
+    )
+    low, high = zip(*[(min(max(a, 0.0), longest), min(max(b, 0.0), longest)) for a, b in ranges])
+    return {"input": (low[0], high[0]), "measurement": (low[1], high[1])}
+
+

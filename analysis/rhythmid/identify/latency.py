@@ -1,0 +1,73 @@
+"""latency.yaml: the identified delays and model in a small file that a controller loads.
+
+    delays: {input: {value: 0.04, std: 1.7e-05}, measurement: {…}, sum: {…}, separable: true, assumption: …}
+    model: the identified model, as in model.yaml, delays included
+
+Seconds throughout. A delay that could not be told apart is null; its sum never is. For looking ahead only the sum
+matters: a state measured now is `measurement` old, and a command given now acts `input` later.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from rhythmid.document import read
+from rhythmid.errors import InputError
+from rhythmid.identify.identification import Estimate, Identification
+from rhythmid.model import Model
+from rhythmid.output import write_text
+
+
+@dataclass(frozen=True)
+class Latency:
+    """Delays [s] of the command and measurement paths, None where they are only known as a sum, and the model."""
+
+    input: float | None
+    measurement: float | None
+    sum: float
+    sum_std: float | None
+    model: Model
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Latency":
+        """The latency file at `path`. Raises InputError when it is not one."""
+        content = read(path).value
+        if not isinstance(content, Mapping):
+            raise InputError(f"{path}: not a latency file; `rhythmid identify --save` writes one")
+        plain = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        try:
+            delays, model = plain["delays"], plain["model"]
+            return cls(
+                delays["input"]["value"], delays["measurement"]["value"], float(delays["sum"]["value"]),
+                delays["sum"]["std"], Model.from_text(yaml.safe_dump(model), str(path)),
+            )  # fmt: skip
+        except (KeyError, TypeError):
+            raise InputError(f"{path}: not a latency file; `rhythmid identify --save` writes one") from None
+
+
+def save_latency(found: Identification, path: Path) -> None:
+    """Write the delays and the model of an identification. Raises InputError when not even the sum is known."""
+    if found.delays.sum.value is None:
+        raise InputError("no latency to save: the records show no command, so the sum of the delays is unknown")
+
+    def entry(estimate: Estimate) -> dict[str, float | None]:
+        return {
+            "value": None if estimate.value is None else float(estimate.value),
+            "std": None if estimate.std is None else float(estimate.std),
+        }
+
+    delays = found.delays
+    content = {
+        "delays": {
+            "input": entry(delays.input),
+            "measurement": entry(delays.measurement),
+            "sum": entry(delays.sum),
+            "unit": "s",
+            "separable": delays.separable,
+            "assumption": delays.assumption,
+        },
+        "model": yaml.safe_load(found.model.to_yaml()),
+    }
+    write_text(path, yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110))
