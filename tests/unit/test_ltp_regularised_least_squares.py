@@ -41,7 +41,7 @@ def test_the_banded_solution_is_the_dense_one_of_equation_5() -> None:
     penalty = np.kron(np.eye(h), second.T @ second)
     output = made.output_at(operator.bins)
     dense = np.linalg.solve(u.conj().T @ u + operator.alpha * penalty, u.conj().T @ output).reshape(h, n)
-    assert operator.solve(output) == pytest.approx(dense, abs=1e-8 * np.abs(dense).max())
+    assert operator.solve(output) == pytest.approx(dense, abs=1e-6 * np.abs(dense).max())
 
 
 def test_estimates_of_a_real_system_have_conjugate_symmetry() -> None:
@@ -66,7 +66,8 @@ def test_the_papers_record_gives_the_theoretical_htfs(measured, plant) -> None:
 def test_the_loss_of_the_peak_is_what_was_predicted(measured, plant, window: float) -> None:
     operator = regularised_least_squares(measured, 3, window=window)
     found = estimate_htf(operator)
-    truth = operator.model_htf(plant.htf)
+    turn = delay_phase(operator.harmonics, operator.frequency, 0.04, 0.05, 1.0)
+    truth = operator.model_htf(plant.htf) * np.exp(-1j * turn)
     row, keep = found.htf.row(0), operator.positive
     peak = np.argmax(np.abs(truth[row, keep]))
     expected = np.abs(operator.smooth(truth)[row, keep][peak] / truth[row, keep][peak])
@@ -75,9 +76,8 @@ def test_the_loss_of_the_peak_is_what_was_predicted(measured, plant, window: flo
     # the window on the impulse response: 1 − ∫ exp(−t/τ) / (1 + (t/t_c)⁴) dt / τ
     tau = plant.cycle.ring_down
     t = np.linspace(0.0, 12 * tau, 4001)
-    share = np.trapezoid(np.exp(-t / tau) / (1 + (t / window) ** 4), t) / tau if hasattr(np, "trapezoid") else None
-    if share is not None:
-        assert expected == pytest.approx(share, abs=0.01)
+    share = np.sum(np.exp(-t / tau) / (1 + (t / window) ** 4)) * t[1] / tau
+    assert expected == pytest.approx(share, abs=0.015)
 
 
 def test_alpha_states_a_time_that_is_the_same_for_records_of_any_length_and_size(measured) -> None:
@@ -113,7 +113,7 @@ def test_standard_deviations_are_those_of_repeated_noise(measured, plant) -> Non
         assert one.htf.std is not None
         stated.append(one.htf.std[one.htf.row(0), at - half - 1])
     scatter = np.sqrt(np.mean(np.abs(np.array(found) - np.mean(found)) ** 2))
-    assert np.mean(stated) == pytest.approx(scatter, rel=0.5)
+    assert np.mean(stated) == pytest.approx(scatter, rel=0.25)
 
 
 def test_what_the_input_does_not_reach_is_told(measured) -> None:

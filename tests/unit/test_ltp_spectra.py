@@ -90,8 +90,15 @@ def test_spectra_do_not_depend_on_when_the_recording_began(paper_record) -> None
     )
     first = spectra(made, pumping_of(made), 1.95)
     second = spectra(later, pumping_of(later), 1.95)
-    assert second.output == pytest.approx(first.output, abs=1e-8 * np.abs(first.output).max())
-    assert second.input == pytest.approx(first.input, abs=1e-8 * np.abs(first.input).max())
+    assert second.window.periods == first.window.periods
+    whole = second.window.start - first.window.start - 17.3456  # the cut may begin a sample earlier
+    assert abs(whole) < 2e-3
+    for m in (0, 1):  # what any HTF is made of; a shift by whole periods turns both factors alike
+        bins = np.arange(300, 1500)
+        products = [
+            one.output_at(bins) * one.shifted_input(np.array([m]), bins)[0].conj() for one in (first, second)
+        ]
+        assert products[1] == pytest.approx(products[0], abs=1e-4 * np.abs(products[0]).max())
 
 
 def test_a_period_of_no_whole_number_of_samples_does_not_leak() -> None:

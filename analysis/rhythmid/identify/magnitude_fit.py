@@ -20,7 +20,7 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-POOR = 0.2  # relative misfit of the magnitudes above which other starts are tried
+POOR = 0.5  # relative misfit of the magnitudes above which other starts are tried
 ROUGH = 200  # frequencies at which a first look is taken
 SCAN = np.geomspace(0.4, 2.5, 17)
 
@@ -146,37 +146,36 @@ def _descend(comparison: _Comparison, start: Array) -> tuple[Array, Array]:
 
 
 def _scan(cost: Callable[[Array], float], start: Array) -> Array:
-    """Best of a multiplicative grid, one parameter after the other, twice around."""
+    """Best of a multiplicative grid, one parameter after the other, twice around those that matter."""
     values, best = start.copy(), cost(start)
+    order = list(range(len(values)))
     for _ in range(2):
-        for i in range(len(values)):
+        for i in tuple(order):
+            costs = []
             for factor in SCAN:
                 trial = values.copy()
                 trial[i] = start[i] * factor
-                reached = cost(trial)
-                if reached < best:
-                    best, values = reached, trial
+                costs.append(cost(trial))
+                if costs[-1] < best:
+                    best, values = costs[-1], trial
+            if max(costs) < min(costs) + 1e-3 * best:
+                order.remove(i)
     return values
 
 
 def fit_magnitude(estimate: HtfEstimate, model: Model) -> MagnitudeFit:
     """Fit the model's free parameters to |Ĝ_m|, equation (8), and to the mean of the limit cycle.
 
-    Where the fit from the model's own values stays poor, starts between 0.4 and 2.5 times them are tried. Raises
-    InputError when the model has no limit cycle at its own values.
+    Where the model's own values are far off, starts between 0.4 and 2.5 times them are tried. Raises InputError when the
+    model has no limit cycle at its own values.
     """
     names = undelayed_parameters(model)
     comparison = _Comparison(estimate, model, names)
     start = np.array([model.value(name) for name in names])
     comparison.linearised(start)  # says why when even these values do not work
-    values, residual = start, comparison.residual(start)
-    if names:
-        values, residual = _descend(comparison, start)
-        if comparison.misfit(residual) > POOR:
-            better = _scan(comparison.rough, start)
-            trial, left = _descend(comparison, better)
-            if float(np.sum(left**2)) < float(np.sum(residual**2)):
-                values, residual = trial, left
+    if comparison.rough(start) > POOR:
+        start = _scan(comparison.rough, start)
+    values, residual = _descend(comparison, start) if names else (start, comparison.residual(start))
     fitted = model.with_values(dict(zip(names, values)))
     final = comparison.linearised(values)
     covariance = _covariance(comparison, values, residual) if names else np.empty((0, 0))
@@ -196,7 +195,7 @@ def _covariance(comparison: _Comparison, values: Array, residual: Array) -> Arra
     independent = max(1.0, float(np.sum(comparison.weight > 0.0)) / together - len(values))
     scatter = float(np.sum(residual[:-1] ** 2)) / independent
     _, singular, right = np.linalg.svd(jacobian / norms, full_matrices=False)
-    determined = singular > 1e-7 * singular[0]
+    determined = singular > 1e-5 * singular[0]
     inverse = (right.T[:, determined] / singular[determined]) @ (right.T[:, determined] / singular[determined]).T
     covariance = scatter * inverse / np.outer(norms, norms)
     unknown = dead | (np.abs(right[~determined]).max(axis=0, initial=0.0) > 1e-3)

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 RING_DOWNS = 12.0  # t_c / τ
 HAT = np.pi / np.sqrt(2.0)  # ∫ dt / (1 + t⁴): effective length of the window, in t_c
-NOISE = 3.0 * np.pi / (4.0 * np.sqrt(2.0))  # ∫ dt / (1 + t⁴)²: of the window's noise, in t_c
+PROBES = 24  # random outputs by which the gain for noise is measured
 REACHED = 0.01  # of the greatest mean input power, below which nothing is known about a harmonic
 
 
@@ -77,13 +77,34 @@ class RegularisedLeastSquares:
     @cached_property
     def power(self) -> Array:
         """Mean input power (h, n) around each bin, as far as the window ties bins together [unit² s²]."""
+        return self._around(np.abs(self.shifted) ** 2)
+
+    def _around(self, values: Array) -> Array:
+        """Mean of values (h, n) over the bins that the window ties together."""
         wide = max(1, round(1.0 / (2.0 * self.window * self.spectra.resolution)))
-        wide = max(wide, self._spacing)
-        kernel = np.ones(2 * wide + 1) / (2 * wide + 1)
-        return np.array([np.convolve(row, kernel, mode="same") for row in np.abs(self.shifted) ** 2])
+        kernel = np.ones(2 * wide + 1)
+        return np.array([np.convolve(row, kernel, mode="same") for row in values]) / np.convolve(
+            np.ones(values.shape[1]), kernel, mode="same"
+        )
 
     @cached_property
-    def _spacing(self) -> int:
+    def noise_gain(self) -> tuple[Array, float]:
+        """Standard deviation of Ĝ (h, n) for white noise of unit deviation in every bin of Y, and how many degrees of
+        freedom (5) takes: both measured with random outputs (M. F. Hutchinson, Commun. Stat. 19 (1990) 433)."""
+        rng = np.random.default_rng(0)
+        half = len(self.bins) // 2
+        used = np.any(self.shifted != 0.0, axis=0)
+        variance, taken = np.zeros(self.shifted.shape), 0.0
+        for _ in range(PROBES):
+            right = (rng.standard_normal(half) + 1j * rng.standard_normal(half)) / np.sqrt(2.0)
+            output = np.where(used, np.concatenate([right[::-1].conj(), [0.0], right]), 0.0)
+            found = self.solve(output)
+            variance += np.abs(found) ** 2 / PROBES
+            taken += np.vdot(output, np.einsum("hn,hn->n", self.shifted, found)).real / PROBES
+        return np.sqrt(self._around(variance)), float(np.clip(taken, 0.0, used.sum() - 1.0))
+
+    @cached_property
+    def spacing(self) -> int:
         """Distance between bins that the input excites."""
         live = np.abs(self.spectra.input) > 1e-3 * np.abs(self.spectra.input).max()
         gaps = np.diff(np.flatnonzero(live))
@@ -159,11 +180,8 @@ def estimate_htf(operator: RegularisedLeastSquares) -> HtfEstimate:
     found = operator.solve(output)
     used = np.any(operator.shifted != 0.0, axis=0)
     residual = np.where(used, output - np.einsum("hn,hn->n", operator.shifted, found), 0.0)
-    # each harmonic takes as many degrees of freedom as its window holds independent values
-    share = min(0.9, len(operator.harmonics) * HAT * operator.window * operator.spectra.resolution)
-    noise = float(np.sqrt(np.sum(np.abs(residual) ** 2) / max(1.0, used.sum() * (1.0 - share))))
+    gain, taken = operator.noise_gain
+    noise = float(np.sqrt(np.sum(np.abs(residual) ** 2) / (used.sum() - taken)))
     keep = operator.positive
-    variance = noise**2 / np.maximum(operator.power[:, keep], 1e-300)
-    std = np.sqrt(variance * min(1.0, NOISE * operator.window * operator.spectra.resolution))
-    htf = HarmonicTransferFunctions(operator.harmonics, operator.frequency[keep], found[:, keep], std)
+    htf = HarmonicTransferFunctions(operator.harmonics, operator.frequency[keep], found[:, keep], noise * gain[:, keep])
     return HtfEstimate(htf, operator.reached[:, keep], operator, noise)
