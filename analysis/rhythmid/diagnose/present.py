@@ -207,22 +207,25 @@ def _functions(
 def _transfer(
     found: Search, pumpings: Sequence[Pumping], series: Sequence[Series], nominal: Model
 ) -> TransferChange | str:
-    """Transfer functions of the refitted nominal and the final model around the cycle of the first forced record."""
-    if not pumpings:
-        return (
-            "no periodic forcing was recorded, so there is no cycle around which to state transfer functions"
-        )
-    pumping = pumpings[0]
+    """Transfer functions of the refitted nominal and the final model around the cycle of the first forced record, or, where
+    no forcing was recorded, around rest; the reason where there are none."""
+    if any(one.kind != "force" for one in series):
+        return "transfer functions are stated for a force as input, and these records have another"
     highest = max(bandwidth(one.value, one.period) for one in series)
-    frequency = np.linspace(0.02, 1.0, POINTS) * min(highest, 20.0 * pumping.frequency)
-    indices = np.array(INDICES)
+    if pumpings:
+        pumping, indices = pumpings[0], np.array(INDICES)
+        highest = min(highest, 20.0 * pumping.frequency)
+    else:
+        pumping, indices = Pumping(1.0, np.zeros(2, dtype=complex)), np.array([0])
+    frequency = np.linspace(0.02, 1.0, POINTS) * highest
     try:
         before = theoretical_htf(found.nominal.model, pumping, indices, frequency)
         after = theoretical_htf(found.fit.model, pumping, indices, frequency)
-    except InputError as error:
+    except (InputError, np.linalg.LinAlgError) as error:
         return f"no transfer functions: {error}"
     unit = f"{nominal.units.position}/{nominal.units.force}"
-    return TransferChange(frequency, INDICES, before.value, after.value, unit, pumping.frequency)
+    pumped = pumping.frequency if pumpings else None
+    return TransferChange(frequency, tuple(map(int, indices)), before.value, after.value, unit, pumped)
 
 
 def _estimates(fit: Fit) -> dict[str, dict[str, float | str | None]]:

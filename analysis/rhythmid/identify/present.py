@@ -33,7 +33,11 @@ def _transfer(found: Identification) -> list[TransferFunction]:
     estimate, first = found.harmonics, found.paper[0]
     delays = found.delays
     both = delays.separable and delays.input.value is not None and delays.measurement.value is not None
-    split = (delays.input.value or 0.0, delays.measurement.value or 0.0) if both else (delays.sum.value or 0.0, 0.0)
+    split = (
+        (delays.input.value or 0.0, delays.measurement.value or 0.0)
+        if both
+        else (delays.sum.value or 0.0, 0.0)
+    )
     for row, m in enumerate(estimate.harmonics):
         inside = found.reached[row]
         frequency = estimate.frequency[inside]

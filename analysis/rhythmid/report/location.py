@@ -59,26 +59,28 @@ def location_section(found: Findings) -> Section:
         factor, unit = scaled(abs(place.position), found.output_unit)
         blocks.append(
             Paragraph(
-                f"Model and record part most in {place.run.name}, around {number(place.time, 3)} s{phase}, at x = "
+                f"Model and record part most in “{place.run.name}”, around {number(place.time, 3)} s{phase}, at x = "
                 f"{with_unit(number(factor * place.position, 3), unit)} and v = "
                 f"{with_unit(number(place.velocity, 2), f'{found.output_unit}/s')}; the mismatch is strongest at "
                 f"{number(place.frequency, 3)} Hz, which carries {percent(place.share)} of its power."
             )
         )
-    blocks.append(Columns(tuple(_slot_scores(found, slot))))
+    figures = [figure for figure in (_slot_scores(found, slot), _dependences(found)) if figure is not None]
+    if figures:
+        blocks.append(Columns(tuple(figures)))
     evidence = tuple(result["location"]["evidence"])
     if evidence:
         blocks.append(Fold("The evidence in words", (Bullets(tuple(map(plain, evidence))),)))
     return Section("Where model and machine part", tuple(blocks))
 
 
-def _slot_scores(found: Findings, slot: str | None) -> list[Block]:
+def _slot_scores(found: Findings, slot: str | None) -> Drawing | None:
     best: dict[str, ElementScore] = {}
     for one in found.scores:
         if one.slot not in best or one.statistic > best[one.slot].statistic:
             best[one.slot] = one
     if not best:
-        return []
+        return None
     bars = [
         Bar(
             one.slot,
@@ -89,48 +91,41 @@ def _slot_scores(found: Findings, slot: str | None) -> list[Block]:
         )
         for one in sorted(best.values(), key=lambda s: -s.statistic)
     ]
-    blocks: list[Block] = [
-        Drawing(
-            "Best score in each slot",
-            draw_bars(
-                "Best score test in each slot: " + ", ".join(f"{b.label} {b.text}" for b in bars), bars,
-                found.threshold, "chance",
-            ),
-            "How strongly the best element of each slot would explain the mismatch (χ² of its score test). Beyond the dotted line "
-            "chance is no explanation. The final say is with the refits below.",
-        )
-    ]  # fmt: skip
-    telling = list(found.functions)
-    if telling:
-        bars = [
-            Bar(
-                f.quantity,
-                100.0 * max(f.explained, 0.0),
-                f"{100.0 * max(f.explained, 0.0):.0f}\u202f%",
-                "measured",
-            )
-            for f in telling
-        ]
-        blocks.append(
-            Drawing(
-                "What the mismatch depends on",
-                draw_bars(
-                    "Share of the mismatch that a free function explains: "
-                    + ", ".join(f"{b.label} {b.text}" for b in bars),
-                    bars,
-                    full=100.0,
-                ),
-                "Share of the mismatch that a free function of each quantity explains in stretches it was not fitted to. "
-                + (
-                    "Nothing that is left goes with any of them."
-                    if found.result["verdict"] == "consistent"
-                    else "The long bars say what the missing force goes with."
-                    if max(f.explained for f in telling) > SHARE
-                    else "No long bar: the fault is no force that depends on the present state alone, or too large to be mapped."
-                ),
-            )
-        )
-    return blocks
+    return Drawing(
+        "Best score in each slot",
+        draw_bars(
+            "Best score test in each slot: " + ", ".join(f"{bar.label} {bar.text}" for bar in bars),
+            bars,
+            found.threshold,
+            "chance",
+        ),
+        "How strongly the best element of each slot would explain the mismatch (χ² of its score test). Beyond the dotted line "
+        "chance is no explanation. The final say is with the refits below.",
+    )
+
+
+def _dependences(found: Findings) -> Drawing | None:
+    """What a free function of each quantity would explain."""
+    if not found.functions:
+        return None
+    shares = {one.quantity: 100.0 * max(one.explained, 0.0) for one in found.functions}
+    bars = [Bar(quantity, share, f"{share:.0f}\u202f%") for quantity, share in shares.items()]
+    if found.result["verdict"] == "consistent":
+        reading = "Nothing that is left goes with any of them."
+    elif max(shares.values()) > 100.0 * SHARE:
+        reading = "The long bars say what the missing force goes with."
+    else:
+        reading = "No long bar: the fault is no force that depends on the present state alone, or too large to be mapped."
+    return Drawing(
+        "What the mismatch depends on",
+        draw_bars(
+            "Share of the mismatch that a free function explains: "
+            + ", ".join(f"{bar.label} {bar.text}" for bar in bars),
+            bars,
+            full=100.0,
+        ),
+        f"Share of the mismatch that a free function of each quantity explains in stretches it was not fitted to. {reading}",
+    )
 
 
 def unknown_section(found: Findings) -> Section:

@@ -8,7 +8,7 @@ from rhythmid.report.blocks import Columns, Drawing, Fold, Paragraph, Table, dra
 from rhythmid.report.chart import Chart, Curve
 from rhythmid.report.quantity import number, percent, plus_minus, pretty_unit, scaled, with_unit
 from rhythmid.report.row_chart import Change, draw_changes
-from rhythmid.report.run import Error, Harmonic, Run, Which, by_phase, density, error_of, harmonics
+from rhythmid.report.run import FEWEST, Error, Harmonic, Run, Which, by_phase, density, error_of, harmonics
 from rhythmid.report.state_map import draw_maps, state_map
 
 BEFORE, AFTER = "refitted nominal model", "with the added effect"
@@ -23,7 +23,7 @@ def residual_folds(runs: Sequence[Run], unit: str) -> list[Fold | Paragraph]:
         before, after = error_of([run], "before"), error_of([run], "after")
         return 0.0 if before is None else before.rms - (after.rms if after and run.after is not None else 0.0)
 
-    drawable = [run for run in runs if run.used.any()]
+    drawable = [run for run in runs if run.used.sum() >= FEWEST]
     ranked = sorted(drawable, key=gain, reverse=True)[:MOST_SHOWN]
     blocks: list[Fold | Paragraph] = []
     for run in (r for r in drawable if r in ranked):
@@ -202,7 +202,7 @@ def error_changes(runs: Sequence[Run], noise: float | None) -> Drawing:
                 f"{row.label} {number(row.before, 3)} %" + (f" to {number(row.after, 3)} %" if row.after is not None else "")
                 for row in shown
             ),
-            shown, "error [% of the motion's standard deviation]",
+            shown, "error [% of the motion]",
         ),
         f"{'Squares: before; circles: after' if repaired else 'Squares: error'}; upright ticks: what the measurement noise alone "
         f"would leave. What lies at its tick cannot be improved any further.",

@@ -16,6 +16,7 @@ Mask = NDArray[np.bool_]
 Which = Literal["before", "after"]
 SEGMENTS = 10  # a record is cut into for the uncertainty of its error
 PHASES = 48  # parts of a cycle
+FEWEST = 16  # samples below which a record is not drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +181,7 @@ class Place:
 
 def worst_place(runs: Sequence[Run]) -> Place | None:
     """Where the refitted nominal model departs most from the records."""
-    candidates = [run for run in runs if run.used.any()]
+    candidates = [run for run in runs if run.used.sum() >= FEWEST]
     if not candidates:
         return None
     run = max(candidates, key=lambda one: float(np.mean(one.residual("before")[one.used] ** 2)))
@@ -193,7 +194,8 @@ def worst_place(runs: Sequence[Run]) -> Place | None:
     cycle = by_phase(run, "before")
     phase = float(cycle[0][int(np.argmax(np.abs(cycle[1])))]) if cycle is not None else None
     states = state_map(run.position[run.used], run.velocity[run.used], residual[run.used])
-    row, column = np.unravel_index(int(np.nanargmax(np.abs(states.mean))), states.mean.shape)
+    size = np.nan_to_num(np.abs(states.mean))
+    row, column = np.unravel_index(int(np.argmax(size)), size.shape)
     return Place(
         run, float(run.time[int(np.argmax(power))]), phase, float(states.x[column : column + 2].mean()),
         float(states.v[row : row + 2].mean()), float(frequency[line]), share,

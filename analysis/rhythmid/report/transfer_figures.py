@@ -141,14 +141,14 @@ def change_figures(
         words = "Small everywhere: small-signal transfer functions alone would hardly have shown the effect."
     else:
         words = f"Largest in {harmonic_name(indices[most])} near {number(float(frequency[at]), 2)} Hz: {number(peak, 2)} %."
-    pumped = f" Pumped at {pumping:.4g} Hz." if pumping is not None else ""
+    shifted = f" and shifted by the pumping of {pumping:.4g} Hz (G₊₁, G₋₁)" if pumping is not None else ""
     return Columns(
         (
             drawing(
                 "Transfer functions of the final model",
                 Chart("Magnitudes of the final model's harmonic transfer functions over frequency.",
                       "output frequency [Hz]", f"magnitude [{label}]", tuple(magnitudes), from_zero=True),
-                f"How the output answers a small input at its own frequency (G₀) and shifted by the pumping (G₊₁, G₋₁).{pumped}",
+                f"How the output answers a small input at its own frequency (G₀){shifted}.",
             ),
             drawing(
                 "What the effect changes in them",

@@ -1,0 +1,161 @@
+"""The report of a real diagnosis, looked at in a real browser."""
+
+from pathlib import Path
+
+import pytest
+
+from rhythmid.diagnose.diagnosis import diagnose
+from rhythmid.diagnose.present import present
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.experiment import Experiment, perform
+from rhythmid.identify.identify import paper_hopper
+from rhythmid.record.record import Channel, Record
+from rhythmid.report.page import write_page
+
+CANDIDATES = {"coulomb_friction", "cubic_stiffness", "flight_damping", "sensor_lag"}
+SECTIONS = (
+    "Where model and machine part", "What is missing", "How much better it fits", "What is left unexplained",
+    "Harmonics of the cycle and transfer functions", "The ranking", "Parameters", "Delays", "What remains unknown",
+    "The next experiment", "Calibration", "Quality of the records", "How to reproduce this",
+)  # fmt: skip
+EXPERIMENT = """
+model: machine.yaml
+excitation: {{type: chirp, amplitude: {amplitude}, band: [0, 7], sweep: 6.0}}
+forcing: {{amplitude: 1.0, frequency: 1.0}}
+delays: {{input: 0.0203, measurement: 0.0151}}
+noise: {{measurement_std: 1.0e-4}}
+seed: {seed}
+"""
+
+
+def record(folder: Path, name: str, amplitude: float, seed: int) -> Record:
+    """A record of the hopper with hidden friction."""
+    path = folder / f"{name}.yaml"
+    path.write_text(EXPERIMENT.format(amplitude=amplitude, seed=seed))
+    messages = perform(Experiment.load(path))
+    output, command, forcing = (messages[topic] for topic in ("joint_states", "excitation", "forcing"))
+    return Record(
+        name,
+        Channel(output.stamp_ns * 1e-9, output.position, "m"),
+        Channel(command.stamp_ns * 1e-9, command.effort, "N"),
+        Channel(forcing.stamp_ns * 1e-9, forcing.effort, "N"),
+    )
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory, browser) -> Path:
+    """The page of a quick diagnosis; not made where there is no browser to look at it."""
+    folder = tmp_path_factory.mktemp("report")
+    catalogue = load_catalogue()
+    machine = paper_hopper().with_element(catalogue["coulomb_friction"], {"force": 0.03})
+    machine.save(folder / "machine.yaml")
+    records = [record(folder, "weak chirp", 0.2, 1), record(folder, "strong chirp", 1.2, 2)]
+    holdout = [record(folder, "other chirp", 0.5, 3)]
+    others = [name for name, element in catalogue.items() if element.candidate and name not in CANDIDATES]
+    few = catalogue.without(*others)
+    nominal = paper_hopper().with_values({"linear_spring.stiffness": 190.0})
+    answer = diagnose(records, nominal, holdout, few)
+    assert answer.diagnosis.verdict == "missing_physics"
+    path = folder / "report.html"
+    write_page(path, present(answer, nominal, records, holdout, "rhythmid diagnose bags", "nominal.yaml"))
+    return path
+
+
+@pytest.mark.parametrize(("width", "dark"), [(1200, False), (1200, True), (390, False)])
+def test_the_page_loads_without_errors_or_requests(browser, report: Path, width: int, dark: bool) -> None:
+    browser.open(report, width, dark)
+    assert browser.messages == []
+    assert browser.requests == [report.as_uri()]
+    assert browser.evaluate("document.querySelector('h1').innerText") == "Missing physics: Coulomb friction"
+
+
+def test_all_sections_are_there_and_visible(browser, report: Path) -> None:
+    browser.open(report, 1200)
+    titles = browser.evaluate("[...document.querySelectorAll('main h2')].map(h => h.innerText)")
+    assert tuple(titles) == SECTIONS
+    assert browser.evaluate(
+        "[...document.querySelectorAll('section')].every(s => s.getBoundingClientRect().height > 50)"
+    )
+
+
+@pytest.mark.parametrize("width", [320, 390, 768, 1200])
+def test_nothing_runs_over_the_edge(browser, report: Path, width: int) -> None:
+    browser.open(report, width)
+    browser.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
+    assert browser.evaluate("document.documentElement.scrollWidth") <= width
+    over = browser.evaluate(
+        "[...document.querySelectorAll('main *:not(svg *)')].filter(e => e.getBoundingClientRect().right > innerWidth + 1"
+        " && getComputedStyle(e).position !== 'absolute' && !e.closest('thead')).map(e => e.outerHTML.slice(0, 80))"
+    )
+    assert over == []
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_every_drawing_is_drawn_and_its_text_stays_inside_and_legible(
+    browser, report: Path, width: int
+) -> None:
+    browser.open(report, width)
+    browser.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
+    assert browser.evaluate("[...document.images].every(i => i.complete && i.naturalWidth > 0)")
+    drawn = browser.evaluate(
+        """[...document.querySelectorAll('figure svg[role=img]')].filter(s => s.checkVisibility()).map(s => {
+            const frame = s.getBoundingClientRect();
+            const texts = [...s.querySelectorAll('text')].map(t => t.getBoundingClientRect());
+            return {
+                label: s.getAttribute('aria-label'), width: frame.width, height: frame.height,
+                outside: texts.filter(t => t.left < frame.left - 1 || t.right > frame.right + 1 || t.top < frame.top - 1
+                                           || t.bottom > frame.bottom + 1).length,
+                size: Math.min(...texts.map(t => t.height)),
+            }})"""
+    )
+    assert len(drawn) >= 12
+    for one in drawn:
+        assert one["width"] > 250 and one["height"] > 50, one
+        assert one["outside"] == 0, one
+        assert one["size"] >= 9.0, one
+
+
+def test_the_faulty_slot_is_marked_in_the_path_that_is_shown(browser, report: Path) -> None:
+    for width in (1200, 390):
+        browser.open(report, width)
+        shown = browser.evaluate(
+            "[...document.querySelectorAll('.slot.faulty')].filter(s => s.checkVisibility()).map(s =>"
+            " [...s.parentNode.querySelectorAll('.missing')].map(t => t.textContent))"
+        )
+        assert shown == [["+ Coulomb friction"]]
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_text_stands_out_from_its_background(browser, report: Path, dark: bool) -> None:
+    """WCAG 2.1, success criterion 1.4.3: a contrast of at least 4.5 for text, drawings' text included."""
+    browser.open(report, 1200, dark)
+    faint = browser.evaluate(
+        """(() => {
+            const rgb = c => c.match(/[\\d.]+/g).map(Number);
+            const light = c => rgb(c).slice(0, 3).map(v => v / 255).map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+                .reduce((s, v, i) => s + v * [0.2126, 0.7152, 0.0722][i], 0);
+            const behind = e => { for (; e; e = e.parentElement) { const c = getComputedStyle(e).backgroundColor;
+                if (rgb(c).length < 4 || rgb(c)[3] > 0) return c } return 'rgb(255,255,255)' };
+            const found = [];
+            for (const e of document.querySelectorAll('main p, main td, main th, main li, figcaption, h1, h2, .kicker, dt, dd, svg text')) {
+                if (!e.checkVisibility() || e.classList.contains('flag-text')) continue;
+                const svg = e instanceof SVGElement;
+                const [a, b] = [light(svg ? getComputedStyle(e).fill : getComputedStyle(e).color), light(behind(e))].sort((x, y) => y - x);
+                if ((a + 0.05) / (b + 0.05) < 4.5) found.push([(a + 0.05) / (b + 0.05), e.textContent.slice(0, 40)]);
+            }
+            return found })()"""
+    )
+    assert faint == []
+
+
+def test_in_print_everything_folded_is_unfolded(browser, report: Path) -> None:
+    browser.open(report, 800, medium="print")
+    assert browser.evaluate(
+        "[...document.querySelectorAll('details')].every(d => d.getBoundingClientRect().height > 100"
+        " || d.querySelectorAll('figure, pre, li, tr').length < 3)"
+    )
+    assert browser.print().startswith(b"%PDF")
+
+
+def test_the_page_stays_small(report: Path) -> None:
+    assert report.stat().st_size < 2_000_000
