@@ -185,7 +185,8 @@ def _impulse(jacobian: _Jacobian, time: float) -> Impulse | None:
         through[:, i] = (up - down) / (2.0 * shift[i])
     smooth, _ = jacobian.at(np.mod(ends, period))
     saltation = expm(-smooth[1, :q, :q] * half) @ through @ expm(-smooth[0, :q, :q] * half)
-    return Impulse(time, 2.0 * np.linalg.solve((saltation + np.eye(q)).T, (saltation - np.eye(q)).T).T)
+    size = 2.0 * np.linalg.solve((saltation + np.eye(q)).T, (saltation - np.eye(q)).T).T
+    return Impulse(time, size.astype(float))
 
 
 def linearise(cycle: LimitCycle, effort: float | None = None) -> Linearisation:

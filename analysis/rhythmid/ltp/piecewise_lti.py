@@ -58,16 +58,16 @@ class PiecewiseLti:
             offset = phi @ (offset - steady) + steady
             through = phi @ through
         state = np.linalg.solve(identity - through, offset)
-        total = np.zeros(len(nu), dtype=complex)
+        total: Complex = np.zeros(len(nu), dtype=np.complex128)
         for piece, f, steady, phi in steps:  # z = steady + exp(F t) (z(start) − steady)
             length = piece.end - piece.start
             turned = f - 1j * shift * identity
             moving = np.linalg.solve(turned, (expm(turned * length) - identity) @ (state - steady))
             window = length if shift == 0.0 else (1.0 - np.exp(-1j * shift * length)) / (1j * shift)
             part = (piece.c @ moving)[:, 0] + ((piece.c @ steady)[:, 0] + piece.d) * window
-            total += part * np.exp(-1j * shift * piece.start)
+            total = total + part * np.exp(-1j * shift * piece.start)
             state = steady + phi @ (state - steady)
-        return total / self.period
+        return (total / self.period).astype(complex)
 
 
 def hybrid_spring_mass_damper(

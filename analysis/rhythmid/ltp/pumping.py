@@ -67,7 +67,7 @@ class Pumping:
         if not self.active:
             return None
         margin = GRID // 16
-        t = self.period / GRID * np.arange(-margin, GRID + margin + 1)
+        t = self.period / GRID * np.arange(-margin, GRID + margin + 1, dtype=np.float64)
         return spline(t, self(t))
 
 
