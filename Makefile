@@ -41,8 +41,9 @@ format: install ## Format the code
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-demo: install ## Run the real graph for a minute and identify it from its bag
+demo: install ## Run the real graph, identify it from its bag; then conceal an effect, and find it
 	$(BIN)/python docs/demo.py
+	$(BIN)/python docs/demo_concealed.py
 
 benchmark: install ## Compare the simulator with scipy and MuJoCo
 	$(BIN)/python -m pip install --quiet --constraint requirements.lock mujoco
