@@ -261,10 +261,20 @@ def joint_likelihood(
     )
 
 
-def step_of(series: Sequence[Series]) -> float | None:
-    """Integration step [s]: where the cycle is not data, its integration error must be small beside the response."""
-    if all(one.ignored is None for one in series):
-        return None
+def fit_from(
+    model: Model, records: Record | Sequence[Record], cycle: bool = True, block: int | None = None
+) -> Fit:
+    """The fit that the model's own values lead to, without a search: for values that are known to be near."""
+    given = (records,) if isinstance(records, Record) else tuple(records)
+    ready, pumping = prepared_model(model, given)
+    late = sum(max(ready.value(name), 0.0) for name in DELAYS if name in ready.parameters)
+    series = _series(given, late, block, cycle, pumping)
+    return estimate(ready, series, max_step=step_of(series))
+
+
+def step_of(series: Sequence[Series]) -> float:
+    """Integration step [s]: small enough that its error moves no estimate by more than a twentieth of its standard
+    deviation at a noise of a thousandth of the motion."""
     return 0.2 * min(one.period * one.block for one in series)
 
 
