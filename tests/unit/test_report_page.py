@@ -289,9 +289,12 @@ def test_an_identification_without_separable_delays_gives_the_sum_only() -> None
         "measurement": nothing,
         "assumption": "no forcing is known",
     }
+    told["delays"] |= {"intervals": {"input": [0.0, 0.035]}, "undetermined": ["both delays by opposite amounts"]}
     html = render(identification_page(told, "a model from run", (), "rhythmid identify run", {}))
     assert "cannot tell the two delays apart" in html
     assert "late together" in html
+    assert "between 0.00\u202fms and 35.00\u202fms" in html
+    assert "both delays by opposite amounts" in html
 
 
 def test_experiments_stand_beside_their_actual_delays() -> None:

@@ -7,7 +7,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from rhythmid.commands.options import Bags, Elements, JsonFile, SignalsFile
+from rhythmid.commands.options import Bags, Elements, JsonFile, ReportFile, SignalsFile, command_line
 from rhythmid.output import require_new, write_json
 
 
@@ -19,6 +19,7 @@ def identify(
     signals: SignalsFile = None,
     elements: Elements = None,
     json: JsonFile = None,
+    report: ReportFile = None,
     save_model: Annotated[Path | None, typer.Option("--save-model", help="Write the identified model.")] = None,
     save: Annotated[Path | None, typer.Option("--save", help="Write delays and model for a controller.")] = None,
     method: Annotated[
@@ -47,7 +48,7 @@ def identify(
     from rhythmid.model import Model
     from rhythmid.record.read import load_records
 
-    for path in (json, save_model, save):
+    for path in (json, report, save_model, save):
         require_new(path)
     if method not in get_args(Method):
         raise InputError(f"--method {method}: one of {', '.join(get_args(Method))} is expected")
@@ -71,6 +72,12 @@ def identify(
         found.model.save(save_model)
     if save is not None:
         save_latency(found, save)
+    if report is not None:
+        from rhythmid.identify.present import present
+        from rhythmid.report.page import write_page
+
+        write_page(report, present(found, command_line(), "the paper's hopper" if model is None else model.name))
+        typer.echo(f"report: {report}")
 
 
 def show(result: dict[str, Any]) -> None:

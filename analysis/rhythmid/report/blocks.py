@@ -143,7 +143,7 @@ def markup(block: Block) -> str:
 
 def words(text: str) -> str:
     """Text made safe, with the delays' indices set as such."""
-    return re.sub(r"τ_([uy])\b", r"τ<sub>\1</sub>", escape(text))
+    return re.sub(r"([τδ])_([uyf])\b", r"\1<sub>\2</sub>", escape(text))
 
 
 def formula(text: str) -> str:

@@ -7,12 +7,24 @@ import numpy as np
 
 from rhythmid.report.blocks import Block, Bullets, Fold, Paragraph, Section, Table, Tile, Tiles
 from rhythmid.report.page import Page
-from rhythmid.report.quantity import NONE, number, percent, pretty_name, sentence, with_unit
+from rhythmid.report.quantity import NONE, number, percent, plain, pretty_name, sentence, with_unit
 from rhythmid.report.record_quality import RecordQuality, quality_section
-from rhythmid.report.sections import MILLISECONDS, delays_section, parameters_table, reproduce_section, told
+from rhythmid.report.sections import (
+    DELAYS,
+    MILLISECONDS,
+    delays_section,
+    parameters_table,
+    reproduce_section,
+    told,
+)
 from rhythmid.report.transfer_figures import TransferFunction, transfer_grid
 
 SHOWN = 1  # |m| up to which transfer functions are shown at once; others are folded away
+OBSERVABLES = {
+    "A": "the phase of the limit cycle",
+    "B": "the slope of G₀",
+    "C": "the offset of the sidebands",
+}
 METHODS = ("G0", "G-1", "G+1")
 
 
@@ -95,15 +107,33 @@ def _tiles(result: Mapping[str, Any]) -> Tiles:
 
 
 def _delays(result: Mapping[str, Any]) -> Section:
-    section = delays_section(result["delays"])
-    aliases = result["delays"].get("aliases") or ()
-    if not aliases:
-        return section
-    pairs = "; ".join(f"{number(1e3 * a)} and {number(1e3 * b)} ms" for a, b in aliases)
-    said = Paragraph(
-        f"The phases repeat every cycle, so these pairs of τ_u and τ_y would fit as well: {pairs}."
-    )
-    return Section(section.title, (*section.blocks, said))
+    """The delays, and what is known where they cannot be told apart."""
+    delays = result["delays"]
+    section = delays_section(delays)
+    more: list[Block] = []
+    for name, (low, high) in (delays.get("intervals") or {}).items():
+        pair = f"{_milliseconds(low)} and {_milliseconds(high)}"
+        more.append(
+            Paragraph(f"All that can be said of {DELAYS.get(name, name)}: it lies between {pair} (95 %).")
+        )
+    aliases = "; ".join(f"{number(1e3 * a)} and {number(1e3 * b)} ms" for a, b in delays.get("aliases") or ())
+    if aliases:
+        more.append(
+            Paragraph(
+                f"Phases repeat every cycle, so these pairs of τ_u and τ_y would fit as well: {aliases}."
+            )
+        )
+    if delays.get("undetermined"):
+        more += [Paragraph("The records do not notice:"), Bullets(tuple(map(plain, delays["undetermined"])))]
+    seen = delays.get("observables") or {}
+    rows = tuple((name, told(seen[key], MILLISECONDS)) for key, name in OBSERVABLES.items() if seen.get(key))
+    if rows:
+        more.append(
+            Table(
+                "The three delays that can be seen directly, with 95 % intervals.", ("seen in", "delay"), rows
+            )
+        )
+    return Section(section.title, (*section.blocks, *more))
 
 
 def transfer_section(functions: Sequence[TransferFunction], unit: str = "m/N") -> Section:

@@ -117,8 +117,8 @@ def delays_section(delays: Mapping[str, Any], before: Mapping[str, Any] | None =
     if closure is not None:
         blocks.append(
             Paragraph(
-                f"Check: the sum measured by itself and the sum of the two parts differ by {number(closure, 2)} standard "
-                f"deviations; more than 3 would be suspicious."
+                f"Check: the phase of the limit cycle plus the offset of the sidebands is the sum of the delays seen another way than by "
+                f"the slope of G₀. The two differ by {number(abs(closure), 2)} standard deviations; more than 3 would be suspicious."
             )
         )
     if before is not None:
