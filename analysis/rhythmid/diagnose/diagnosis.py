@@ -141,9 +141,11 @@ def check_comparable(series: Sequence[Series]) -> None:
                 )
 
 
-def _floor(found: Search, series: Sequence[Series], noise: NoiseModel) -> float:
+def _floor(series: Sequence[Series], noises: Sequence[NoiseModel]) -> float:
+    """Error that noise alone leaves. Repeats that still ring down overstate it, and a fit that is good enough shows less."""
     joined = np.concatenate([one.averaged[one.used] - one.averaged.mean() for one in series])
-    return math.sqrt(noise.variance) / max(float(np.sqrt(np.mean(joined**2))), 1e-300)
+    variance = min(noise.variance for noise in noises)
+    return math.sqrt(variance) / max(float(np.sqrt(np.mean(joined**2))), 1e-300)
 
 
 def _conclude(
@@ -209,7 +211,7 @@ def _conclude(
         p_value,
         _nominal_error(nominal, found),
         plain.train_nrmse,
-        _floor(found, series, repeats or found.noise),
+        _floor(series, [found.noise, *([repeats] if repeats is not None else [])]),
     )
     return Diagnosis(
         verdict=verdict,
