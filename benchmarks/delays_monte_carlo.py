@@ -12,6 +12,7 @@ import math
 import time
 
 import numpy as np
+
 from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment
 from rhythmid.identify.bound import cramer_rao, planned_record

@@ -3,6 +3,7 @@
 import json
 
 import pytest
+
 from machines import CATALOGUE, hopper, records
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.errors import InputError

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+
 from machines import CATALOGUE, hopper
-from rhythmid.errors import InputError
 from rhythmid.effect import Path, effect_along
+from rhythmid.errors import InputError
 from rhythmid.parallel import fork_map
 
 T = np.arange(4000) * 1e-3

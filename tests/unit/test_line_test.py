@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
+
 from machines import SHORT, hopper, records
 from rhythmid.diagnose.line_test import strongest_line
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare
-from scipy.signal import lfilter
 
 
 @pytest.fixture(scope="module")

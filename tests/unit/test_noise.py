@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from scipy.signal import lfilter
+
+from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 
 
 def coloured(rng, coefficients, std, n):

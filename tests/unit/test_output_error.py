@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from machines import CATALOGUE, SHORT, hopper, record, records
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import estimate, start_only
