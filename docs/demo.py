@@ -54,11 +54,11 @@ def main() -> None:
     default = ROOT / "out" / datetime.now().strftime("demo-%Y%m%d-%H%M%S")
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else default
     folder.mkdir(parents=True)
-    bag, answer = folder / "bag", folder / "result.json"
+    bag, answer, report = folder / "bag", folder / "result.json", folder / "report.html"
     rhythmid("run", EXPERIMENT, "--out", bag)
-    rhythmid("identify", bag, "--model", MODEL, "--json", answer)
+    rhythmid("identify", bag, "--model", MODEL, "--json", answer, "--report", report)
     Console().print(compare(Experiment.load(EXPERIMENT), json.loads(answer.read_text(encoding="utf-8"))))
-    print(f"bag: {bag}\nresult: {answer}")
+    print(f"bag: {bag}\nresult: {answer}\nreport with plots: {report}")
 
 
 if __name__ == "__main__":
