@@ -1,5 +1,7 @@
 """Recorder over real topics: any type and quality of service, nothing lost unsaid, readable after a crash."""
 
+import errno
+import os
 import signal
 import time
 
@@ -12,6 +14,9 @@ from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import String
 
 from rhythmid.errors import InputError
+from rhythmid.record.bag_writer import BagWriter
+from rhythmid.record.recover import recover
+from rhythmid_nodes.bag import LiveBag
 from rhythmid_nodes.qos import latched
 from rhythmid_nodes.recorder import Recorder
 
@@ -123,10 +128,37 @@ def test_after_kill_9_all_but_the_last_moment_is_readable(no_shared_memory, grap
     process.signal(signal.SIGKILL)
     graph.until(lambda: process.returncode is not None, "the end")
     assert not (bag / "metadata.yaml").exists()
-    from rhythmid.record.recover import recover
-
     recover(bag, tmp_path / "recovered")
     assert [m.position[0] for m in read(tmp_path / "recovered")["/hopper/joint_states"]] == list(range(300))
+
+
+def test_a_robots_own_message_types_are_recorded_with_their_definitions(tmp_path, monkeypatch):
+    share = tmp_path / "share"
+    (share / "ament_index/resource_index/packages").mkdir(parents=True)
+    (share / "ament_index/resource_index/packages/my_robot").touch()
+    (share / "my_robot/msg").mkdir(parents=True)
+    (share / "my_robot/msg/Leg.msg").write_text("std_msgs/Header header\nToe[] toes\nfloat64 knee\n")
+    (share / "my_robot/msg/Toe.msg").write_text("geometry_msgs/Vector3 force\n")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    bag = LiveBag(tmp_path / "bag", "mcap", 1.0, 10)
+    bag.open()
+    bag.add_topic("/leg", "my_robot/msg/Leg", [])
+    with pytest.raises(InputError, match="my_robot/msg/Arm is not installed"):
+        bag.add_topic("/arm", "my_robot/msg/Arm", [])
+    bag.stop()
+    with Reader(tmp_path / "bag") as reader:
+        (connection,) = reader.connections
+    assert connection.msgtype == "my_robot/msg/Leg" and "MSG: my_robot/Toe" in connection.msgdef.data
+
+
+def test_a_disk_that_fills_up_is_told_in_one_line(graph, tmp_path, monkeypatch):
+    def full(self):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(BagWriter, "flush", full)
+    recorder = graph.add(Recorder, path=str(tmp_path / "bag"), topics=["joint_states"], flush_period=0.1)
+    graph.until(lambda: recorder.failure is not None, "the failure")
+    assert isinstance(recorder.failure, InputError) and "No space left on device" in str(recorder.failure)
 
 
 @pytest.mark.parametrize(

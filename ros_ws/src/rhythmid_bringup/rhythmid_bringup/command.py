@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from rhythmid.errors import InputError
+
 
 def add(app: typer.Typer) -> None:
     """Add `run` to the command."""
@@ -23,7 +25,10 @@ def add(app: typer.Typer) -> None:
         ] = None,
     ) -> None:
         """Run the graph of an experiment: starts, watches and stops its nodes and leaves a bag."""
-        # ROS is heavy and need not be installed for the other commands
-        from rhythmid_bringup.run import run_alone, run_graph
-
+        try:  # ROS is slow to load, and the other commands need none
+            from rhythmid_bringup.run import run_alone, run_graph
+        except ModuleNotFoundError as missing:
+            raise InputError(
+                f"`rhythmid run` needs ROS 2: {missing}; see the README for both ways to get it"
+            ) from None
         raise typer.Exit(run_graph(experiment, out) if node is None else run_alone(experiment, out, node))

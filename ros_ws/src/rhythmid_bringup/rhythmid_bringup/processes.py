@@ -8,11 +8,15 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 
+_REFUSAL = "error: "
 GRACE = 5.0  # seconds between one signal and the next
 
 
 class Supervised:
-    """A child process in a session of its own, so that a Ctrl-C reaches the supervisor alone."""
+    """A child process in a session of its own, so that a Ctrl-C reaches the supervisor alone.
+
+    `tell(name, line)` gets what it says, but for the one line that says why it refuses its input: that is `refusal`.
+    """
 
     def __init__(
         self,
@@ -22,7 +26,7 @@ class Supervised:
         tell: Callable[[str, str], None],
     ) -> None:
         self.name = name
-        self.last_line = ""
+        self.refusal = ""
         self._tell = tell
         self._process = subprocess.Popen(
             command,
@@ -36,10 +40,6 @@ class Supervised:
         )
         self._reader = threading.Thread(target=self._pass_on, daemon=True)
         self._reader.start()
-
-    @property
-    def pid(self) -> int:
-        return self._process.pid
 
     @property
     def returncode(self) -> int | None:
@@ -57,8 +57,10 @@ class Supervised:
     def _pass_on(self) -> None:
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            self.last_line = line.rstrip()
-            self._tell(self.name, self.last_line)
+            if line.startswith(_REFUSAL):
+                self.refusal = f"{self.name}: {line.removeprefix(_REFUSAL).strip()}"
+            else:
+                self._tell(self.name, line.rstrip())
 
 
 def end(processes: Sequence[Supervised], meanwhile: Callable[[], None] = lambda: time.sleep(0.02)) -> None:

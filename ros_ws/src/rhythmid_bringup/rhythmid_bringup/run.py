@@ -38,8 +38,8 @@ def load(path: Path, out: Path | None) -> Experiment:
 def run_graph(path: Path, out: Path | None) -> int:
     """Run the whole graph under supervision.
 
-    The exit code is 0 when the run came to its end or the user stopped it, 2 when a node refused its parameters, and
-    1 when a node died or the excitation stopped by itself.
+    The exit code is 0 when the run came to its end or the user stopped it, 1 when a node died or the excitation
+    stopped by itself. Raises InputError when a node refuses its parameters.
     """
     experiment = load(path, out)
     folder = Path(tempfile.mkdtemp(prefix="rhythmid-"))
@@ -48,31 +48,36 @@ def run_graph(path: Path, out: Path | None) -> int:
         os.environ.update(environment)  # the supervisor's own node must be in the same domain
         supervisor = Supervisor(experiment, folder, environment, console, interrupted)
         outcome = supervisor.run()
+    if outcome.code != 1:
+        shutil.rmtree(folder, ignore_errors=True)
+    if outcome.code == 2:
+        raise InputError(outcome.sentence)
     show(console, experiment, supervisor.observed, outcome)
     mend(experiment.record.path)
-    if outcome.code == 0:
-        shutil.rmtree(folder, ignore_errors=True)
-    else:
+    if outcome.code == 1:
         console.print(f"parameters and logs of the nodes: {folder}")
     return outcome.code
 
 
 def mend(bag: Path) -> None:
-    """Say where the bag is; if its recorder died, bring back what it had written first."""
+    """Say where the bag is; if its recorder died, bring back first what it had written."""
     if bag.is_dir() and not (bag / "metadata.yaml").is_file():
-        broken = bag.with_name(f"{bag.name}.broken")
-        bag.rename(broken)
-        console.print(f"the recorder did not close the bag; what it left is in {broken}")
         from rhythmid.record.recover import recover
 
-        recover(broken, bag)
+        broken = Path(tempfile.mkdtemp(prefix=f"{bag.name}.broken.", dir=bag.parent)) / bag.name
+        bag.rename(broken)
+        console.print(f"the recorder did not close the bag; what it left is in {broken}")
+        try:
+            recover(broken, bag)
+        except InputError as nothing:
+            console.print(str(nothing))
     if bag.is_dir():
         console.print(f"bag: {bag}")
 
 
 def run_alone(path: Path, out: Path | None, name: str) -> int:
     """Become one node of the experiment; without supervisor the excitation starts by itself."""
-    experiment = load(path, out)
+    experiment = load(path, out) if name == "recorder" else Experiment.load(path)
     specs = {spec.name: spec for spec in experiment.nodes()}
     if name not in specs:
         raise InputError(f"no node {name!r} in the graph; it has {', '.join(specs)}")

@@ -112,14 +112,15 @@ class Supervisor:
         """A node that has ended, or the user's wish to stop."""
         for process in self._processes:
             code = process.returncode
-            if code is not None:
-                process.join_output()
-                how = (
-                    f"was killed by {signal.Signals(-code).name}"
-                    if code < 0
-                    else f"ended with exit code {code}"
-                )
-                return Outcome(2 if code == 2 else 1, f"{process.name} {how}")
+            if code is None:
+                continue
+            process.join_output()
+            if code == 2:
+                return Outcome(2, process.refusal)
+            how = (
+                f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+            )
+            return Outcome(1, f"{process.name} {how}")
         return Outcome(0, "stopped by the user") if self._interrupted() else None
 
     def _wait_until_ready(self, observer: Observer) -> Outcome | None:

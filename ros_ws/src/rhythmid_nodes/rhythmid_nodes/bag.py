@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import sqlite3
 import threading
 from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosbags.interfaces import (
     Connection,
@@ -20,12 +20,13 @@ from rosbags.interfaces import (
     QosTime,
 )
 from rosbags.rosbag2.errors import WriterError
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_typestore
 
 from rhythmid.errors import InputError
 from rhythmid.record.bag_writer import STORAGES, BagWriter
 
 from .clock import Worker
+from .definitions import learn
 
 _DRAIN_PERIOD = 0.1
 
@@ -36,8 +37,8 @@ class LiveBag(Worker):
     Parameters
     ----------
     path
-        Folder of the bag; must not exist. Until the bag is closed it has no metadata.yaml: it is then readable by
-        `rhythmid recover` only.
+        Folder of the bag; must not exist. Until the bag is closed it has no metadata.yaml; after a crash
+        `rhythmid.record.recover` brings back what had been written.
     storage
         `mcap` or `sqlite3`.
     flush_period
@@ -70,7 +71,7 @@ class LiveBag(Worker):
 
     def add_topic(self, topic: str, type_name: str, publishers: Sequence[TopicEndpointInfo]) -> None:
         """Announce a topic before its first message. Raises InputError if its type's definition is not to be had."""
-        self._learn(type_name)
+        learn(self._typestore, type_name)
         self._topics.append((topic, type_name, publishers))
 
     def put(self, topic: str, receive_ns: int, data: bytes) -> None:
@@ -80,30 +81,11 @@ class LiveBag(Worker):
         else:
             self._queue.append((topic, receive_ns, data))
 
-    def _learn(self, type_name: str) -> None:
-        """Find the definition of a type that is not one of ROS 2's own, and of the types that it is made of."""
-        if type_name in self._typestore.fielddefs:
-            return
-        package, _, name = type_name.split("/")
-        try:
-            text = (Path(get_package_share_directory(package)) / "msg" / f"{name}.msg").read_text(
-                encoding="utf-8"
-            )
-        except (PackageNotFoundError, OSError):
-            raise InputError(f"the definition of {type_name} is not installed; leave its topic out") from None
-        found = get_types_from_msg(text, type_name)
-        for _, fields in found.values():
-            for _, description in fields:
-                for part in _named_types(description):
-                    if part not in found:
-                        self._learn(part)
-        self._typestore.register(found)
-
     def _write_all(self) -> None:
         try:
             writer = BagWriter(self._path, version=9, storage_plugin=STORAGES[self._storage])
             writer.open()
-        except (WriterError, OSError) as error:
+        except (WriterError, OSError, sqlite3.Error) as error:
             self.failure = InputError(f"{self._path}: {error}")
             return
         finally:
@@ -117,8 +99,11 @@ class LiveBag(Worker):
                     writer.flush()
             self._drain(writer)
             writer.close()
-        except OSError as error:  # the disk is full or gone; what was flushed can be recovered
-            self.failure = InputError(f"{self._path}: {error.strerror}; the bag is not complete")
+        except (
+            OSError,
+            sqlite3.Error,
+        ) as error:  # the disk is full or gone; what was flushed can be recovered
+            self.failure = InputError(f"{self._path}: {error}; the bag is not complete")
 
     def _drain(self, writer: BagWriter) -> None:
         while self._queue:
@@ -135,16 +120,6 @@ class LiveBag(Worker):
                 topic, type_name, typestore=self._typestore,
                 offered_qos_profiles=[_offered(publisher.qos_profile) for publisher in publishers],
             )  # fmt: skip
-
-
-def _named_types(description: Any) -> list[str]:
-    """Message types that a field is made of; `description` is rosbags' (Nodetype, details)."""
-    kind, details = description
-    if kind.name == "NAME":
-        return [details]
-    if kind.name in ("ARRAY", "SEQUENCE"):
-        return _named_types(details[0])
-    return []
 
 
 def _offered(profile: Any) -> Qos:

@@ -54,10 +54,11 @@ class Worker:
     def start(self) -> None:
         self._thread.start()
 
-    def stop(self, timeout: float | None = None) -> None:
+    def stop(self) -> None:
+        """Ask the thread to end, and wait until it has."""
         self.stopping.set()
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join(timeout)
+        if self._thread.is_alive():
+            self._thread.join()
 
     def _run(self) -> None:
         if self._priority:

@@ -100,6 +100,10 @@ class ExcitationNode(GraphNode):
         excitation = build(spec, values["folder"])
         count = values["count"] or round(excitation.duration * values["rate"])
         grid = np.arange(count, dtype=np.int64) * self.period_ns * np.float64(1e-9)
+        if excitation.peak > values["max_effort"]:
+            self.get_logger().warning(
+                f"the excitation's peak of {excitation.peak:g} N is clamped to max_effort = {values['max_effort']:g} N"
+            )
         safety = Safety(max_effort=values["max_effort"], ramp=values["ramp"])
         return ramped(excitation, safety, grid, count * self.period_ns * 1e-9)
 

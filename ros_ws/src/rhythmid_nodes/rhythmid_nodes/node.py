@@ -82,7 +82,7 @@ class GraphNode(Node):
     def close(self) -> None:
         """End the workers and say the last figures; the context is still valid."""
         for worker in self.workers:
-            worker.stop(timeout=5.0)
+            worker.stop()
         self.diagnostics.publish_last()
 
 
