@@ -43,6 +43,7 @@ LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalo
 REFITTED = (
     6  # elements of a round that are refitted; the right one was among the first five in all of 234 trials
 )
+NEAR = 60.0  # difference of the criterion within which models are compared again under the noise that they leave
 MOST = 4  # effects at once
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
 RIVALS = 4  # elements that scored best at first, tried again in the place of each of several effects
@@ -174,16 +175,15 @@ def search(
         if not found:
             break
         trials |= {tuple(sorted(t.added)): t for t in found}
-        top = found[0]
+        near = [t for t in found if t.bic() - found[0].bic() < NEAR]
+        top = _most_likely(near, series, noise, step, floor)
         fit = whole_fit(top, series, noise, step, pool=pool)
         finer = accurate(fit.run, fit.model, fit.starts, 0.1 * fit.noise.variance**0.5, 3)
         if finer.max_step < 0.45 * fine_enough(top.model, step):
             step = finer.max_step
             fit = whole_fit(replace(top, converged=False), series, noise, step, pool=pool)
         settled = noise_of(fit, floor=floor)
-        compared = under_noise(
-            [t for t in found if t.bic() - top.bic() < 60.0] + [best], series, settled, step
-        )
+        compared = under_noise([*near, best], series, settled, step)
         trials |= {tuple(sorted(t.added)): t for t in compared}
         winner = compared[0]
         before = next((t for t in compared if t.added == best.added), best)
@@ -214,6 +214,19 @@ def search(
     return Search(
         under(nominal, noise, pool), best, fit, noise, tuple(ranked), tuple(rounds), tuple(excluded)
     )
+
+
+def _most_likely(
+    near: Sequence[Trial], series: Sequence[Series], noise: NoiseModel, step: float, floor: float
+) -> Trial:
+    """The one of several close models whose remainder predicts itself best: each under the noise that it leaves.
+
+    The first noise model is coloured by the effect that is missing and can put an imitation ahead by a little.
+    """
+    if len(near) == 1:
+        return near[0]
+    left = [noise_of(whole_fit(trial, series, noise, step), floor=floor).std for trial in near]
+    return near[left.index(min(left))]
 
 
 def _could_pay(now: Round, best: Trial) -> bool:
