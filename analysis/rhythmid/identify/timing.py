@@ -29,6 +29,7 @@ DRIFT_PARAMETER = {"clock_skew": "skew", "input_delay_drift": "rate"}
 ALIKE = {"clock_skew": ("delay_drift",)}  # the same to first order
 CERTAIN = 5.0  # standard deviations from which a timing effect becomes part of the model
 SMEARS = 3  # widths of command jitter that are tried
+UNEXPLAINED = 1.5  # times the noise floor, beyond which a hold is looked for
 GAIN = 25.0  # in chi2 that a hold must bring
 
 
@@ -64,7 +65,8 @@ def drift_score(fit: Fit, element: str) -> tuple[float, float]:
 
 
 def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tuple[JointFit, tuple[str, ...]]:
-    """The fit with every drift of clock or delay that shows made part of the model; and what was found, in words."""
+    """The fit with every drift of clock or delay that shows made part of the model, or a command held at a slower rate;
+    and what was found, in words."""
     fit, notes = joint.fit, []
     catalogue = load_catalogue()
     for _ in DRIFTS:
@@ -94,7 +96,12 @@ def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tupl
             f"{told}: {1e6 * value:+.3f} ± {1e6 * std:.3f} µs/s; part of the model, and the delays are those at the "
             "record's zero"
         )
-    return replace(joint, fit=fit), tuple(notes)
+    found = replace(joint, fit=fit)
+    if joint.search.over_noise > UNEXPLAINED and fit is joint.fit and fit.model.term("input_delay") is not None:
+        found, period = command_hold(found, pool)
+        if period > 0.0:
+            notes.append(f"the drive takes a new command every {1e3 * period:.3g} ms only; part of the model")
+    return found, tuple(notes)
 
 
 def _simulated(fit: Fit, index: int) -> tuple[Array, Array]:

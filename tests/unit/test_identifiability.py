@@ -1,0 +1,115 @@
+"""What cannot be known is said: sums instead of splits, intervals, aliases, directions in words, closure."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from machines import hopper, record
+from rhythmid.errors import InputError
+from rhythmid.identify.identifiability import Offset, aliases, delays_of, offset_of, undetermined
+from rhythmid.identify.identification import Delays
+from rhythmid.identify.joint import JointFit, joint_likelihood
+from rhythmid.record.record import Record
+
+SPEC = {"type": "chirp", "amplitude": 0.05, "band": [0, 7], "sweep": 12.0}
+DELAYS = (0.04, 0.055)
+
+
+def later(channel, shift: float):
+    return replace(channel, time=channel.time + shift)
+
+
+def delayed_forcing(total: float, part: float, seed: int) -> Record:
+    """A record whose forcing came through the delayed command channel: a machine without input delay, all of it later."""
+    made = record(hopper(), SPEC, delays=(0.0, 0.0), std=5e-6, seed=seed)
+    assert 0.0 <= part <= 1.0  # however the total divides, the record is the same
+    return replace(made, output=later(made.output, total))
+
+
+@pytest.fixture(scope="module")
+def joint() -> JointFit:
+    return joint_likelihood(record(hopper(), SPEC, delays=DELAYS, std=5e-6), hopper())
+
+
+def both(delays: Delays) -> tuple[float | None, float | None]:
+    return delays.input.value, delays.measurement.value
+
+
+def test_forcing_on_the_robot_gives_both_delays_and_prints_the_assumption(joint):
+    found = delays_of(joint)
+    assert found.separable and found.input.value == pytest.approx(0.04, abs=2e-4)
+    assert "undelayed" in found.assumption and "δ_f = 0" in found.assumption
+
+
+def test_the_closure_of_a_right_model_is_near_zero(joint):
+    found = delays_of(joint).observables
+    assert found is not None and abs(found.z) < 4.0
+    assert found.phase.value == pytest.approx(0.055, abs=1e-5)
+    assert found.slope.value == pytest.approx(0.095, abs=1e-3)
+
+
+def test_a_wrong_phase_of_the_forcing_breaks_the_closure_or_moves_the_split_only():
+    made = record(hopper(), SPEC, delays=DELAYS, std=5e-6)
+    assert made.forcing is not None
+    found = delays_of(joint_likelihood(replace(made, forcing=later(made.forcing, -0.01)), hopper()), "on_robot")
+    assert found.sum.value == pytest.approx(0.095, abs=2e-4)  # the sum does not depend on it
+    assert found.measurement.value == pytest.approx(0.065, abs=2e-4)
+
+
+def test_forcing_through_the_delayed_channel_gives_the_sum_and_refuses_to_split():
+    rng = np.random.default_rng(5)
+    for case in range(2):
+        total = float(rng.uniform(0.01, 0.3))
+        found = delays_of(joint_likelihood(delayed_forcing(total, float(rng.uniform()), case), hopper()))
+        assert not found.separable and both(found) == (None, None)
+        assert abs(found.sum.value - total) < 5.0 * found.sum.std
+        low, high = found.intervals["input"]
+        assert low == 0.0 and high == pytest.approx(total, abs=2e-3)
+
+
+def test_the_users_word_that_the_forcing_is_delayed_is_taken(joint):
+    found = delays_of(joint, "delayed")
+    assert not found.separable and both(found) == (None, None) and found.sum.value is not None
+
+
+def test_an_unknown_clock_offset_leaves_intervals_and_a_bound_narrows_them(joint):
+    free = delays_of(joint, "clock_unknown")
+    bounded = delays_of(joint, "clock_unknown", Offset(-0.005, 0.01))
+    assert not free.separable and not bounded.separable
+    assert free.intervals["input"] == pytest.approx((0.0, 0.095), abs=1e-3)
+    assert bounded.intervals["input"] == pytest.approx((0.035, 0.050), abs=1e-3)
+    assert bounded.intervals["measurement"] == pytest.approx((0.045, 0.060), abs=1e-3)
+
+
+def test_a_prior_on_the_clock_offset_gives_delays_with_its_uncertainty(joint):
+    found = delays_of(joint, "clock_unknown", Offset(std=1e-3))
+    assert found.separable and found.input.std == pytest.approx(1e-3, rel=0.05)
+
+
+def test_clock_offsets_that_contradict_themselves_are_refused():
+    with pytest.raises(InputError, match="lower comes first"):
+        offset_of((0.01, -0.01), None)
+    with pytest.raises(InputError, match="one of the two"):
+        offset_of((-0.01, 0.01), 0.001)
+
+
+def test_a_machine_without_forcing_gives_the_sum_only():
+    made = replace(record(hopper(), SPEC, forcing=0.0, delays=DELAYS, std=5e-6), forcing=None)
+    found = delays_of(joint_likelihood(made, hopper()))
+    assert not found.separable and both(found) == (None, None)
+    assert found.sum.value == pytest.approx(0.095, abs=1e-3)
+
+
+def test_delays_beyond_a_period_have_aliases(joint):
+    late = joint.fit.model.with_values({"input_delay.delay": 0.04, "measurement_delay.delay": 1.055})
+    pairs = aliases(replace(joint, fit=replace(joint.fit, model=late)))
+    assert pairs == (pytest.approx((1.04, 0.055)),)
+    assert aliases(joint) == ()
+
+
+def test_parameters_that_act_alike_are_named(joint):
+    alike = joint.fit.model.parameters["gravity.acceleration"]
+    model = hopper().with_parameters({"gravity.acceleration": replace(alike, fixed=False)})
+    words = [d.words for d in undetermined(joint_likelihood(joint.records, model).fit)]
+    assert len(words) == 1
+    assert "gravity.acceleration" in words[0] and "linear_spring.rest_length" in words[0]

@@ -1,0 +1,104 @@
+"""Timing as on robots, concealed in the machine: estimated or compensated, and the delays right all the same."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from machines import CATALOGUE, hopper, record
+from rhythmid.elements.random_delay import uniform_delay
+from rhythmid.identify.joint import JointFit, joint_likelihood
+from rhythmid.identify.timing import command_jitter, compensated, measurement_jitter
+from rhythmid.record.record import Channel, Record
+
+U, Y = "input_delay.delay", "measurement_delay.delay"
+SPEC = {"type": "chirp", "amplitude": 0.3, "band": [0, 7], "sweep": 12.0}
+DELAYS = (0.04, 0.055)
+
+
+def concealing(name: str, **values: float) -> Record:
+    return record(hopper().with_element(CATALOGUE[name], values), SPEC, delays=DELAYS, std=5e-6)
+
+
+def fitted(made: Record) -> JointFit:
+    return joint_likelihood(made, hopper())
+
+
+def lost(channel: Channel | None, share: float, seed: int) -> Channel:
+    assert channel is not None
+    kept = np.random.default_rng(seed).random(len(channel)) > share
+    kept[0] = True
+    return replace(channel, time=channel.time[kept], value=channel.value[kept])
+
+
+def near(joint: JointFit, name: str, truth: float, least: float = 2e-5) -> bool:
+    return abs(joint.fit.model.value(name) - truth) < max(5.0 * joint.fit.std[name], least)
+
+
+def test_a_skewed_clock_is_found_and_taken_out():
+    found, notes = compensated(fitted(concealing("clock_skew", skew=5e-5)))
+    assert len(notes) == 1 and "µs/s" in notes[0]
+    assert near(found, U, DELAYS[0]) and near(found, Y, DELAYS[1])
+
+
+def test_a_drifting_input_delay_is_found_and_taken_out():
+    found, notes = compensated(fitted(concealing("input_delay_drift", rate=5e-4)))
+    assert "the input delay drifts" in notes[0]
+    rate = found.fit.model.value("input_delay_drift.rate")
+    assert rate == pytest.approx(5e-4, rel=0.02)
+    assert near(found, U, DELAYS[0], 5e-5) and near(found, Y, DELAYS[1])
+
+
+def test_a_command_held_at_a_slower_rate_is_found_and_its_half_period_taken_out():
+    joint = fitted(concealing("command_hold", period=0.02))
+    assert joint.fit.model.value(U) == pytest.approx(DELAYS[0] + 0.0095, abs=1e-3)  # half a period, unless modelled
+    found, notes = compensated(joint)
+    assert "every 20 ms" in notes[0]
+    assert near(found, U, DELAYS[0])
+
+
+def test_good_timing_is_left_alone():
+    joint = fitted(record(hopper(), SPEC, delays=DELAYS, std=5e-6))
+    found, notes = compensated(joint)
+    assert notes == () and found.fit is joint.fit
+    jitter = measurement_jitter(joint.fit)
+    assert jitter.value is not None and jitter.value < 2e-5
+
+
+def test_measurement_jitter_is_read_off_residuals_that_grow_with_speed():
+    made = record(hopper(), SPEC, delays=DELAYS, std=5e-6)
+    output = made.output
+    late = uniform_delay(output.time, 2e-4, 3.0)
+    aged = np.interp(output.time - late, output.time, output.value)
+    joint = fitted(replace(made, output=replace(output, value=aged)))
+    jitter = measurement_jitter(joint.fit)
+    assert jitter.value == pytest.approx(2e-4, rel=0.05)
+    assert near(joint, U, DELAYS[0], 5e-5) and near(joint, Y, DELAYS[1] + late.mean())  # its mean is a delay
+
+
+def test_command_jitter_is_read_off_the_roll_off():
+    joint = fitted(concealing("command_jitter", std=0.01))
+    stamps = np.arange(12000) * 1e-3
+    arrival = np.maximum.accumulate(stamps + uniform_delay(stamps, 0.01, 0.0))  # none overtakes another
+    acting = stamps - stamps[np.searchsorted(arrival, stamps, side="right") - 1]
+    jitter = command_jitter(joint.fit)
+    assert jitter.value == pytest.approx(float(acting[1000:].std()), abs=max(4.0 * jitter.std, 1e-3))
+    assert joint.fit.model.value(U) == pytest.approx(DELAYS[0] + float((arrival - stamps)[1000:].mean()), abs=2e-3)
+
+
+def test_lost_samples_of_every_channel_do_no_harm():
+    made = record(hopper(), SPEC, delays=DELAYS, std=5e-6)
+    thin = replace(made, input=lost(made.input, 0.02, 1), output=lost(made.output, 0.05, 2), forcing=lost(made.forcing, 0.05, 3))
+    joint = fitted(thin)
+    assert near(joint, U, DELAYS[0]) and near(joint, Y, DELAYS[1])
+
+
+def test_input_and_output_at_different_rates_do_no_harm():
+    made = record(hopper(), SPEC, delays=DELAYS, std=5e-6)
+    assert made.forcing is not None
+    slow = replace(
+        made,
+        output=replace(made.output, time=made.output.time[::4], value=made.output.value[::4]),
+        forcing=replace(made.forcing, time=made.forcing.time[::10], value=made.forcing.value[::10]),
+    )
+    joint = fitted(slow)
+    assert near(joint, U, DELAYS[0]) and near(joint, Y, DELAYS[1])
