@@ -289,7 +289,10 @@ def test_an_identification_without_separable_delays_gives_the_sum_only() -> None
         "measurement": nothing,
         "assumption": "no forcing is known",
     }
-    told["delays"] |= {"intervals": {"input": [0.0, 0.035]}, "undetermined": ["both delays by opposite amounts"]}
+    told["delays"] |= {
+        "intervals": {"input": [0.0, 0.035]},
+        "undetermined": ["both delays by opposite amounts"],
+    }
     html = render(identification_page(told, "a model from run", (), "rhythmid identify run", {}))
     assert "cannot tell the two delays apart" in html
     assert "late together" in html
@@ -314,3 +317,17 @@ def test_a_page_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     with pytest.raises(InputError):
         write_page(tmp_path / "missing" / "report.html", page)
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_a_noise_level_that_is_not_known_is_not_shown() -> None:
+    known, unknown = findings(result("consistent")), replace(findings(result("consistent")), noise=None)
+    assert "noise alone would make" in render(diagnosis_page(known))
+    html = render(diagnosis_page(unknown))
+    assert "noise alone" not in html
+    assert "nothing repeats in these records" in html
+
+
+def test_an_unknown_effect_is_never_said_to_be_explained() -> None:
+    html = render(diagnosis_page(findings(result("unknown_physics"))))
+    assert "leaves nothing that depends" not in html
+    assert "seems to be" in html

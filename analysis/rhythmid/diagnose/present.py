@@ -28,6 +28,7 @@ from rhythmid.simulate import physical_times
 
 Array = NDArray[np.float64]
 INDICES = (0, -1, 1, -2, 2)  # transfer functions that are compared
+RARE = 0.02  # share of the motion at either end where a free function is poorly known
 POINTS = 240  # of a transfer function
 
 
@@ -68,7 +69,7 @@ def findings(
     if found.best.added:
         models["Augmented model"] = answer.model.to_yaml()
     count = max(len(found.rounds[0].scores), 1)
-    repeats = noise_from_repeats(list(found.fit.run.series)) or noise_of(found.fit)
+    repeats = noise_from_repeats(list(found.fit.run.series))
     return Findings(
         result=answer.diagnosis.to_dict(),
         source=f"{name} against {_listed([r.name for r in records])}",
@@ -78,11 +79,11 @@ def findings(
         forced=any(one.forcing is not None for one in evidence.series),
         runs=tuple(runs),
         output_unit=nominal.units.position,
-        noise=repeats.variance**0.5,
-        slow_noise=repeats.long_run_variance**0.5,
+        noise=repeats.variance**0.5 if repeats else None,
+        slow_noise=(repeats or noise_of(found.fit)).long_run_variance ** 0.5,
         scores=_scores(found),
         threshold=float(chi2_distribution.isf(LEVEL / count, 1)),
-        functions=_functions(evidence.before, evidence.after if found.best.added else (), nominal),
+        functions=_functions(evidence.before, evidence.after if found.best.added else (), runs, nominal),
         transfer=_transfer(
             found, [p for r in records if (p := pumpings[id(r)]) is not None], evidence.series, nominal
         ),
@@ -173,32 +174,40 @@ def _scores(found: Search) -> tuple[ElementScore, ...]:
 
 
 def _functions(
-    before: Sequence[Dependence], after: Sequence[Dependence], model: Model
+    before: Sequence[Dependence], after: Sequence[Dependence], runs: Sequence[Run], model: Model
 ) -> tuple[FreeFunction, ...]:
     later = {one.quantity: one for one in after}
+    paths = {"position": [run.position for run in runs], "velocity": [run.velocity for run in runs]}
 
-    def shape(one: Dependence) -> Array:
-        """The curve less what the model's own parameters can take up: an offset, and a slope over position or speed."""
+    def shape(one: Dependence) -> tuple[Array, Array]:
+        """The curve where it is well known, less what the model's own parameters can take up: an offset, and a slope over
+        position or speed."""
         if not len(one.force):
-            return one.force
-        inside = slice(0, -1)  # the splines end before the last point
-        degree = 1 if one.quantity in ("position", "velocity") else 0
-        return (one.force - np.polyval(np.polyfit(one.grid[inside], one.force[inside], degree), one.grid))[
-            inside
-        ]
+            return one.grid, one.force
+        known = np.arange(len(one.grid)) < len(one.grid) - 1  # the splines end before the last point
+        moved = one.quantity in paths
+        if moved:
+            low, high = np.quantile(np.concatenate(paths[one.quantity]), [RARE, 1.0 - RARE])
+            known &= (one.grid >= low) & (one.grid <= high)
+        if known.sum() < 8:
+            return one.grid[:0], one.force[:0]
+        grid, force = one.grid[known], one.force[known]
+        return grid, force - np.polyval(np.polyfit(grid, force, 1 if moved else 0), grid)
 
     units = {"velocity": f"{model.units.position}/s", "time": "s", "actuator force": model.units.force}
     made = []
     for one in before:
         other = later.get(one.quantity)
+        grid, force = shape(one)
+        grid_after, force_after = shape(other) if other else (None, None)
         made.append(
             FreeFunction(
-                one.quantity, one.explained, one.grid[:-1], shape(one),
+                one.quantity, one.explained, grid, force,
                 grid_unit=units.get(one.quantity, model.units.position),
                 force_unit=model.units.position if "sensor" in one.quantity else model.units.force,
                 explained_after=other.explained if other else None,
-                grid_after=other.grid[:-1] if other else None,
-                force_after=shape(other) if other else None,
+                grid_after=grid_after,
+                force_after=force_after,
             )
         )  # fmt: skip
     return tuple(made)
@@ -211,6 +220,10 @@ def _transfer(
     no forcing was recorded, around rest; the reason where there are none."""
     if any(one.kind != "force" for one in series):
         return "transfer functions are stated for a force as input, and these records have another"
+    if not pumpings and all(one.command is None for one in series):
+        return (
+            "these records have neither an input nor a forcing, so there are no transfer functions to compare"
+        )
     highest = max(bandwidth(one.value, one.period) for one in series)
     if pumpings:
         pumping, indices = pumpings[0], np.array(INDICES)

@@ -85,10 +85,10 @@ def _words(found: Findings) -> str:
     if ". " in summary:
         return summary
     detection = result["detection"]
-    return (
-        f"{sentence(summary)} The refitted model's error is {percent(detection['refitted_nominal_nrmse'])} of the motion; "
-        f"noise alone would make {percent(detection['noise_floor_nrmse'])}."
-    )
+    said = f"{sentence(summary)} The refitted model's error is {percent(detection['refitted_nominal_nrmse'])} of the motion"
+    if found.noise is not None:
+        said += f"; noise alone would make {percent(detection['noise_floor_nrmse'])}"
+    return f"{said}."
 
 
 def _tiles(found: Findings) -> Tiles:
@@ -117,13 +117,14 @@ def _tiles(found: Findings) -> Tiles:
         tiles.append(
             Tile("error on held-out data, of the motion", value, "before → after" if found.repaired else "")
         )
-    tiles.append(
-        Tile(
-            "least possible: noise alone",
-            percent(detection["noise_floor_nrmse"]),
-            "of the motion, in the fitted records",
+    if found.noise is not None:
+        tiles.append(
+            Tile(
+                "least possible: noise alone",
+                percent(detection["noise_floor_nrmse"]),
+                "of the motion in the fitted records, by what repeats in them",
+            )
         )
-    )
     if result["verdict"] == "missing_physics":
         chance = min(effect["probability"] for effect in result["missing"])
         tiles.append(
@@ -239,9 +240,8 @@ def _harmonics(found: Findings) -> Section:
         blocks.append(Paragraph(sentence(found.transfer)))
     else:
         one = found.transfer
-        blocks.append(
-            change_figures(one.frequency, one.indices, one.before, one.after, one.unit, one.pumping)
-        )
+        before = one.before if found.repaired else None
+        blocks.append(change_figures(one.frequency, one.indices, before, one.after, one.unit, one.pumping))
     return Section("Harmonics of the cycle and transfer functions", tuple(blocks))
 
 
@@ -332,7 +332,7 @@ def _calibration(found: Findings) -> Section:
         "Calibration",
         (
             Paragraph(
-                "Parameters that are merely wrong are not missing physics. These differ from the nominal model:"
+                "Parameters that are merely wrong are not missing physics. These differ from the nominal model (± one standard deviation):"
             ),
             Bullets(lines),
         ),

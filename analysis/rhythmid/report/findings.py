@@ -77,7 +77,8 @@ class Findings:
     source : the nominal model's name and the records' names in words.
     slots : elements of the nominal model by slot; `forced` if a forcing was recorded.
     runs : records beside their simulations, those held out last.
-    noise, slow_noise : standard deviation of the noise of the compared averages, and of slow averages of it per sample.
+    noise : standard deviation of the measurement noise in the compared averages, by what repeats; None where nothing does.
+    slow_noise : of slow averages, per sample: noise as above, or what the final model leaves.
     scores : best score of every element, best first; `threshold` above which chance is no explanation.
     functions : free functions, the most explaining first.
     transfer : change of the transfer functions, or the reason why there is none.
@@ -94,7 +95,7 @@ class Findings:
     forced: bool
     runs: tuple[Run, ...]
     output_unit: str
-    noise: float
+    noise: float | None
     slow_noise: float
     scores: tuple[ElementScore, ...]
     threshold: float

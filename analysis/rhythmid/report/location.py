@@ -40,7 +40,9 @@ def location_section(found: Findings) -> Section:
     blocks: list[Block] = [
         Paragraph(
             sentence(
-                f"the fault is {result['location']['where']}" if faulty else result["location"]["where"]
+                f"the fault {'is' if sure else 'seems to be'} {result['location']['where']}"
+                if faulty
+                else result["location"]["where"]
             ),
             "lead",
         ),
@@ -131,7 +133,14 @@ def _dependences(found: Findings) -> Drawing | None:
 def unknown_section(found: Findings) -> Section:
     remainder = found.result.get("remainder")
     blocks: list[Block] = []
-    if remainder is None:
+    if remainder is None and found.result["verdict"] == "unknown_physics":
+        blocks.append(
+            Paragraph(
+                "Something is left that no element of the catalogue explains and that is no function of position, velocity, "
+                "actuator force, time or the measured position alone: memory, a disturbance, or an effect on the way in or out."
+            )
+        )
+    elif remainder is None:
         blocks.append(
             Paragraph(
                 "The final model leaves nothing that depends on position, velocity, actuator force, time or the measured "
@@ -145,7 +154,7 @@ def unknown_section(found: Findings) -> Section:
             Paragraph(
                 f"The final model leaves a mismatch that depends on {remainder['quantity']}: a free function of it "
                 f"explains {share:.0f} % of what is left in stretches it was not fitted to (p = "
-                f"{number(remainder['p_value'], 2)}). No element of the catalogue is this function; its curve can stand in."
+                f"{number(remainder['p_value'], 2)}). No element of the catalogue is this function."
             )
         )
     figures = [_force_map(f, found.repaired) for f in _most_telling(found.functions, remainder)]
@@ -173,11 +182,15 @@ def _force_map(one: FreeFunction, repaired: bool) -> Drawing:
         largest = max(largest, float(np.max(np.abs(one.force_after), initial=0.0)))
     factor, unit = scaled(largest, one.force_unit)
     along, grid_unit = scaled(float(np.max(np.abs(one.grid), initial=0.0)), one.grid_unit)
-    curves = [Curve(along * one.grid, factor * one.force, "missing before", "before")]
-    words = f"explains {100.0 * max(one.explained, 0.0):.0f} % of the mismatch before"
+    curves = [
+        Curve(along * one.grid, factor * one.force, "missing before" if repaired else "missing", "before")
+    ]
+    words = f"explains {100.0 * max(one.explained, 0.0):.0f} % of the mismatch"
+    reading = ""
     if repaired and one.grid_after is not None and one.force_after is not None and len(one.force_after):
         curves.append(Curve(along * one.grid_after, factor * one.force_after, "missing after", "after"))
-        words += f", {100.0 * max(one.explained_after or 0.0, 0.0):.0f} % after"
+        words += f" before, {100.0 * max(one.explained_after or 0.0, 0.0):.0f} % after"
+        reading = " A curve that comes down to zero has been accounted for."
     kind = "sensor error" if "sensor" in one.quantity else "force"
     return drawing(
         f"Missing {kind} over {one.quantity}",
@@ -186,6 +199,5 @@ def _force_map(one: FreeFunction, repaired: bool) -> Drawing:
             f"{kind} [{pretty_unit(unit)}]", tuple(curves),
         ),
         f"The mismatch as a free function of {one.quantity}, no formula assumed; it {words}. Left out: what the nominal "
-        f"model's own parameters can take up (an offset; a slope over position or velocity). A curve that comes down to zero has "
-        f"been accounted for.",
+        f"model's own parameters can take up (an offset; a slope over position or velocity).{reading}",
     )  # fmt: skip

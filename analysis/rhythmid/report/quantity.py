@@ -76,6 +76,7 @@ def plus_minus(value: float, half: float) -> str:
     if decimals < 0:
         value, half, decimals = round(value, decimals), round(half, decimals), 0
     decimals = min(decimals, 12)
+    value = value if round(value, decimals) else 0.0  # no minus zero
     text = f"{value:.{decimals}f} ±\u00a0{half:.{decimals}f}".replace("-", MINUS)
     return f"({text}) × 10{str(shift).translate(_SUPERSCRIPT)}" if shift else text
 

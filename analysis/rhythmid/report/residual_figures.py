@@ -204,8 +204,12 @@ def error_changes(runs: Sequence[Run], noise: float | None) -> Drawing:
             ),
             shown, "error [% of the motion]",
         ),
-        f"{'Squares: before; circles: after' if repaired else 'Squares: error'}; upright ticks: what the measurement noise alone "
-        f"would leave. What lies at its tick cannot be improved any further.",
+        f"{'Squares: before; circles: after' if repaired else 'Squares: error'}. "
+        + (
+            "How small an error the noise allows is not known: nothing repeats in these records."
+            if noise is None
+            else "Upright ticks: what the measurement noise alone would leave. What lies at its tick cannot be improved any further."
+        ),
         legend,
     )  # fmt: skip
 
@@ -258,6 +262,6 @@ def cycle_harmonics(run: Run, unit: str, noise: float) -> Table | None:
     return Table(
         f"Amplitudes of the limit cycle in {run.name}, and what the {BEFORE}{' (before) and the final one (after)' if repaired else ''} "
         f"miss{'' if repaired else 'es'} of them; 95 % intervals by the measurement noise.",
-        columns if repaired else columns[:3],
+        columns if repaired else (*columns[:2], "missed"),
         tuple(rows),
     )

@@ -7,7 +7,7 @@ from typing import Any
 
 from rhythmid import __version__
 from rhythmid.report.blocks import Block, Code, Fold, Paragraph, Section, Table
-from rhythmid.report.quantity import NONE, estimate, number, pretty_name, scaled, with_unit
+from rhythmid.report.quantity import NONE, NORMAL_95, estimate, number, pretty_name, scaled, with_unit
 
 PACKAGES = ("numpy", "scipy", "numba", "rosbags")
 DELAYS = {"input": "input delay τ_u", "measurement": "measurement delay τ_y", "sum": "sum τ_u + τ_y"}
@@ -25,7 +25,7 @@ def told(one: Mapping[str, Any] | None, like: Mapping[str, Any] | None = None) -
 
 def _shown(one: Mapping[str, Any]) -> tuple[float, str]:
     """Factor and unit in which an estimate is printed."""
-    size = max(abs(float(one.get("value") or 0.0)), float(one.get("std") or 0.0))
+    size = max(abs(float(one.get("value") or 0.0)), NORMAL_95 * float(one.get("std") or 0.0))
     return scaled(size, str(one.get("unit", "")))
 
 
@@ -79,7 +79,7 @@ def _moved(bent: Mapping[str, Any] | None, final: Mapping[str, Any]) -> str:
     if final.get("std") == 0.0:
         return NONE
     change = float(final["value"]) - float(bent["value"])
-    size = abs(float(final["value"]))
+    size = abs(float(bent["value"]))
     if final.get("unit") == "s":
         factor, unit = scaled(abs(change), "s")
         return ("+" if change >= 0 else "") + with_unit(number(factor * change, 3), unit)

@@ -12,6 +12,7 @@ from rhythmid.report.quantity import number, pretty_unit, scaled
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+FAINT_CHANGE = 2.0  # [% of the peak of |G_0|] below which a change would hardly be noticed
 FAINT = 0.02  # of the peak, below which a phase means nothing
 STYLES = ("measured", "after", "before", "third")  # of |m| = 0, 1, 2, 3
 
@@ -44,12 +45,7 @@ def transfer_grid(functions: Sequence[TransferFunction], unit: str) -> Columns:
     for one in functions:
         name = harmonic_name(one.m)
         magnitude = np.abs(one.value)
-        factor, shown = scaled(float(magnitude.max(initial=0.0)), unit.split("/")[0])
-        label = (
-            f"{pretty_unit(shown)}/{pretty_unit(unit.split('/', 1)[1])}"
-            if "/" in unit
-            else pretty_unit(shown)
-        )
+        factor, label = _scaled(float(magnitude.max(initial=0.0)), unit)
         band = None if one.std is None else 1.96 * one.std
         low = None if band is None else factor * np.maximum(magnitude - band, 0.0)
         high = None if band is None else factor * (magnitude + band)
@@ -111,50 +107,60 @@ def _phase(one: TransferFunction, name: str, band: Array | None, magnitude: Arra
 def change_figures(
     frequency: Array,
     indices: Sequence[int],
-    before: Complex,
+    before: Complex | None,
     after: Complex,
     unit: str,
     pumping: float | None,
 ) -> Columns:
     """What an effect does to the transfer functions of a model.
 
-    `before` and `after` complex[h, n] of the harmonics `indices` (h,) at `frequency` [Hz] (n,).
+    `before` (None where nothing was added) and `after` complex[h, n] of the harmonics `indices` (h,) at `frequency` [Hz] (n,).
     """
     top = np.abs(after)
-    main = list(indices).index(0)
-    largest = float(top[main].max())
-    factor, shown = scaled(largest, unit.split("/")[0])
-    label = (
-        f"{pretty_unit(shown)}/{pretty_unit(unit.split('/', 1)[1])}" if "/" in unit else pretty_unit(shown)
-    )
-    magnitudes, changes = [], []
-    for row, m in enumerate(indices):
-        style, dashed = style_of(m), m < 0
-        if abs(m) <= 1:
-            magnitudes.append(Curve(frequency, factor * top[row], f"|{harmonic_name(m)}|", style, dashed))
-        change = 100.0 * np.abs(after[row] - before[row]) / largest
-        changes.append(Curve(frequency, change, harmonic_name(m), style, dashed))
-    at = int(np.argmax(np.abs(after - before).max(axis=0)))
-    most = int(np.argmax(np.abs(after - before)[:, at]))
-    peak = 100.0 * float(np.abs(after - before)[most, at]) / largest
-    if peak < 2.0:
+    largest = float(top[list(indices).index(0)].max())
+    factor, label = _scaled(largest, unit)
+    magnitudes = [
+        Curve(frequency, factor * top[row], f"|{harmonic_name(m)}|", style_of(m), m < 0)
+        for row, m in enumerate(indices)
+        if abs(m) <= 1
+    ]
+    shifted = f" and shifted by the pumping of {pumping:.4g} Hz (G₊₁, G₋₁)" if pumping is not None else ""
+    magnitude = drawing(
+        "Transfer functions of the final model",
+        Chart(
+            "Magnitudes of the final model's harmonic transfer functions over frequency.",
+            "output frequency [Hz]", f"magnitude [{label}]", tuple(magnitudes), from_zero=True,
+        ),
+        f"How the output answers a small input at its own frequency (G₀){shifted}.",
+    )  # fmt: skip
+    if before is None:
+        return Columns((magnitude,))
+    change = 100.0 * np.abs(after - before) / largest
+    row, at = map(int, np.unravel_index(int(np.argmax(change)), change.shape))
+    if change[row, at] < FAINT_CHANGE:
         words = "Small everywhere: small-signal transfer functions alone would hardly have shown the effect."
     else:
-        words = f"Largest in {harmonic_name(indices[most])} near {number(float(frequency[at]), 2)} Hz: {number(peak, 2)} %."
-    shifted = f" and shifted by the pumping of {pumping:.4g} Hz (G₊₁, G₋₁)" if pumping is not None else ""
-    return Columns(
-        (
-            drawing(
-                "Transfer functions of the final model",
-                Chart("Magnitudes of the final model's harmonic transfer functions over frequency.",
-                      "output frequency [Hz]", f"magnitude [{label}]", tuple(magnitudes), from_zero=True),
-                f"How the output answers a small input at its own frequency (G₀){shifted}.",
-            ),
-            drawing(
-                "What the effect changes in them",
-                Chart("Change of each harmonic transfer function from the refitted nominal model to the final model, in percent of "
-                      "the peak of G₀.", "output frequency [Hz]", "change [% of the peak of |G₀|]", tuple(changes), from_zero=True),
-                f"Distance between the functions of the refitted nominal and the final model, delays included. {words}",
-            ),
-        )
+        place = f"{harmonic_name(indices[row])} near {number(float(frequency[at]), 2)} Hz"
+        words = f"Largest in {place}: {number(float(change[row, at]), 2)} %."
+    curves = [
+        Curve(frequency, change[row], harmonic_name(m), style_of(m), m < 0) for row, m in enumerate(indices)
+    ]
+    changed = drawing(
+        "What the effect changes in them",
+        Chart(
+            "Change of each harmonic transfer function from the refitted nominal model to the final model.",
+            "output frequency [Hz]", "change [% of the peak of |G₀|]", tuple(curves), from_zero=True,
+        ),
+        f"Distance between the functions of the refitted nominal and the final model, delays included. {words}",
     )  # fmt: skip
+    return Columns((magnitude, changed))
+
+
+def _scaled(largest: float, unit: str) -> tuple[float, str]:
+    """Factor and printed unit for values of this size in `unit`, a ratio such as m/N."""
+    above, _, below = unit.partition("/")
+    factor, shown = scaled(largest, above)
+    if not below:
+        return factor, pretty_unit(shown)
+    below = pretty_unit(below)
+    return factor, f"{pretty_unit(shown)}/{f'({below})' if '·' in below else below}"
