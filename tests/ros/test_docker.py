@@ -1,6 +1,7 @@
 """The containers: a container for each node, the analysis apart from the experiment; really built where that is possible."""
 
 import importlib.util
+import json
 import os
 import re
 import shutil
@@ -78,8 +79,9 @@ def _why_not() -> str:
 def test_the_graph_runs_in_containers_and_is_identified_from_the_bag_that_they_leave(tmp_path):
     shutil.copy(DEMO.parent / "paper_hopper.yaml", tmp_path)
     (tmp_path / "short.yaml").write_text(
-        "model: paper_hopper.yaml\nexcitation: {type: chirp, amplitude: 0.02, sweep: 10.0, repetitions: 1}\n"
-        "delays: {input: 0.04, measurement: 0.05}\ntime: {mode: realtime, layout: processes}\n",
+        "model: paper_hopper.yaml\nexcitation: {type: chirp, amplitude: 0.004, sweep: 10, repetitions: 9, warm_up: 1, "
+        "shift: {period: 1, count: 9}}\ndelays: {input: 0.04, measurement: 0.05}\n"
+        "time: {mode: lockstep, layout: processes}\n",
         encoding="utf-8",
     )
     done = subprocess.run(
@@ -90,4 +92,7 @@ def test_the_graph_runs_in_containers_and_is_identified_from_the_bag_that_they_l
     assert done.returncode == 0, done.stdout + done.stderr
     bag = Path(done.stdout.rsplit("bag: ", 1)[1].strip())
     assert (bag / "metadata.yaml").is_file()
+    delays = json.loads((bag.parent / "result.json").read_text(encoding="utf-8"))["delays"]
+    assert delays["input"]["value"] == pytest.approx(0.04, abs=1e-3)
+    assert delays["measurement"]["value"] == pytest.approx(0.05, abs=1e-3)
     shutil.rmtree(bag.parents[1])
