@@ -77,6 +77,7 @@ def _why_not() -> str:
 @pytest.mark.timeout(900)
 @pytest.mark.skipif(bool(_why_not()), reason=_why_not() or "can be built")
 def test_the_graph_runs_in_containers_and_is_identified_from_the_bag_that_they_leave(tmp_path):
+    tmp_path.chmod(0o755)  # the containers' user reads the experiment
     shutil.copy(DEMO.parent / "paper_hopper.yaml", tmp_path)
     (tmp_path / "short.yaml").write_text(
         "model: paper_hopper.yaml\nexcitation: {type: chirp, amplitude: 0.004, sweep: 10, repetitions: 9, warm_up: 1, "
