@@ -107,6 +107,8 @@ class Supervisor:
             lines = {spec.name: command(spec, given) for spec, given in zip(specs, arguments)}
         for name, line in lines.items():
             self._processes.append(Supervised(name, line, self._environment, self._tell))
+            if not self._lockstep:
+                self._processes[-1].hurry()
 
     def _trouble(self) -> Outcome | None:
         """A node that has ended, or the user's wish to stop."""

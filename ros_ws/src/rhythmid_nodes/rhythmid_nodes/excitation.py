@@ -148,11 +148,13 @@ class ExcitationNode(GraphNode):
     def close(self) -> None:
         """A node that is ended while it plays leaves a last command of zero."""
         with self._lock:
-            if not self.lockstep and self._state in ("running", "ramping"):
+            playing = not self.lockstep and self._state in ("running", "ramping")
+            if playing:
                 self._halt(self._wall.now(), "the node was ended")
-        for publisher in (self._output, self._run):
-            publisher.wait_for_all_acked(Duration(seconds=0.5))
         super().close()
+        if playing:
+            for publisher in (self._output, self._run):
+                publisher.wait_for_all_acked(Duration(seconds=0.5))
 
     # Start and stop
 

@@ -28,11 +28,11 @@ class Lateness:
         return self._sum_ns / self.count if self.count else 0.0
 
     def percentile_ns(self, percent: float) -> int:
-        """Upper edge of the bin that holds the percentile, never above the maximum."""
+        """Upper edge of the bin that holds the percentile; beyond the last bin, and at most, the maximum."""
         wanted, seen = self.count * percent / 100.0, 0
         for index, number in enumerate(self._bins):
             seen += number
-            if seen >= wanted and seen:
+            if seen >= wanted and seen and index < _BINS:
                 return min((index + 1) * _BIN_NS, self.max_ns)
         return self.max_ns
 
