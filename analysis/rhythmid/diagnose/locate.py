@@ -22,6 +22,7 @@ from rhythmid.signal import first_order_hold
 
 Array = NDArray[np.float64]
 FOLDS = 5
+DEALT = 20  # stretches a fold is made of
 
 
 @dataclass(frozen=True)
@@ -110,11 +111,11 @@ def _regress(
     gain = max(total - left_over, 0.0)
     statistic = (gain / max(rank, 1)) / max(left_over / max(n - rank, 1), 1e-300)
     p_value = float(f_distribution.sf(statistic, max(rank, 1), max(n - rank, 1)))
-    edges = np.linspace(0, n, FOLDS * 2 + 1).astype(int)
+    edges = np.linspace(0, n, FOLDS * DEALT + 1).astype(int)
     predicted_error = 0.0
-    for fold in range(FOLDS):
+    for fold in range(FOLDS):  # stretches are dealt in turn, so that no amplitude is left out altogether
         test = np.zeros(n, bool)
-        for part in (fold, fold + FOLDS):
+        for part in range(fold, FOLDS * DEALT, FOLDS):
             test[edges[part] : edges[part + 1]] = True
         inner = scaled[~test].T @ scaled[~test] + ridge
         beta = -np.linalg.solve(inner, scaled[~test].T @ residual[~test])

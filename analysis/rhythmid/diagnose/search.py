@@ -43,7 +43,9 @@ LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalo
 REFITTED = (
     6  # elements of a round that are refitted; the right one was among the first five in all of 234 trials
 )
-NEAR = 60.0  # difference of the criterion within which models are compared again under the noise that they leave
+NEAR = (
+    60.0  # difference of the criterion within which models are compared again under the noise that they leave
+)
 MOST = 4  # effects at once
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
 RIVALS = 4  # elements that scored best at first, tried again in the place of each of several effects
@@ -75,16 +77,20 @@ class Search:
     excluded: tuple[tuple[tuple[str, ...], str], ...]
 
 
-def noise_without(fit: Fit, changes: Sequence[Change], count: int = 3) -> NoiseModel:
-    """Noise model of the residual less what the best few guesses explain of it.
+def noise_without(fit: Fit, changes: Sequence[Change], most: int = 60) -> NoiseModel:
+    """Noise model of the residual less what the catalogue's best guesses together explain of it.
 
-    The residual of a model that lacks something is not noise; taking the strongest suspects out first keeps their
-    effect from passing for colour, and changes next to nothing where nothing is missing.
+    The residual of a model that lacks something is not noise: a regular motion that is missed can be predicted from its
+    own past, so it would pass for colour and be whitened away. Where nothing is missing the guesses take out no more
+    than their number of degrees of freedom, which is given back.
     """
-    ranked = score(fit, changes)[:count]
+    samples = sum(int(one.used.sum()) for one in fit.run.series)
+    ranked = score(fit, changes)[: min(most, samples // 50)]
     residuals = [r.copy() for r in fit.residuals]
+    share = 1.0
     if ranked:
-        picked = [next(c for c in changes if c.key == s.key) for s in ranked]
+        by_key = {change.key: change for change in changes}
+        picked = [by_key[one.key] for one in ranked]
         used = [one.used for one in fit.run.series]
         design = np.concatenate(
             [np.column_stack([c.outputs[i][u] for c in picked]) for i, u in enumerate(used)]
@@ -92,10 +98,12 @@ def noise_without(fit: Fit, changes: Sequence[Change], count: int = 3) -> NoiseM
         norms = np.linalg.norm(design, axis=0)
         norms[norms == 0.0] = 1.0
         target = np.concatenate([r[u] for r, u in zip(residuals, used)])
-        solution = np.linalg.lstsq(design / norms, -target, rcond=1e-6)[0] / norms
+        solution, _, rank, _ = np.linalg.lstsq(design / norms, -target, rcond=1e-6)
+        solution = solution / norms
+        share = samples / max(samples - int(rank), 1)
         for i, r in enumerate(residuals):
             r += np.column_stack([c.outputs[i] for c in picked]) @ solution
-    stretches = [r[s] for r, one in zip(residuals, fit.run.series) for s in runs(one.used)]
+    stretches = [r[s] * math.sqrt(share) for r, one in zip(residuals, fit.run.series) for s in runs(one.used)]
     return estimate_noise(stretches, floor=fit.noise.std * 1e-6)
 
 
