@@ -1,9 +1,10 @@
-"""Held-out records as a gate: an effect that makes the prediction of what no fit has seen worse is not kept.
+"""Free-run error as a gate: an effect that makes the prediction of what no fit has seen worse, or no prediction better, goes.
 
 Held-out error is a poor selector, for it hardly sees small effects; but where real machines differ from every model a
 little, an information criterion goes on adding effects, and those that only imitate the rest betray themselves here.
 """
 
+import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -14,7 +15,8 @@ from rhythmid.diagnose.refit import Proposal, run_trials, whole_fit
 from rhythmid.diagnose.search import Search
 from rhythmid.identify.series import Series
 
-HARM = 0.01  # share by which the held-out error has to fall without an effect for it to be dropped
+HARM = 0.01  # share by which the held-out error falls without an effect that does harm
+USE = 0.003  # share by which the error on seen and held-out records together has to rise without an effect of use
 
 
 def admitted(
@@ -26,20 +28,29 @@ def admitted(
     """
     dropped: list[str] = []
     while found.best.added:
-        error = HeldOut(found, separate).nrmse(found.fit.model, found.fit)
+        seen, error = found.fit.nrmse(), _held_out(found, separate)
         if error is None:
             break
-        without = [_without(found, label, pool) for label in found.best.added]
-        errors = [HeldOut(one, separate).nrmse(one.fit.model, one.fit) if one else None for one in without]
-        least, label, slim = min(
-            ((e, label, one) for e, label, one in zip(errors, found.best.added, without) if e is not None and one),
-            key=lambda case: case[0], default=(error, "", None),
-        )  # fmt: skip
-        if slim is None or least > (1.0 - HARM) * error:
+        cases = [(label, _without(found, label, pool)) for label in found.best.added]
+        judged = [(_held_out(one, separate), label, one) for label, one in cases if one is not None]
+        doubtful = [
+            (other, label, one)
+            for other, label, one in judged
+            if other is not None
+            and (
+                other < (1.0 - HARM) * error
+                or math.hypot(other, one.fit.nrmse()) < (1.0 + USE) * math.hypot(error, seen)
+            )
+        ]
+        if not doubtful:
             break
-        dropped.append(f"{label}: the held-out error falls from {error:.3g} to {least:.3g} without it")
-        found = slim
+        least, label, found = min(doubtful, key=lambda case: case[0])
+        dropped.append(f"{label}: the held-out error is {least:.3g} without it and {error:.3g} with it")
     return found, tuple(dropped)
+
+
+def _held_out(found: Search, separate: Sequence[Series] | None) -> float | None:
+    return HeldOut(found, separate).nrmse(found.fit.model, found.fit)
 
 
 def _without(found: Search, label: str, pool: ThreadPoolExecutor | None) -> Search | None:
