@@ -21,6 +21,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 COMMAND_GROUP = "rhythmid.commands"
+SEVERAL = ("--holdout", "--elements")  # options that may be followed by several values
 console = Console(stderr=True)
 
 def _version(show: bool) -> None:
@@ -49,7 +50,7 @@ def main() -> None:
     for entry in entry_points(group=COMMAND_GROUP):
         entry.load()(app)
     try:
-        code = app(standalone_mode=False)
+        code = app(spread(sys.argv[1:]), standalone_mode=False)
     except InputError as error:
         _refuse(str(error))
     except (typer.Abort, KeyboardInterrupt):
@@ -61,6 +62,21 @@ def main() -> None:
         _refuse(describe())
     else:
         sys.exit(code if isinstance(code, int) else 0)
+
+
+def spread(arguments: list[str]) -> list[str]:
+    """Arguments in which several values after one `--holdout` or `--elements` stand one by one behind their option."""
+    found: list[str] = []
+    option, taken = "", 0
+    for argument in arguments:
+        if argument.startswith("-"):
+            option, taken = (argument, 0) if argument in SEVERAL else ("", 0)
+        elif option:
+            if taken:
+                found.append(option)
+            taken += 1
+        found.append(argument)
+    return found
 
 
 def _refuse(problem: str) -> NoReturn:
