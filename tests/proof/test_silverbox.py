@@ -108,3 +108,8 @@ def test_the_augmented_model_runs_free_over_the_official_tests(answer, tmp_path,
     assert error < limit
     linear = answer.evidence.search.nominal.model
     assert error < 0.05 * float(np.sqrt(np.mean(start_only(linear, [series], white, 1e-3).residuals[0][START:] ** 2)))
+
+
+def test_the_augmented_model_can_be_saved_and_read_back(answer, tmp_path):
+    answer.model.save(tmp_path / "augmented.yaml")
+    assert Model.load(tmp_path / "augmented.yaml").value("cubic_stiffness.coefficient") > 3.0

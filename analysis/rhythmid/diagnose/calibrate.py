@@ -55,6 +55,16 @@ def with_delays(model: Model, series: Sequence[Series], catalogue: Catalogue) ->
     return model
 
 
+def causal(model: Model) -> Model:
+    """The model with a delay that came out a little negative set to zero: no machine answers before it is asked."""
+    current = model.parameters.get(INPUT_DELAY)
+    if current is None or current.bounds[0] >= 0.0:
+        return model
+    return model.with_parameters(
+        {INPUT_DELAY: replace(current, value=max(current.value, 0.0), bounds=(0.0, current.bounds[1]))}
+    )
+
+
 def _shooting_start(model: Model, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Model:
     """Parameters from short windows with starts of their own: wrong values cannot drift far in a window."""
     length = 2.0 / max(dominant_frequency(one) for one in series)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from rhythmid.diagnose.calibrate import Calibration, calibrate, reconstructed
+from rhythmid.diagnose.calibrate import Calibration, calibrate, causal, reconstructed
 from rhythmid.diagnose.confidence import probabilities
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.gate import admitted
@@ -120,7 +120,7 @@ def diagnose(
         nominal_run,
         augmented_run,
     )
-    return Answer(diagnosis, found.fit.model, evidence)
+    return Answer(diagnosis, causal(found.fit.model), evidence)
 
 
 def check_comparable(series: Sequence[Series]) -> None:

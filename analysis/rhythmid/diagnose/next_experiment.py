@@ -40,9 +40,9 @@ def _menu(effort: float, frequency: float, length: float) -> list[tuple[str, dic
     found: list[tuple[str, dict, float]] = []
     for factor in (0.3, 1.0, 3.0):
         amplitude = factor * effort
-        found.append((f"a chirp of {amplitude:.3g} from 0 to {top:.3g} Hz over {length:.0f} s",
+        found.append((f"a chirp of {amplitude:.3g} from 0 to {top:.3g} Hz over {length:.3g} s",
                       {"type": "chirp", "amplitude": amplitude, "band": [0.0, top], "sweep": length}, 1.0))  # fmt: skip
-        found.append((f"a step of bias force of {amplitude:.3g}, held for {length / 2:.0f} s and released",
+        found.append((f"a step of bias force of {amplitude:.3g}, held for {length / 2:.3g} s and released",
                       {"type": "profile", "points": [[0.0, amplitude], [length / 2, 0.0]], "length": length}, 1.0))  # fmt: skip
     found.append((f"an odd multisine of {effort:.3g} rms up to {3 * top:.3g} Hz",
                   {"type": "multisine", "rms": effort, "period": length / 3, "periods": 3, "band": [frequency / 5, 3 * top]},
