@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from rhythmid.errors import InputError
 from rhythmid.identify.delay_fit import DelayEstimate, combine_delays, fit_delays
@@ -41,6 +42,7 @@ class PaperResult:
     loss: NDArray[np.float64]
 
 
+@threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
 def paper_method(record: Record, model: Model, pumping: Pumping, harmonics: int = HARMONICS) -> PaperResult:
     """Identify `model` and its delays from a record by the paper's method.
 
