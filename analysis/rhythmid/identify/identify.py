@@ -169,7 +169,12 @@ def identify(
         results.append(paper_method(record, own, pumping, harmonics if pumping.active else 0))
         pumpings.append(pumping)
     if method == "joint":
-        return _joint(given, nominal, results, pumpings[0].source, forcing, offset)
+        try:
+            return _joint(given, nominal, results, pumpings[0].source, forcing, offset)
+        except InputError:
+            if any(pumping.active for pumping in pumpings):
+                raise
+            # a cycle whose forcing is unknown cannot be simulated; the transfer functions around it can still be fitted
     first = results[0]
     units = first.fit.model.parameters
     parameters = {
@@ -185,7 +190,7 @@ def identify(
         fitted = with_delays(fitted, delays.sum.value or 0.0, 0.0)
     return Identification(
         fitted, given, parameters, delays, first.estimate.htf, first.estimate.reached, tuple(results),
-        _quality(fitted, given, results), tuple(note for r, one in zip(given, results) for note in _notes(r, one)),
+        _quality(_nrmse(fitted, given, results), given, results), tuple(note for r, one in zip(given, results) for note in _notes(r, one)),
     )  # fmt: skip
 
 
@@ -210,8 +215,7 @@ def _joint(
     }
     first = results[0]
     jitter = measurement_jitter(fit)
-    quality = _quality(None, records, results) | {
-        "nrmse": fit.nrmse(),
+    quality = _quality(fit.nrmse(), records, results) | {
         "unexplained_response": joint.search.response,
         "noise_std": math.sqrt(fit.noise.variance * fit.run.series[0].block),
         "measurement_jitter": jitter.to_dict(),
@@ -247,13 +251,18 @@ def _notes(record: Record, result: PaperResult) -> Iterator[str]:
         yield f"{record.name}: the model leaves {result.fit.misfit:.0%} of the HTFs' magnitudes unexplained"
 
 
-def _quality(model: Model | None, records: Sequence[Record], results: Sequence[PaperResult]) -> dict[str, Any]:
-    channels = [record.quality for record in records]
+def _nrmse(model: Model, records: Sequence[Record], results: Sequence[PaperResult]) -> float:
+    """Largest free-run NRMSE of a model that starts on its limit cycle."""
     nrmse = 0.0
-    for record, result in zip(records, results) if model is not None else ():
+    for record, result in zip(records, results):
         cycle, delay = result.fit.linearised.cycle, model.value("measurement_delay.delay")
         begin = (record.output.time[0] - delay - result.pumping.origin) % result.pumping.period
         nrmse = max(nrmse, free_run_nrmse(model, record, cycle.path(begin)))
+    return nrmse
+
+
+def _quality(nrmse: float, records: Sequence[Record], results: Sequence[PaperResult]) -> dict[str, Any]:
+    channels = [record.quality for record in records]
     first = results[0]
     return {
         "rate": 1.0 / records[0].output.period,
