@@ -84,13 +84,13 @@ def undetermined(fit: Fit) -> list[Direction]:
         if prior is not None:
             information[i, i] += (size[i] / prior.std) ** 2
     values, vectors = np.linalg.eigh(information)
-    floor = max(1.0, 1e-15 * float(values[-1]))
+    floor = max(1.0, 1e-11 * float(values[-1]))  # below this lies the error of the differences
     return [_direction(fit.names, vectors[:, i], size) for i in range(p) if values[i] < floor]
 
 
 def _direction(names: Sequence[str], vector: Array, size: Array) -> Direction:
     large = np.flatnonzero(np.abs(vector) > 0.05 * np.abs(vector).max())
-    moved = [names[i] for i in large]
+    moved = [names[int(i)] for i in large]
     step = (vector * size)[large]
     if len(moved) == 1:
         words = f"nothing in the records determines {moved[0]}"
