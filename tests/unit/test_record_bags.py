@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from rhythmid.errors import InputError
 from rhythmid.record.bag import Bag
 from rhythmid.record.bag_report import quality_report

@@ -1,3 +1,4 @@
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false
 """Cramér-Rao bound: the smallest standard deviations that any unbiased estimator can reach, before or after the data.
 
 The inverse of the Fisher information of the sampled output under Gaussian noise, with the initial states as nuisances

@@ -1,3 +1,4 @@
+# pyright: reportArgumentType=false, reportAttributeAccessIssue=false
 """Maximum likelihood in the frequency domain: harmonic transfer functions and limit cycle, parameters and delays together.
 
 Minimises Σ_l |Y_l − Σ_m G_m(θ) e^{−j[(ω_l − mω_p) τ_u + ω_l τ_y]} U_{l−mP}|² / σ_l² + Σ_n |X̂_n − X_n(θ) e^{−jnω_p τ_y}|² / σ_n²
