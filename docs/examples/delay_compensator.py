@@ -12,6 +12,7 @@ import math
 import sys
 
 import numpy as np
+
 from rhythmid.identify.latency import Latency
 from rhythmid.model import Model
 from rhythmid.signal import spline, zero_order_hold

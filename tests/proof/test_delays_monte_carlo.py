@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from machines import hopper, record
 from rhythmid.identify.bound import cramer_rao
 from rhythmid.identify.joint import fit_from

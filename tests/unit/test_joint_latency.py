@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 import pytest
+
 from machines import hopper, record
 from rhythmid.errors import InputError
 from rhythmid.identify.identify import identify

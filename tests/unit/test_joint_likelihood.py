@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from machines import hopper, record
 from rhythmid.errors import InputError
 from rhythmid.identify.bound import cramer_rao

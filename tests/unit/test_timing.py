@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from machines import CATALOGUE, hopper, record
 from rhythmid.elements.random_delay import uniform_delay
 from rhythmid.identify.joint import JointFit, joint_likelihood
