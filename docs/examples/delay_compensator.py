@@ -1,3 +1,4 @@
+# pyright: reportArgumentType=false
 """A controller that uses an identified latency: it predicts the machine's state over both delays before it acts.
 
     rhythmid identify bag --save latency.yaml
