@@ -19,6 +19,21 @@ def run_node(executable, *arguments):
 
 
 @pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["-p", "delay"], "Couldn't parse parameter override rule: '-p delay'"),
+        (["--params-file", "missing.yaml"], "Couldn't parse params file: '--params-file missing.yaml'"),
+        (["--delay", "0.04"], "--delay"),
+    ],
+)
+def test_ros_arguments_that_cannot_be_parsed_are_refused_likewise(arguments, said):
+    done = run_node("delay_injector", *arguments)
+    last = done.stderr.splitlines()[-1]  # rcl may have logged a line of its own before
+    assert done.returncode == 2 and last.startswith("error: ") and said in last
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
     ("executable", "given", "said"),
     [
         ("delay_injector", "delay:=-0.04", "error: parameter delay = -0.04 must lie in [0, 10] s"),

@@ -1,5 +1,7 @@
 """Plant over real topics: grid stamps without gaps, commands at their stamps, and nothing lost in lockstep."""
 
+import errno
+import os
 import time
 from pathlib import Path
 
@@ -38,6 +40,16 @@ def test_real_time_samples_lie_on_the_grid_without_gaps_and_follow_the_physics(g
     for field in ("position", "velocity", "effort"):
         heard = [getattr(message, field)[0] for message in states[:300]]
         np.testing.assert_allclose(heard, getattr(expected, field)[skipped:], rtol=1e-12, atol=1e-12)
+
+
+def test_without_the_right_to_priority_it_runs_at_ordinary_priority_and_says_so(graph, monkeypatch, capsys):
+    def refuse(*_):
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    node = graph.add(PlantNode, model=str(MODEL), priority=20)
+    graph.until(lambda: int(node.figures()["samples"]) > 10, "samples")
+    assert "warning: no SCHED_FIFO priority 20: Operation not permitted" in capsys.readouterr().err
 
 
 def test_a_command_acts_at_its_stamp_and_a_late_one_at_once(graph):

@@ -1,7 +1,7 @@
 """`rhythmid identify`: parameters, delays and harmonic transfer functions from records."""
 
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, cast, get_args
 
 import typer
 from rich.console import Console
@@ -61,9 +61,8 @@ def identify(
     with Console(stderr=True).status("reading") as status:
         records = load_records(bags, signals)
         status.update("identifying")
-        found = find(
-            records, known, method=method, forcing=forcing if offset is None else "clock_unknown", offset=offset
-        )  # type: ignore[arg-type]
+        path = "clock_unknown" if offset is not None else cast(Forcing | None, forcing)
+        found = find(records, known, method=cast(Method, method), forcing=path, offset=offset)
     result = found.to_dict()
     show(result)
     if json is not None:

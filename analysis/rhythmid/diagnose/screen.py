@@ -25,7 +25,7 @@ from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.model import Model
 from rhythmid.signal import first_order_hold
-from rhythmid.simulate import delayed_command
+from rhythmid.simulate import delayed_command, physical_times
 
 Array = NDArray[np.float64]
 
@@ -94,12 +94,14 @@ def trajectories(fit: Fit) -> Trajectories:
         rows = disturbed.rows(fit.model, index, start)
         if rows is None:
             raise InputError(f"{one.name}: the fitted model diverges")
-        acceleration = np.gradient(rows[:, 1], one.centres)
-        body = _body_force(fit.model, one.centres, rows[:, 0], rows[:, 1], rows[:, q + 1])
+        # the machine was there when the measurement was taken, not when it was stamped
+        time = one.centres - float(np.mean(one.centres - physical_times(fit.model, one.centres)))
+        acceleration = np.gradient(rows[:, 1], time)
+        body = _body_force(fit.model, time, rows[:, 0], rows[:, 1], rows[:, q + 1])
         leg = fit.model.mass.value * acceleration - rows[:, q + 1] - body
         command = delayed_command(fit.model, one.command)
-        signal = np.zeros(one.blocks) if command is None else _evaluate(command, one.centres)
-        paths.append(Path(one.centres, rows[:, 0], rows[:, 1], rows[:, q + 1], leg, rows[:, q]))
+        signal = np.zeros(one.blocks) if command is None else _evaluate(command, time)
+        paths.append(Path(time, rows[:, 0], rows[:, 1], rows[:, q + 1], leg, rows[:, q]))
         outputs.append(rows[:, q].copy())
         commands.append(signal)
     return Trajectories(fit, disturbed, tuple(paths), tuple(outputs), tuple(commands))

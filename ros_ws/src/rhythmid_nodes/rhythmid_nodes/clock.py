@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -46,7 +47,6 @@ class Worker:
     def __init__(self, name: str, body: Callable[[], None], priority: int = 0) -> None:
         self.stopping = threading.Event()
         self.failure: BaseException | None = None
-        self.priority_refused = False
         self._body = body
         self._priority = priority
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
@@ -64,8 +64,10 @@ class Worker:
         if self._priority:
             try:
                 os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(self._priority))
-            except OSError:
-                self.priority_refused = True
+            except OSError as refused:
+                print(
+                    f"warning: no SCHED_FIFO priority {self._priority}: {refused.strerror}", file=sys.stderr
+                )
         try:
             self._body()
         except BaseException as failure:

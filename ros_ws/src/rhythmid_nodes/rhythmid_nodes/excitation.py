@@ -238,9 +238,8 @@ class ExcitationNode(GraphNode):
                 return
             faded = self._fade_from is not None and self._sent - self._fade_from >= self._fade_length
             if faded or self._sent >= len(self._effort):
-                self._output.publish(
-                    self._writer.write(stamp_ns, 0.0)
-                )  # what holds the last command holds zero
+                # whoever holds the last command holds zero from now on
+                self._output.publish(self._writer.write(stamp_ns, 0.0))
                 self._end()
                 return
             self._send()
@@ -252,7 +251,7 @@ class ExcitationNode(GraphNode):
             self._enter("stopped", "asked to stop")
 
     def _halt(self, stamp_ns: int, danger: str) -> None:
-        """Stop at once, without fading: what holds the last command holds zero."""
+        """Stop at once, without fading, with a last command of zero."""
         self._output.publish(self._writer.write(stamp_ns, 0.0))
         self._enter("stopped", danger)
         self.get_logger().error(f"excitation stopped: {danger}")

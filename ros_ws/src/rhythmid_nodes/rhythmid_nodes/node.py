@@ -105,7 +105,11 @@ def serve(build: Sequence[Callable[[], GraphNode]], arguments: list[str]) -> int
         signal.signal(number, lambda received, _frame: asked.append(received))
     _end_with_supervisor()
     sys.setswitchinterval(2e-4)  # a waiting clock thread gets the interpreter within 0.2 ms
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as problem:  # --ros-args that cannot be parsed; rcl adds the places in its sources
+        print(f"error: {' '.join(str(problem).split(', at /')[0].split())}", file=sys.stderr)
+        return 2
     executor = EventsExecutor()
     nodes: list[GraphNode] = []
     problems: list[BaseException] = []

@@ -5,12 +5,10 @@ Services `~/pause` and `~/resume` (std_srvs/Trigger).
 
 from __future__ import annotations
 
-import array
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_srvs.srv import Trigger
 
@@ -41,27 +39,44 @@ PARAMETERS = (
 class Track:
     """One recorded topic: what came in, checked by the stamps of the headers."""
 
-    def __init__(self) -> None:
+    def __init__(self, period_ns: int) -> None:
         self.received = 0
         self.type_name = ""
         self.has_header = False
-        self.stamps = array.array("q")
+        self._period_ns = period_ns
+        self._stamped = self._duplicates = self._backwards = self._longest_ns = 0
+        self._first_ns = self._previous_ns = self._last_ns = 0
+        self._on_grid = True
 
     @property
     def is_stream(self) -> bool:
         """Whether it carries one message for every sample of the grid."""
         return self.type_name == _STREAM
 
-    def check(self, period_ns: int) -> str:
+    def add(self, stamp_ns: int) -> None:
+        """Take note of the header stamp [ns] of the next message."""
+        if self._stamped == 0:
+            self._first_ns = self._previous_ns = self._last_ns = stamp_ns
+        else:
+            step = stamp_ns - self._previous_ns
+            self._duplicates += step == 0
+            self._backwards += step < 0
+            self._on_grid = self._on_grid and step % self._period_ns == 0
+            self._longest_ns = max(self._longest_ns, step)
+            self._last_ns = max(self._last_ns, stamp_ns)
+            self._previous_ns = stamp_ns
+        self._stamped += 1
+
+    def check(self) -> str:
         """Rate, duplicates, steps back, longest interval; missing samples where the stamps lie on a grid."""
-        if len(self.stamps) < 2:
+        span_ns = self._last_ns - self._first_ns
+        if span_ns == 0:
             return ""
-        steps = np.diff(np.array(self.stamps))
-        rate = len(steps) / max(np.sum(steps) * 1e-9, 1e-9)
-        found = f", {rate:.3f} Hz, {np.sum(steps == 0)} duplicates, {np.sum(steps < 0)} backwards"
-        if self.is_stream and not np.any(steps % period_ns):
-            found += f", {np.sum(steps) // period_ns - len(steps)} missing"
-        return f"{found}, longest interval {np.max(steps) * 1e-6:.3f} ms"
+        rate = (self._stamped - 1) / (span_ns * 1e-9)
+        found = f", {rate:.3f} Hz, {self._duplicates} duplicates, {self._backwards} backwards"
+        if self.is_stream and self._on_grid:
+            found += f", {span_ns // self._period_ns + 1 - (self._stamped - self._duplicates)} missing"
+        return f"{found}, longest interval {self._longest_ns * 1e-6:.3f} ms"
 
 
 class Recorder(GraphNode):
@@ -87,7 +102,7 @@ class Recorder(GraphNode):
         )
         self._bag.open()
         self.workers.append(self._bag)
-        self._tracks = {self.resolve_topic_name(topic): Track() for topic in values["topics"]}
+        self._tracks = {self.resolve_topic_name(topic): Track(self.period_ns) for topic in values["topics"]}
         self._inputs = {topic: self._subscribe(topic, track) for topic, track in self._tracks.items()}
         self.create_service(Trigger, "~/pause", self._on_pause)
         self.create_service(Trigger, "~/resume", self._on_resume)
@@ -104,7 +119,7 @@ class Recorder(GraphNode):
             "not_recorded_while_paused": str(self._skipped),
         }
         for topic, track in self._tracks.items():
-            checked = track.check(self.period_ns) if self._closed else ""
+            checked = track.check() if self._closed else ""
             figures[topic] = f"{track.received} messages{checked}"
         return figures
 
@@ -136,7 +151,7 @@ class Recorder(GraphNode):
             self._skipped += 1
         else:
             if track.has_header:
-                track.stamps.append(stamp_ns)
+                track.add(stamp_ns)
             self._bag.put(topic, self._receive_time(track, stamp_ns), data)
         if self._ack is not None and self._streams:
             self._ack.taken(min([stream.received for stream in self._streams]))
