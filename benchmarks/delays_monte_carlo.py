@@ -1,17 +1,22 @@
-"""Monte Carlo of the joint estimator on the paper's experiment: scatter against the bound, and coverage of intervals.
+"""Monte Carlo of the joint estimator on the paper's experiment: scatter against the bound, coverage of intervals, and starts
+that are far off.
 
-    python benchmarks/delays_monte_carlo.py --runs 300 --noise 5e-6            # with the limit cycle as data
-    python benchmarks/delays_monte_carlo.py --runs 300 --noise 2e-5 --no-cycle
-    python benchmarks/delays_monte_carlo.py --starts 200                       # random starts, k and c off by up to 50 %
+    python benchmarks/delays_monte_carlo.py                    # everything, on two chirps: a few minutes
+    python benchmarks/delays_monte_carlo.py --chirps 9 --only scatter     # the paper's nine chirps
+    python benchmarks/delays_monte_carlo.py --only starts --runs 200
 
-The record is simulated once; every run adds its own white noise to it and fits from values that are a little off.
+One record is simulated; every run adds white noise of its own and fits from values that are a little off. A start that
+is far off has delays of its own, so each has its own record.
 """
 
 import argparse
-import math
 import time
+from dataclasses import dataclass
+from importlib.resources import as_file, files
+from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment
@@ -19,92 +24,114 @@ from rhythmid.identify.bound import cramer_rao, planned_record
 from rhythmid.identify.harmonic_likelihood import INPUT_DELAY, MEASUREMENT_DELAY
 from rhythmid.identify.identify import paper_hopper
 from rhythmid.identify.joint import fit_from, joint_likelihood
-from rhythmid.identify.monte_carlo import noisy, scatter
+from rhythmid.identify.monte_carlo import Drawn, noisy, scatter
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
 from rhythmid.record.record import Record
-from rhythmid.table1 import EXPERIMENT
 
+EXPERIMENT = """
+model: paper_hopper.yaml
+excitation:
+  {{type: chirp, amplitude: 0.004, band: [0, 7], sweep: 30.0, repetitions: {chirps}, warm_up: 1,
+   shift: {{period: 1.0, count: {chirps}}}}}
+forcing: {{amplitude: 1.0, frequency: 1.0}}
+delays: {{input: {delays[0]}, measurement: {delays[1]}}}
+"""
 DELAYS = (0.04, 0.05)
-TRUTH = {"linear_spring.stiffness": 200.0, "switched_damper.stance": 2.0}
+NOISE = (5e-6, 2e-5)
+STIFFNESS, DAMPING = "linear_spring.stiffness", "switched_damper.stance"
+NAMES = (INPUT_DELAY, MEASUREMENT_DELAY, STIFFNESS, DAMPING)
 
 
-def record_of(delays: tuple[float, float]) -> Record:
-    """The paper's experiment without noise."""
-    from importlib.resources import as_file, files
-
+def record_of(chirps: int, delays: tuple[float, float] = DELAYS) -> Record:
+    """The paper's experiment without noise, with so many chirps after the warm-up."""
     with as_file(files("rhythmid") / "models") as folder:
-        text = EXPERIMENT.format(input=delays[0], measurement=delays[1])
-        return planned_record(Experiment.from_text(text, folder))
+        return planned_record(Experiment.from_text(EXPERIMENT.format(chirps=chirps, delays=delays), folder))
 
 
-def truth(delays: tuple[float, float]) -> Model:
+def machine_of(delays: tuple[float, float] = DELAYS) -> Model:
     """The machine that made the record."""
-    return paper_hopper().with_values({**TRUTH, INPUT_DELAY: delays[0], MEASUREMENT_DELAY: delays[1]})
+    values = {STIFFNESS: 200.0, DAMPING: 2.0, INPUT_DELAY: delays[0], MEASUREMENT_DELAY: delays[1]}
+    return paper_hopper().with_values(values)
 
 
-def monte_carlo(runs: int, noise: float, cycle: bool, workers: int | None) -> None:
-    """Print scatter over bound and coverage of each parameter."""
-    record, machine = record_of(DELAYS), truth(DELAYS)
+def print_scatter(seeds: range, record: Record, noise: float, cycle: bool, workers: int | None) -> None:
+    """Scatter over bound, and coverage, of each parameter."""
+    machine = machine_of()
     bound = cramer_rao(machine, record, noise, cycle=cycle)
-    off = machine.with_values({"linear_spring.stiffness": 201.0, "switched_damper.stance": 2.05,
-                               INPUT_DELAY: 0.043, MEASUREMENT_DELAY: 0.051})  # fmt: skip
+    moved = (0.003, 0.001, 1.0, 0.05)
+    off = machine.with_values({name: machine.value(name) + by for name, by in zip(NAMES, moved)})
 
-    def one(seed: int):
-        return fit_from(off, noisy(record, noise, seed), cycle=cycle)
+    def one(seed: int) -> Drawn:
+        return Drawn.of(fit_from(off, noisy(record, noise, seed), cycle=cycle), NAMES)
 
-    fits = [result for _, result in fork_map(one, range(runs), workers) if not isinstance(result, Exception)]
-    print(f"{len(fits)} of {runs} runs, noise {1e6 * noise:g} µm, {'with' if cycle else 'without'} the limit cycle")
+    drawn, lost = [], 0
+    for _, found in fork_map(one, seeds, workers):
+        if isinstance(found, Exception):
+            lost += 1
+        else:
+            drawn.append(found)
+    print(f"\nnoise {1e6 * noise:g} µm, {'with' if cycle else 'without'} the limit cycle: {len(seeds)} runs, {lost} without an answer")
     print(f"{'parameter':28}{'bound':>11}{'std':>11}{'std/bound':>11}{'bias/std':>10}{'95 % covers':>13}")
-    for name in (*TRUTH, INPUT_DELAY, MEASUREMENT_DELAY):
-        found = scatter(fits, name, machine.value(name))
+    for name in NAMES:
+        found = scatter(drawn, name, machine.value(name))
         print(
             f"{name:28}{bound.std[name]:11.3g}{found.std:11.3g}{found.std / bound.std[name]:11.3f}"
-            f"{found.bias / found.std:+10.3f}{found.coverage:13.1%}"
+            f"{found.bias / found.std:+10.3f}{found.coverage:13.1%}",
+            flush=True,
         )
 
 
-def starts(runs: int, workers: int | None) -> None:
-    """Print how many random starts reach the truth within five standard deviations."""
-    rng = np.random.default_rng(1)
-    cases = [(rng.uniform(0.0, 0.3, 2), rng.uniform(0.5, 1.5, 2), rng.uniform(0.0, 0.3, 2)) for _ in range(runs)]
+@dataclass(frozen=True)
+class Start:
+    """True delays [s], and where the search begins: factors on k and c, assumed delays [s]."""
 
-    def one(case) -> tuple[str, float]:
-        actual, factor, guess = case
-        record = noisy(record_of(tuple(actual.round(5))), 5e-6, 1)
-        model = paper_hopper().with_values({
-            "linear_spring.stiffness": 200.0 * factor[0], "switched_damper.stance": 2.0 * factor[1],
-            INPUT_DELAY: guess[0], MEASUREMENT_DELAY: guess[1],
-        })  # fmt: skip
+    actual: tuple[float, float]
+    factor: NDArray[np.float64]
+    guess: NDArray[np.float64]
+
+
+def print_starts(runs: int, chirps: int, workers: int | None) -> None:
+    """How many random starts reach the truth (within five standard deviations of each parameter)."""
+    rng = np.random.default_rng(1)
+    cases = [
+        Start(tuple(rng.uniform(0.0, 0.3, 2).round(5)), rng.uniform(0.5, 1.5, 2), rng.uniform(0.0, 0.3, 2))
+        for _ in range(runs)
+    ]
+
+    def one(case: Start) -> tuple[str, float]:
+        record = noisy(record_of(chirps, case.actual), 5e-6, 1)
+        right = machine_of(case.actual)
+        values = (*case.guess, *(case.factor * (200.0, 2.0)))
         begin = time.process_time()
         try:
-            fit = joint_likelihood(record, model).fit
+            fit = joint_likelihood(record, right.with_values(dict(zip(NAMES, values)))).fit
         except InputError:
-            return "reported", time.process_time() - begin
-        right = truth(tuple(actual.round(5)))
-        worst = max(abs(fit.model.value(n) - right.value(n)) / fit.std[n] for n in (*TRUTH, INPUT_DELAY, MEASUREMENT_DELAY))
+            return "reported as stuck", time.process_time() - begin
+        worst = max(abs(fit.model.value(n) - right.value(n)) / fit.std[n] for n in NAMES)
         return "reached" if worst < 5.0 else "wrong", time.process_time() - begin
 
-    results = [r for _, r in fork_map(one, cases, workers) if not isinstance(r, Exception)]
-    counts = {kind: sum(r[0] == kind for r in results) for kind in ("reached", "reported", "wrong")}
-    seconds = np.array([r[1] for r in results])
-    print(f"{runs} starts: {counts}; CPU seconds: median {np.median(seconds):.2f}, largest {seconds.max():.2f}")
+    results = [found for _, found in fork_map(one, cases, workers) if not isinstance(found, Exception)]
+    seconds = np.array([spent for _, spent in results])
+    told = ", ".join(f"{sum(kind == k for kind, _ in results)} {k}" for k in ("reached", "reported as stuck", "wrong"))
+    print(f"\n{runs} starts, {chirps} chirps: {told}; {np.median(seconds):.2f} s of CPU time each (largest {seconds.max():.2f})")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=300)
-    parser.add_argument("--noise", type=float, default=5e-6, help="standard deviation [m]")
-    parser.add_argument("--no-cycle", action="store_true", help="do not use the limit cycle as data")
-    parser.add_argument("--starts", type=int, default=0, help="try so many random starts instead")
-    parser.add_argument("--workers", type=int, default=None)
+    parser.add_argument("--runs", type=int, help="runs of each case (300), and starts (200)")
+    parser.add_argument("--chirps", type=int, default=2, help="chirps of 30 s after the warm-up")
+    parser.add_argument("--only", choices=("scatter", "starts"))
+    parser.add_argument("--workers", type=int, help="processes; as many as there are processors if not told")
     given = parser.parse_args()
-    if given.starts:
-        starts(given.starts, given.workers)
-    elif given.runs < 2 or not math.isfinite(given.noise):
-        parser.error("at least two runs are needed")
-    else:
-        monte_carlo(given.runs, given.noise, not given.no_cycle, given.workers)
+    if given.chirps < 1 or (given.runs is not None and given.runs < 2):
+        parser.error("at least one chirp and two runs are needed")
+    if given.only != "starts":
+        record, runs = record_of(given.chirps), given.runs or 300
+        for case, (noise, cycle) in enumerate(product(NOISE, (True, False))):
+            print_scatter(range(case * runs, (case + 1) * runs), record, noise, cycle, given.workers)
+    if given.only != "scatter":
+        print_starts(given.runs or 200, given.chirps, given.workers)
 
 
 if __name__ == "__main__":

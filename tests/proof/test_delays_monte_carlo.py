@@ -6,7 +6,7 @@ import pytest
 from machines import hopper, record
 from rhythmid.identify.bound import cramer_rao
 from rhythmid.identify.joint import fit_from
-from rhythmid.identify.monte_carlo import noisy, scatter
+from rhythmid.identify.monte_carlo import Drawn, noisy, scatter
 
 TRUTH = {
     "input_delay.delay": 0.04,
@@ -24,7 +24,9 @@ def test_scatter_is_the_bound_and_intervals_cover(cycle):
     quiet = record(hopper(), SPEC, delays=(0.04, 0.055), std=0.0)
     machine = hopper().with_values(TRUTH)
     bound = cramer_rao(machine, quiet, NOISE, cycle=cycle)
-    fits = [fit_from(machine, noisy(quiet, NOISE, seed), cycle=cycle) for seed in range(RUNS)]
+    fits = [
+        Drawn.of(fit_from(machine, noisy(quiet, NOISE, seed), cycle=cycle), tuple(TRUTH)) for seed in range(RUNS)
+    ]
     found = {name: scatter(fits, name, truth) for name, truth in TRUTH.items()}
     ratios = [found[name].std / bound.std[name] for name in TRUTH]
     assert max(ratios) < 1.4 and min(ratios) > 0.65  # 3.5 standard deviations of a scatter of 40

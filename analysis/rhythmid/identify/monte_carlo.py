@@ -1,6 +1,6 @@
 """Monte Carlo of an estimator: noise drawn anew, the scatter of what is found, how often its intervals hold the truth."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +9,20 @@ from rhythmid.identify.output_error import Fit
 from rhythmid.record.record import Record
 
 COVER = 1.959964  # standard deviations on either side of a 95 % interval
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What one fit found: `values` and stated standard deviations `std` by name."""
+
+    values: Mapping[str, float]
+    std: Mapping[str, float]
+
+    @classmethod
+    def of(cls, fit: Fit, names: Sequence[str]) -> "Drawn":
+        """The parameters `names` of a fit."""
+        stds = fit.std
+        return cls({n: fit.model.value(n) for n in names}, {n: stds[n] for n in names})
 
 
 @dataclass(frozen=True)
@@ -27,9 +41,9 @@ def noisy(record: Record, std: float, seed: int) -> Record:
     return replace(record, output=replace(output, value=value))
 
 
-def scatter(fits: Sequence[Fit], name: str, truth: float) -> Scatter:
+def scatter(found: Sequence[Drawn], name: str, truth: float) -> Scatter:
     """Scatter of the parameter `name` over fits of independent noise about its true value."""
-    values = np.array([fit.model.value(name) for fit in fits])
-    stds = np.array([fit.std[name] for fit in fits])
+    values = np.array([one.values[name] for one in found])
+    stds = np.array([one.std[name] for one in found])
     covered = np.abs(values - truth) < COVER * stds
     return Scatter(float(values.std(ddof=1)), float(values.mean() - truth), float(covered.mean()))

@@ -122,11 +122,13 @@ def minimise(
     iterations: int = 30,
     pool: ThreadPoolExecutor | None = None,
     tolerance: float = 1e-3,
+    like: Linearisation | None = None,
 ) -> Fit:
     """Levenberg-Marquardt from the model's own values.
 
-    Stops when a further step would lower chi2 by less than `tolerance` (or by less than 1e-7 of itself). Raises
-    InputError when the model diverges at its initial values.
+    Stops when a further step would lower chi2 by less than `tolerance` (or by less than 1e-7 of itself). The steps of
+    differences are those of `like`, a linearisation of the same structure, or are sought. Raises InputError when the
+    model diverges at its initial values.
     """
     problem = Problem(run, names, noise, pool)
     current = [np.array(s) for s in (starts if starts is not None else first_guess(model, run))]
@@ -137,10 +139,14 @@ def minimise(
         raise InputError(
             "the model diverges when simulated over the records with its initial values; check its parameters and units"
         )
-    steps = _first_steps(model, names, run)
-    velocity = 2 * np.pi * max(dominant_frequency(one) for one in run.series) * problem.spread
-    state_steps = 1e-4 * np.array([problem.spread, velocity, *([problem.spread] * (run.states - 2))])
-    steps, state_steps = problem.settle_steps(model, current, residuals, steps, state_steps)
+    if like is None:
+        velocity = 2 * np.pi * max(dominant_frequency(one) for one in run.series) * problem.spread
+        state_steps = 1e-4 * np.array([problem.spread, velocity, *([problem.spread] * (run.states - 2))])
+        steps, state_steps = problem.settle_steps(
+            model, current, residuals, _first_steps(model, names, run), state_steps
+        )
+    else:
+        steps, state_steps = np.abs(like.steps), like.state_steps
     damping, converged, message = 1e-6, False, f"no convergence in {iterations} iterations"
     low = np.array([model.parameters[name].bounds[0] for name in names])
     high = np.array([model.parameters[name].bounds[1] for name in names])
@@ -279,7 +285,7 @@ def estimate(
         noise = noise_of(fit, floor=1e-9 * spread)
         if progress is not None:
             progress(f"residual {noise.variance**0.5:.3g}, colour of order {noise.order}")
-        fit = minimise(fit.model, run, chosen, noise, fit.starts, iterations, pool)
+        fit = minimise(fit.model, run, chosen, noise, fit.starts, iterations, pool, like=fit.linearisation)
     return fit
 
 

@@ -19,13 +19,15 @@ DEAD = 3e-4  # share of a sensitivity, below which what the projection leaves of
 @dataclass(frozen=True)
 class Linearisation:
     """Whitened residual (n,) and its sensitivities to parameters (n, p), both with the initial states projected out;
-    `bases` (one (n_s, q) orthonormal basis a series) span what initial states can do; `steps` are the differences used."""
+    `bases` (one (n_s, q) orthonormal basis a series) span what initial states can do; `steps` (p,) and `state_steps` (q,) are
+    the differences used."""
 
     residual: Array
     jacobian: Array
     bases: tuple[Array, ...]
     pieces: tuple[slice, ...]
     steps: Array
+    state_steps: Array
 
 
 class Problem:
@@ -200,7 +202,7 @@ class Problem:
         target = 1e-4 * self.spread
         ratio = np.clip(target / np.maximum(moved, 1e-30), 1e-3, 1e3)
         linearisation = Linearisation(
-            np.concatenate(rows), np.concatenate(columns), tuple(bases), tuple(places), signed
+            np.concatenate(rows), np.concatenate(columns), tuple(bases), tuple(places), signed, state_steps
         )
         return linearisation, states, steps * ratio[:p], state_steps * ratio[p:]
 

@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 from scipy.interpolate import PPoly
 
 from rhythmid.compiled import InputKind
@@ -82,13 +83,14 @@ def bandwidth(value: Array, period: float, share: float = 0.9999) -> float:
     """Frequency [Hz] below which `share` of the motion's power lies (its mean and trend left out)."""
     n = len(value)
     detrended = value - np.linspace(value[: max(1, n // 50)].mean(), value[-max(1, n // 50) :].mean(), n)
-    power = np.abs(np.fft.rfft(detrended * np.hanning(n))) ** 2
+    length = _fast_length(n)
+    power = np.abs(np.fft.rfft(detrended * np.hanning(n), length)) ** 2
     floor = np.median(power[len(power) // 2 :])  # measurement noise, as the upper half of the band shows it
     power = np.maximum(power - 4.0 * floor, 0.0)
     total = np.cumsum(power)
     if total[-1] <= 0.0:
         return 0.5 / period
-    return float(np.searchsorted(total, share * total[-1]) / (n * period))
+    return float(np.searchsorted(total, share * total[-1]) / (length * period))
 
 
 def block_length(value: Array, period: float) -> int:
@@ -179,9 +181,15 @@ def hold_out_tail(series: Sequence[Series], share: float = 0.2) -> tuple[list[Se
 def dominant_frequency(series: Series) -> float:
     """Frequency [Hz] of the strongest line of the motion."""
     value = series.averaged - series.averaged.mean()
-    power = np.abs(np.fft.rfft(value * np.hanning(len(value)))) ** 2
+    length = _fast_length(len(value))
+    power = np.abs(np.fft.rfft(value * np.hanning(len(value)), length)) ** 2
     power[0] = 0.0
-    return float(max(1, int(np.argmax(power))) / (len(value) * series.period * series.block))
+    return float(max(1, int(np.argmax(power))) / (length * series.period * series.block))
+
+
+def _fast_length(least: int) -> int:
+    """Length of a Fourier transform that is quick, at least `least`."""
+    return int(next_fast_len(least, real=True))  # type: ignore[arg-type]
 
 
 def scales(series: Sequence[Series], model: Model) -> Scales:

@@ -103,14 +103,20 @@ def fundamental_frequency(time: Array, value: Array) -> float:
 def _refined(time: Array, value: Array, frequency: float, harmonics: int) -> float:
     """Gauss-Newton on the frequency of a Fourier series with so many harmonics."""
     h = np.arange(1, harmonics + 1)
+    columns = np.ones((2 * harmonics + 2, len(time)))
     for _ in range(8):
-        angle = np.multiply.outer(2 * np.pi * frequency * time, h)
-        cosine, sine = np.cos(angle), np.sin(angle)
-        columns = np.hstack([np.ones((len(time), 1)), cosine, sine])
-        solution = np.linalg.lstsq(columns, value, rcond=1e-12)[0]
+        turn = np.exp(2j * np.pi * frequency * time)
+        power = np.ones(len(time), dtype=complex)
+        for n in range(1, harmonics + 1):
+            power = power * turn
+            columns[n], columns[harmonics + n] = power.real, power.imag
+        fourier = columns[:-1]
+        solution = np.linalg.solve(fourier @ fourier.T, fourier @ value)
         a, b = solution[1 : harmonics + 1], solution[harmonics + 1 :]
-        slope = 2 * np.pi * time * (cosine @ (h * b) - sine @ (h * a))
-        step = float(np.linalg.lstsq(np.column_stack([columns, slope]), value, rcond=1e-12)[0][-1])
+        columns[-1] = 2 * np.pi * time * ((h * b) @ fourier[1 : harmonics + 1] - (h * a) @ fourier[harmonics + 1 :])
+        size = np.sqrt(np.sum(columns**2, axis=1))
+        scaled = columns / size[:, None]
+        step = float(np.linalg.solve(scaled @ scaled.T, scaled @ value)[-1] / size[-1])
         frequency += step
         if abs(step) < 1e-13 * frequency:
             break
