@@ -109,7 +109,7 @@ def _refined(time: Array, value: Array, frequency: float, harmonics: int) -> flo
         power = np.ones(len(time), dtype=complex)
         for n in range(1, harmonics + 1):
             power = power * turn
-            columns[n], columns[harmonics + n] = power.real, power.imag
+            columns[n], columns[harmonics + n] = np.real(power), np.imag(power)
         fourier = columns[:-1]
         solution = np.linalg.solve(fourier @ fourier.T, fourier @ value)
         a, b = solution[1 : harmonics + 1], solution[harmonics + 1 :]
