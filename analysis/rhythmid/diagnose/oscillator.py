@@ -1,0 +1,76 @@
+"""The oscillator that a simulated motion shows: what small forces do to a machine, without a model of it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Oscillator:
+    """x'' + damping x' + omega² x = gain · force, with omega [rad/s] and damping [1/s]: what small forces do."""
+
+    omega: float
+    damping: float
+    gain: float = 1.0
+
+    def response(self, forces: Array, step: float) -> Array:
+        """Motion (n, …) from rest under forces (n, …)."""
+        n = len(forces)
+        size = next_fast_len(2 * n)
+        s = 2j * np.pi * np.arange(size // 2 + 1) / (size * step)
+        transfer = self.gain / (s * s + self.damping * s + self.omega**2)
+        shape = (-1,) + (1,) * (forces.ndim - 1)
+        return np.asarray(irfft(transfer.reshape(shape) * rfft(forces, size, axis=0), size, axis=0))[:n]
+
+    def free(self, time: Array) -> Array:
+        """What two unknown initial conditions do, (n, 2)."""
+        t = time - time[0]
+        turned = 1j * math.sqrt(max(self.omega**2 - 0.25 * self.damping**2, 0.01 * self.omega**2))
+        wave = np.exp((turned - 0.5 * self.damping) * t)
+        return np.column_stack([wave.real, wave.imag])
+
+
+def oscillator_of(
+    effort: Array | None, motion: Array, step: float, dominant: float, bandwidth: float
+) -> Oscillator:
+    """Oscillator that turns a force (n,) into a motion (n,), both at steps [s], by what moves below `bandwidth` [Hz].
+
+    Iterated weighted least squares over frequency (C. K. Sanathanan, J. Koerner, IEEE Trans. Autom. Control 8 (1963) 56) with a
+    delay that is tried out; a lightly damped oscillator at the `dominant` frequency [Hz] where no force is known.
+    """
+    fallback = Oscillator(2.0 * np.pi * dominant, 0.1 * 2.0 * np.pi * dominant)
+    if effort is None or np.ptp(effort) == 0.0:
+        return fallback
+    n = len(motion)
+    window = np.hanning(n)
+    force = np.asarray(rfft((effort - effort.mean()) * window))
+    motion = np.asarray(rfft((motion - motion.mean()) * window))
+    frequency = np.arange(len(force)) / (n * step)
+    kept = (frequency > 1.5 / (n * step)) & (frequency < bandwidth)
+    kept &= np.abs(force) > 1e-3 * np.abs(force).max()
+    if kept.sum() < 3:
+        return fallback
+    s, force, motion = 2j * np.pi * frequency[kept], force[kept], motion[kept]
+    best, least = fallback, math.inf
+    for delay in np.linspace(0.0, 0.5 / dominant, 26):
+        late = motion * np.exp(s * delay)
+        weight = np.ones(len(s))
+        for _ in range(6):
+            columns = np.column_stack([s * s * late, s * late, late]) * weight[:, None]
+            target = force * weight
+            solution = np.linalg.lstsq(
+                np.vstack([columns.real, columns.imag]), np.concatenate([target.real, target.imag]), rcond=None
+            )[0]
+            m, c, k = solution
+            weight = 1.0 / np.maximum(np.abs(m * s * s + c * s + k), 1e-300)
+        left = float(np.sum(np.abs(force / (m * s * s + c * s + k) - late) ** 2))
+        if left < least and m > 0.0 and k > 0.0:
+            best, least = Oscillator(math.sqrt(k / m), max(c / m, 0.01 * math.sqrt(k / m)), 1.0 / m), left
+    return best
+
+
