@@ -17,7 +17,7 @@ from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment, Noise, perform
 from rhythmid.identify.joint import cycle_columns, prepared_model
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.output_error import minimise, start_only
+from rhythmid.identify.output_error import Fit, minimise, start_only
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
@@ -61,7 +61,20 @@ def cramer_rao(
     cycle: bool = True,
     block: int | None = None,
 ) -> Bound:
-    """Bound at the model's own values for records with these inputs and stamps.
+    """Bound at the model's own values for records with these inputs and stamps; arguments as for `expected_fit`."""
+    fit = expected_fit(model, records, std, correlation, cycle, block)
+    return Bound(fit.names, fit.covariance)
+
+
+def expected_fit(
+    model: Model,
+    records: Record | Sequence[Record],
+    std: float,
+    correlation: float = 0.0,
+    cycle: bool = True,
+    block: int | None = None,
+) -> Fit:
+    """The fit at the model's own values whose covariance is the bound, for records with these inputs and stamps.
 
     `std` [output unit] is that of a single sample's noise, `correlation` that from sample to sample (its slow part is
     what counts). Of the records' outputs only the start is taken, so planned and real ones serve alike. With `cycle`
@@ -79,5 +92,4 @@ def cramer_rao(
     plain = [replace(one, ignored=None) for one in series]
     begun = start_only(ready, plain, noise, 0.2 * series[0].period * series[0].block)
     run = replace(begun.run, series=tuple(series))
-    fit = minimise(ready, run, ready.free, noise, begun.starts, iterations=0)
-    return Bound(fit.names, fit.covariance)
+    return minimise(ready, run, ready.free, noise, begun.starts, iterations=0)

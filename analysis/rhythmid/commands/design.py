@@ -1,0 +1,157 @@
+"""`rhythmid design`: a signal to play, and what it will tell, before the run."""
+
+from pathlib import Path
+from typing import Annotated, Any, cast
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from rhythmid.commands.options import Elements, JsonFile
+from rhythmid.output import require_new, write_json
+
+
+def design(
+    model: Annotated[Path, typer.Argument(help="Model file; its values are taken for the truth.")],
+    duration: Annotated[float, typer.Option("--duration", help="Length of the run [s].")],
+    band: Annotated[
+        tuple[float, float], typer.Option("--band", help="Lowest and highest frequency of the command [Hz].")
+    ],
+    max_effort: Annotated[
+        float, typer.Option("--max-effort", help="Largest effort of the command [N, or the model's unit].")
+    ],
+    envelope: Annotated[
+        tuple[float, float],
+        typer.Option(
+            "--envelope", help="Lowest and highest position that may be measured [m, or the model's unit]."
+        ),
+    ],
+    noise_std: Annotated[
+        float,
+        typer.Option(
+            "--noise-std", help="Standard deviation of a measured sample's noise [m, or the model's unit]."
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option("--output", help="Folder to write: samples, model, experiment, figure, prediction."),
+    ],
+    kind: Annotated[
+        str,
+        typer.Option(
+            "--kind", help="multisine (interleaved, least crest factor) or comb (time-shifted chirps)."
+        ),
+    ] = "multisine",
+    rate: Annotated[
+        int, typer.Option("--rate", help="Samples of command and measurement in a second [Hz].")
+    ] = 1000,
+    harmonics: Annotated[
+        int,
+        typer.Option(
+            "--harmonics", help="Sidebands on either side of a line whose responses are kept apart."
+        ),
+    ] = 3,
+    forcing: Annotated[
+        tuple[float, float] | None,
+        typer.Option(
+            "--forcing",
+            help="Amplitude [N] and frequency [Hz] of the forcing on the robot; the model's, or 1 1.",
+        ),
+    ] = None,
+    delays: Annotated[
+        tuple[float, float] | None,
+        typer.Option("--delays", help="Input and measurement delay as expected [s]; the model's by default."),
+    ] = None,
+    longest_delay: Annotated[
+        float,
+        typer.Option(
+            "--longest-delay", help="Longest that either delay may be [s]; shifts beyond it must not alias."
+        ),
+    ] = 0.3,
+    max_distortion: Annotated[
+        float | None,
+        typer.Option(
+            "--max-distortion", help="Largest nonlinear part of the response, as a share of the linear one."
+        ),
+    ] = None,
+    shifts: Annotated[
+        int | None,
+        typer.Option(
+            "--shifts", help="comb: chirps, each starting at another phase; 2 harmonics + 3 by default."
+        ),
+    ] = None,
+    period: Annotated[
+        float | None,
+        typer.Option("--period", help="multisine: its period [s]; the longest that fits twice by default."),
+    ] = None,
+    spacing: Annotated[
+        float | None,
+        typer.Option(
+            "--spacing",
+            help="multisine: distance of its lines [Hz]; the closest that does not alias by default.",
+        ),
+    ] = None,
+    seed: Annotated[
+        int, typer.Option("--seed", help="multisine: of the lines left out and the starting phases.")
+    ] = 0,
+    elements: Elements = None,
+    json: JsonFile = None,
+) -> None:
+    """Design an experiment: the signal to play, as large as the machine bears, and every parameter's predicted uncertainty."""
+    from rhythmid.design.design_folder import save_design
+    from rhythmid.design.designer import design as make
+    from rhythmid.design.designer import forcing_of
+    from rhythmid.design.requirements import Kind, Requirements
+    from rhythmid.elements.catalogue import load_catalogue
+    from rhythmid.ltp.htf import transport_delays
+    from rhythmid.model import Model
+    from rhythmid.settings import Forcing
+
+    for path in (output, json):
+        require_new(path)
+    catalogue = load_catalogue(elements or ())
+    known = Model.load(model, catalogue)
+    input_delay, measurement_delay = delays or transport_delays(known)
+    wanted = Requirements(
+        duration, band, max_effort, envelope, noise_std, cast(Kind, kind), rate, harmonics,
+        forcing_of(known) if forcing is None else Forcing(*forcing), input_delay, measurement_delay, longest_delay,
+        max_distortion, shifts, period, spacing, seed,
+    )  # fmt: skip
+    with Console(stderr=True).status("designing") as status:
+        found = make(known, wanted, catalogue, status.update)
+        status.update("writing")
+        save_design(found, model, output, elements or ())
+    result = found.to_dict()
+    show(result)
+    if json is not None:
+        write_json(json, result)
+    typer.echo(f"{output}: play it with `rhythmid run {output / 'experiment.yaml'}`")
+
+
+def show(result: dict[str, Any]) -> None:
+    """Print a design."""
+    console = Console()
+    table = Table(title="predicted standard deviations")
+    for column in ("name", "value", "std", "unit"):
+        table.add_column(column)
+    rows = result["parameters"] | {f"delay: {name}": estimate for name, estimate in result["delays"].items()}
+    for name, estimate in rows.items():
+        table.add_row(name, f"{estimate['value']:.6g}", f"{estimate['std']:.2g}", estimate["unit"])
+    console.print(table)
+    size, position, signal, bent = (result[key] for key in ("amplitude", "position", "signal", "distortion"))
+    console.print(
+        f"{result['kind']}: {len(signal['frequencies'])} lines, peak {size['peak']:.4g} {size['unit']} "
+        f"(limit: {size['limited_by']}), rms {size['rms']:.4g}, crest factor {size['crest_factor']:.2f}"
+    )
+    low, high = position["cycle"]
+    console.print(
+        f"position {position['low']:.6g} to {position['high']:.6g} {position['unit']}, the limit cycle alone {low:.6g} to "
+        f"{high:.6g}"
+    )
+    console.print(
+        f"repeats over {signal['window']:.6g} s after a lead-in of {signal['lead_in']:.4g} s; harmonics up to "
+        f"±{signal['harmonics']} stay apart"
+    )
+    console.print(f"distortion of the response: even {bent['even']:.2%}, odd {bent['odd']:.2%}")
+    for note in result["notes"]:
+        console.print(f"note: {note}")

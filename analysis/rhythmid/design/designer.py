@@ -1,0 +1,195 @@
+"""Design an experiment: a signal whose responses stay apart, as large as the machine bears, and what it will tell."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.design.amplitude import Amplitude, largest_amplitude
+from rhythmid.design.chirp_comb import chirp_comb
+from rhythmid.design.distortion import Distortion, distortion, linearised_bias
+from rhythmid.design.interleaved_multisine import interleaved_multisine
+from rhythmid.design.prediction import Prediction, predict, require_unambiguous_delays
+from rhythmid.design.rehearsal import Rehearsal
+from rhythmid.design.requirements import Requirements
+from rhythmid.design.signal_plan import SignalPlan
+from rhythmid.design.waveform import Waveform, sampled
+from rhythmid.elements.catalogue import Catalogue, load_catalogue
+from rhythmid.errors import InputError
+from rhythmid.experiment import Experiment
+from rhythmid.identify.harmonic_likelihood import DELAYS, INPUT_DELAY, MEASUREMENT_DELAY, visible_sidebands
+from rhythmid.identify.joint import without_forcing
+from rhythmid.ltp.htf import LinearisedModel, linearised
+from rhythmid.ltp.pumping import Pumping
+from rhythmid.model import Model
+from rhythmid.settings import Delay, Forcing, Noise, TimeMode
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+STRONG = 0.05  # distortion, as a share of the response, that deserves a word
+BIASED = 1.0  # standard deviations of bias that deserve a word
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """An experiment ready to be played, with what is predicted of it.
+
+    `command` holds the samples that the file will hold; `machine` is the model linearised about its limit cycle,
+    without delays; `bias` of a fit to transfer functions, in standard deviations of each parameter; `visible` are the
+    harmonics |m| of the response that will stand out of the noise. `output` (n,) is the measured position [m] without
+    noise, `still` (n,) the same without command.
+    """
+
+    requirements: Requirements
+    plan: SignalPlan
+    command: Waveform
+    amplitude: Amplitude
+    experiment: Experiment
+    machine: LinearisedModel
+    prediction: Prediction
+    distortion: Distortion
+    bias: Mapping[str, float]
+    visible: Sequence[int]
+    output: Array
+    still: Array
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user should know, one line each."""
+        found = []
+        if self.distortion.total > STRONG:
+            found.append(
+                f"the response departs from a linear one by {self.distortion.total:.1%}: transfer functions are distorted; "
+                "--max-distortion bounds it"
+            )
+        worst = max(self.bias, key=lambda name: abs(self.bias[name]), default=None)
+        if worst is not None and abs(self.bias[worst]) > BIASED:
+            found.append(
+                f"a fit to transfer functions would be biased, {worst} by {abs(self.bias[worst]):.2g} standard deviations; the "
+                "joint fit of `rhythmid identify` simulates the nonlinear machine and is not"
+            )
+        apart = self.requirements.harmonics + self.plan.facts.get("empty_classes", 0) // 2
+        beyond = [m for m in self.visible if m > apart]
+        if beyond:
+            found.append(
+                f"harmonic ±{beyond[0]} of the response stands out of the noise too; --harmonics {beyond[-1]} keeps it apart"
+            )
+        return tuple(found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON of `design --json`; plain numbers, lists and strings."""
+        lines = self.plan.response
+        return {
+            "kind": self.requirements.kind,
+            "duration": self.command.duration,
+            "rate": self.requirements.rate,
+            "amplitude": {
+                "peak": self.command.peak,
+                "rms": float(np.sqrt(np.mean(self.command.values**2))),
+                "crest_factor": self.command.crest_factor,
+                "limited_by": self.amplitude.limited_by,
+                "unit": self.experiment.model.units.force,
+            },
+            "position": {
+                "low": self.amplitude.low,
+                "high": self.amplitude.high,
+                "cycle": [float(self.still.min()), float(self.still.max())],
+                "unit": self.experiment.model.units.position,
+            },
+            "signal": {
+                **self.plan.facts,
+                "lead_in": self.plan.lead_in,
+                "window": self.plan.window,
+                "harmonics": lines.harmonics,
+                "frequencies": lines.frequency.tolist(),
+            },
+            "parameters": {name: e.to_dict() for name, e in self.prediction.parameters.items()},
+            "delays": {name: e.to_dict() for name, e in self.prediction.delays.items()},
+            "distortion": {"even": self.distortion.even, "odd": self.distortion.odd},
+            "bias_of_transfer_functions": dict(self.bias),
+            "visible_harmonics": list(self.visible),
+            "notes": list(self.notes),
+        }
+
+
+def with_delays(model: Model, requirements: Requirements, catalogue: Catalogue) -> Model:
+    """The model with both delays at their expected values."""
+    for name, value in (
+        (INPUT_DELAY, requirements.input_delay),
+        (MEASUREMENT_DELAY, requirements.measurement_delay),
+    ):
+        label = name.split(".")[0]
+        if model.term(label) is None:
+            model = model.with_element(catalogue[label], {"delay": value})
+        else:
+            model = model.with_values({name: value})
+    return model
+
+
+def planned_experiment(model: Model, command: Waveform, requirements: Requirements) -> Experiment:
+    """The run of this command, in simulated time, as the experiment file will describe it."""
+    return Experiment(
+        without_forcing(model), Path("model.yaml"), command, {"type": "samples"},
+        forcing=requirements.forcing, input_delay=Delay(requirements.input_delay),
+        measurement_delay=Delay(requirements.measurement_delay), noise=Noise(requirements.noise_std),
+        time=TimeMode(rate=requirements.rate), duration=command.duration,
+    )  # fmt: skip
+
+
+def forcing_of(model: Model) -> Forcing:
+    """The model's own forcing where it has one, else the paper's."""
+    term = model.term("periodic_forcing")
+    return (
+        Forcing() if term is None else Forcing(**{name: value.value for name, value in term.values.items()})
+    )
+
+
+def design(
+    model: Model,
+    requirements: Requirements,
+    catalogue: Catalogue | None = None,
+    progress: Progress | None = None,
+) -> Design:
+    """Design a run of the `model`, whose values are taken for the truth.
+
+    Raises InputError, in one line, for a design that aliases, does not fit into its duration or envelope, or could not
+    determine a free parameter.
+    """
+    told = progress or (lambda _: None)
+    machine = with_delays(model, requirements, load_catalogue() if catalogue is None else catalogue)
+    forcing = requirements.forcing
+    pumping = Pumping.cosine(forcing.amplitude, forcing.frequency, forcing.phase)
+    told("finding the limit cycle")
+    plain = without_forcing(machine).with_values(dict.fromkeys(DELAYS, 0.0))
+    linear = linearised(plain, pumping)
+    ring_down = linear.cycle.ring_down
+    if not np.isfinite(ring_down):
+        raise InputError(
+            "the limit cycle is not stable: a command would not die out, and no run is long enough"
+        )
+    require_unambiguous_delays(linear.cycle, requirements.longest_delay)
+    if requirements.kind == "comb":
+        plan = chirp_comb(requirements, ring_down)
+    else:
+        plan = interleaved_multisine(requirements, ring_down, progress)
+    shape = sampled(plan.excitation, requirements.duration, requirements.rate)
+    settled = round(plan.lead_in * requirements.rate)
+    told("simulating the limit cycle over the run")
+    rehearsal = Rehearsal(planned_experiment(machine, shape, requirements), shape)
+    amplitude = largest_amplitude(rehearsal, requirements, settled, progress)
+    command = shape.with_peak(amplitude.peak)
+    experiment = planned_experiment(machine, command, requirements)
+    told("predicting the standard deviations")
+    prediction = predict(machine, experiment, requirements.noise_std)
+    told("predicting the distortion")
+    bent = distortion(rehearsal, amplitude.peak, settled)
+    record = prediction.record
+    density = requirements.noise_std**2 / requirements.rate
+    return Design(
+        requirements, plan, command, amplitude, experiment, linear, prediction, bent,
+        linearised_bias(prediction.fit, bent.signal), visible_sidebands(record, plain, pumping, density),
+        rehearsal.output(amplitude.peak), rehearsal.output(0.0),
+    )  # fmt: skip

@@ -1,0 +1,131 @@
+"""Interleaved multisine: equally spaced odd lines, placed so that every response line belongs to one line and harmonic.
+
+The period holds an even number P of pumping periods, so the responses of odd lines, at all harmonics, are odd, and even
+distortion falls on even bins. Of every four lines one, drawn at random, is left out: what shows at it is odd distortion
+(the random-odd grid of R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., 2012,
+section 4.3). Equal spacing allows a small crest factor.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from rhythmid.design.crest_factor import least_crest
+from rhythmid.design.requirements import Requirements
+from rhythmid.design.response_lines import Lines, ResponseLines
+from rhythmid.design.signal_plan import SignalPlan, duration_for, lead_in, shortest_repeat
+from rhythmid.errors import InputError
+from rhythmid.excitation.multisine import Multisine
+
+REPEATS = 2  # of the period: what differs between them is noise
+GROUP = 4  # of lines, one of which is left out
+FEWEST = 4  # lines that are worth the name
+
+
+def _pumping_periods(requirements: Requirements, ring_down: float) -> tuple[int, int]:
+    """Pumping periods P in a period of the multisine, even, and its repeats. Raises InputError where none fit."""
+    frequency = requirements.forcing.frequency
+    available = (requirements.duration - lead_in(requirements, ring_down)) * frequency
+    least = 2 * math.ceil(0.5 * shortest_repeat(ring_down) * frequency)
+    if requirements.period is not None:
+        exact = requirements.period * frequency
+        periods = round(exact)
+        if abs(exact - periods) > 1e-6 or periods % 2 or periods < 2:
+            near = max(2, 2 * round(0.5 * exact)) / frequency
+            raise InputError(
+                f"--period {requirements.period:g} s aliases: it does not hold an even number of forcing periods of "
+                f"{1.0 / frequency:g} s, so sidebands fall between the lines or on them; the nearest that does is {near:g} s"
+            )
+        repeats = math.floor(available / periods + 1e-9)
+        needed = periods
+    else:
+        repeats = REPEATS if available >= REPEATS * least else 1
+        periods = 2 * math.floor(0.5 * available / repeats + 1e-9)
+        needed = least
+    if requirements.period is not None and periods < least:
+        raise InputError(
+            f"--period {requirements.period:g} s is too short: the machine's ring-down asks for {least / frequency:g} s at least"
+        )
+    if repeats < 1 or periods < least:
+        longer = math.ceil(duration_for(needed / frequency, requirements, ring_down))
+        raise InputError(
+            f"--duration {requirements.duration:g} s is too short for a multisine of {needed / frequency:g} s behind a lead-in "
+            f"that lets the machine settle; at least {longer} s are needed"
+        )
+    return periods, repeats
+
+
+def spaced_lines(first: int, last: int, spacing: int) -> Lines:
+    """Every `spacing`-th bin from `first` to `last`."""
+    return np.arange(first, last + 1, spacing)
+
+
+def closest_lines(low: int, high: int, periods: int, harmonics: int, spacings: range) -> Lines | None:
+    """Odd lines within bins low … high, the most closely spaced whose responses all have a bin of their own; None where no
+    four of them do."""
+    for spacing in spacings:
+        for first in range(low | 1, min(low + spacing, high) + 1, 2):
+            lines = spaced_lines(first, high, spacing)
+            if len(lines) >= FEWEST and ResponseLines(lines, periods, 1.0, harmonics).separate:
+                return lines
+    return None
+
+
+def thinned(lines: Lines, seed: int) -> Lines:
+    """The lines without one of every four, drawn at random, for odd distortion to show; all where they are few."""
+    if len(lines) < 2 * GROUP:
+        return lines
+    rng = np.random.default_rng(seed)
+    out = [group + int(rng.integers(1, GROUP)) for group in range(0, len(lines) - GROUP + 1, GROUP)]
+    return np.delete(lines, out)
+
+
+def interleaved_multisine(
+    requirements: Requirements, ring_down: float, progress: Callable[[str], None] | None = None
+) -> SignalPlan:
+    """The multisine with the longest period that fits twice behind its lead-in; `ring_down` [s] is the machine's.
+
+    Raises InputError when the run is too short for it, or when responses would fall on one another.
+    """
+    frequency = requirements.forcing.frequency
+    periods, repeats = _pumping_periods(requirements, ring_down)
+    period = periods / frequency
+    low = max(1, math.ceil(requirements.band[0] * period - 1e-9))
+    high = math.floor(requirements.band[1] * period + 1e-9)
+    harmonics = requirements.harmonics
+    if requirements.spacing is None:
+        spaced = closest_lines(low, high, periods, harmonics, range(2, max(3, high - low), 2))
+        if spaced is None:
+            raise InputError(
+                f"the design aliases: no {FEWEST} lines between {requirements.band[0]:g} and {requirements.band[1]:g} Hz with a "
+                f"period of {period:g} s keep their sidebands up to ±{harmonics} apart; use a longer --duration, a wider "
+                "--band or fewer --harmonics"
+            )
+    else:
+        spacing = 2 * round(0.5 * requirements.spacing * period)
+        if spacing < 2 or len(spaced_lines(low | 1, high, max(spacing, 2))) < FEWEST:
+            raise InputError(
+                f"--spacing {requirements.spacing:g} Hz leaves fewer than {FEWEST} odd lines of 1/{period:g} Hz in the band"
+            )
+        spaced = closest_lines(low, high, periods, harmonics, range(spacing, spacing + 1))
+        if spaced is None:
+            tried = spaced_lines(low | 1, high, spacing)
+            ResponseLines(tried, periods, 1.0 / period, harmonics).require_separate(
+                "leave out --spacing and the closest that does not alias is chosen"
+            )
+            raise AssertionError("unreachable: the first offset was found to alias")
+    lines = thinned(spaced, requirements.seed)
+    weights = np.ones(len(lines))
+    _, phases = least_crest(lines, weights, requirements.seed, progress)
+    sine = Multisine(
+        rms=1.0, period=period, periods=math.ceil(requirements.duration / period),
+        lines=tuple(int(k) for k in lines), weights=tuple(weights), phases=tuple(float(p) for p in phases),
+    )  # fmt: skip
+    window = repeats * period
+    response = ResponseLines(repeats * lines, repeats * periods, 1.0 / window, harmonics)
+    facts = {
+        "period": period, "repeats": repeats, "lines": len(lines), "spacing": float(spaced[1] - spaced[0]) / period,
+        "left_out": [float(k / period) for k in np.setdiff1d(spaced, lines)],
+    }  # fmt: skip
+    return SignalPlan(sine, period, window, requirements.duration - window, response, facts)

@@ -1,0 +1,32 @@
+"""The planned run, simulated at any amplitude and without noise: what the machine would do."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.design.waveform import Waveform
+from rhythmid.errors import InputError
+from rhythmid.experiment import Experiment, perform
+from rhythmid.settings import Noise, Safety
+
+Array = NDArray[np.float64]
+KEPT = 8  # simulated runs that are remembered
+
+
+class Rehearsal:
+    """Runs of one `experiment` with commands of one shape."""
+
+    def __init__(self, experiment: Experiment, waveform: Waveform) -> None:
+        self._experiment = replace(experiment, noise=Noise(), safety=Safety(max_effort=np.inf))
+        self._waveform = waveform
+        self.output = lru_cache(maxsize=KEPT)(self._output)
+
+    def _output(self, amplitude: float) -> Array:
+        """Measured position [m] (n,) with the command's peak at `amplitude` [N]; negative turns the command over."""
+        command = self._waveform.with_peak(amplitude)
+        done = perform(replace(self._experiment, excitation=command))["joint_states"].position
+        if done is None or not np.isfinite(done).all():
+            raise InputError(f"the machine diverges under a command of {abs(amplitude):g}")
+        return done

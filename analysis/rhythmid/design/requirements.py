@@ -1,0 +1,98 @@
+"""What a user asks of an experiment before it is designed."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from rhythmid.errors import InputError
+from rhythmid.settings import Forcing
+
+Kind = Literal["comb", "multisine"]
+KINDS: tuple[Kind, ...] = ("comb", "multisine")
+
+
+@dataclass(frozen=True)
+class Requirements:
+    """Length, limits and circumstances of the run to be designed.
+
+    `duration` [s]; `band` of the command [Hz]; `max_effort` largest |u| [N]; `envelope` of the measured position [m];
+    `noise_std` of a single measured sample [m]; `kind` a comb of shifted chirps or an interleaved multisine; `rate` [Hz];
+    `harmonics` M: responses at ω + mω_p, |m| ≤ M, are to stay apart; `forcing` on the robot; `input_delay` and
+    `measurement_delay` [s] as expected; `longest_delay` [s] that either may have; `max_distortion`, a share of the
+    response that the nonlinear part may reach, None for any. `shifts` K of a comb, `period` [s] and `spacing` [Hz] of a
+    multisine's lines are chosen where they are None. Raises InputError, naming the option, for what contradicts itself.
+    """
+
+    duration: float
+    band: tuple[float, float]
+    max_effort: float
+    envelope: tuple[float, float]
+    noise_std: float
+    kind: Kind = "multisine"
+    rate: int = 1000
+    harmonics: int = 3
+    forcing: Forcing = Forcing()
+    input_delay: float = 0.0
+    measurement_delay: float = 0.0
+    longest_delay: float = 0.3
+    max_distortion: float | None = None
+    shifts: int | None = None
+    period: float | None = None
+    spacing: float | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, value in (
+            ("duration", self.duration),
+            ("max-effort", self.max_effort),
+            ("noise-std", self.noise_std),
+        ):
+            if not (value > 0.0 and math.isfinite(value)):
+                raise InputError(f"--{name} {value:g}: a finite number greater than 0 is expected")
+        if self.kind not in KINDS:
+            raise InputError(f"--kind {self.kind}: one of {', '.join(KINDS)} is expected")
+        low, high = self.band
+        if not 0.0 <= low < high < math.inf:
+            raise InputError(f"--band {low:g} {high:g}: two frequencies in Hz are expected, 0 ≤ low < high")
+        if not self.envelope[0] < self.envelope[1]:
+            raise InputError(
+                f"--envelope {self.envelope[0]:g} {self.envelope[1]:g}: two positions low < high are expected"
+            )
+        if self.max_distortion is not None and not self.max_distortion > 0.0:
+            raise InputError(
+                f"--max-distortion {self.max_distortion:g}: a share of the response greater than 0 is expected"
+            )
+        if self.rate < 1 or self.harmonics < 1:
+            raise InputError("--rate and --harmonics are whole numbers greater than 0")
+        if self.forcing.amplitude == 0.0 or not self.forcing.frequency > 0.0:
+            raise InputError(
+                "without forcing there is no limit cycle to excite about; give --forcing AMPLITUDE FREQUENCY"
+            )
+        for name, value in (("input", self.input_delay), ("measurement", self.measurement_delay)):
+            if not 0.0 <= value <= self.longest_delay:
+                raise InputError(
+                    f"the {name} delay of {value:g} s is outside 0 to {self.longest_delay:g} s; "
+                    "give --delays and --longest-delay that agree"
+                )
+        self._sampled()
+        foreign = {
+            "comb": {"period": self.period, "spacing": self.spacing},
+            "multisine": {"shifts": self.shifts},
+        }
+        for name, value in foreign[self.kind].items():
+            if value is not None:
+                raise InputError(f"--{name} is none of a {self.kind}'s options")
+
+    def _sampled(self) -> None:
+        """Refuse a band, or sidebands of it, beyond the Nyquist frequency."""
+        high, nyquist = self.band[1], 0.5 * self.rate
+        if high >= nyquist:
+            raise InputError(
+                f"--band up to {high:g} Hz aliases: at {self.rate} Hz nothing beyond {nyquist:g} Hz is sampled"
+            )
+        top = high + self.harmonics * self.forcing.frequency
+        if top >= nyquist:
+            raise InputError(
+                f"sideband +{self.harmonics} of {high:g} Hz lies at {top:g} Hz and aliases: at {self.rate} Hz nothing beyond "
+                f"{nyquist:g} Hz is sampled; lower --band or --harmonics, or raise --rate"
+            )

@@ -1,0 +1,68 @@
+"""Where the responses to the lines of a command fall, and whether any two fall on one another.
+
+A machine pumped at ω_p answers a line at ω with lines at ω + mω_p, and at the mirror images −ω + mω_p. Over a window of P
+pumping periods these are the bins |l + mP|. Harmonic transfer functions can be read off line by line only where all of
+them differ, and differ from the limit cycle's own bins nP (E. Louarroudi et al., IEEE TIM 61(5), 2012).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.errors import InputError
+
+Lines = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseLines:
+    """Excited bins `lines` (n,) of width `resolution` [Hz] in a window of `periods` P pumping periods, and the largest harmonic
+    M that is to stay apart."""
+
+    lines: Lines
+    periods: int
+    resolution: float
+    harmonics: int
+
+    @property
+    def frequency(self) -> NDArray[np.float64]:
+        """Excited frequencies [Hz] (n,)."""
+        return self.lines.astype(np.float64) * self.resolution
+
+    @property
+    def orders(self) -> Lines:
+        """−M … M."""
+        return np.arange(-self.harmonics, self.harmonics + 1)
+
+    @property
+    def bins(self) -> Lines:
+        """Bins of the responses |l + mP|, shape (2M + 1, n)."""
+        return np.abs(self.lines[None, :] + self.orders[:, None] * self.periods)
+
+    @property
+    def separate(self) -> bool:
+        """Whether every response has a bin of its own."""
+        bins = self.bins
+        return len(np.unique(bins)) == bins.size and not np.any(bins % self.periods == 0)
+
+    def require_separate(self, remedy: str) -> None:
+        """Raise InputError naming two responses that coincide, and the `remedy`."""
+        if self.separate:
+            return
+        bins = self.bins
+        on_cycle = np.argwhere(bins % self.periods == 0)
+        if len(on_cycle):
+            m, n = on_cycle[0]
+            raise InputError(
+                f"the design aliases: the line at {self.frequency[n]:.6g} Hz lies on a harmonic of the forcing, where the limit "
+                f"cycle hides its response; {remedy}"
+            )
+        order = np.argsort(bins, axis=None, kind="stable")
+        same = int(np.flatnonzero(np.diff(bins.ravel()[order]) == 0)[0])
+        (m, n), (other, k) = (np.unravel_index(order[same + i], bins.shape) for i in (0, 1))
+        raise InputError(
+            f"the design aliases: the responses to {self.frequency[n]:.6g} Hz at m = {self.orders[m]:+d} and to "
+            f"{self.frequency[k]:.6g} Hz at m = {self.orders[other]:+d} both fall on "
+            f"{bins[m, n] * self.resolution:.6g} Hz; {remedy}"
+        )
