@@ -3,23 +3,35 @@
 import json
 import math
 import os
+import tempfile
 from pathlib import Path
 from typing import Any
 
 from rhythmid.errors import InputError
 
 
-def require_new(path: Path | None) -> None:
-    """Refuse, before any work, a result that would overwrite something or cannot be written."""
-    if path is None:
-        return
-    if path.exists():
-        raise InputError(f"{path}: exists already; name another file or remove it")
-    folder = path.absolute().parent
-    if not folder.is_dir():
-        raise InputError(f"{path}: the folder {folder} does not exist")
-    if not os.access(folder, os.W_OK):
-        raise InputError(f"{path}: the folder {folder} is not writable")
+def require_new(*paths: Path | None) -> None:
+    """Refuse, before any work, results that would overwrite something or one another, or that cannot be written."""
+    given = [path for path in paths if path is not None]
+    for number, path in enumerate(given):
+        if os.path.lexists(path):
+            raise InputError(f"{path}: exists already; name another file or remove it")
+        if path.absolute() in [other.absolute() for other in given[:number]]:
+            raise InputError(f"{path}: is named for two results; give each a file of its own")
+        folder = path.absolute().parent
+        if not folder.is_dir():
+            raise InputError(f"{path}: the folder {folder} does not exist")
+        require_writable(folder, path)
+
+
+def require_writable(folder: Path, path: Path) -> None:
+    """Refuse a `folder` in which the result `path` cannot be made."""
+    try:  # permissions alone do not tell: file systems may be read-only, full, or no place for files
+        probe, name = tempfile.mkstemp(prefix=".rhythmid.", dir=folder)
+        os.close(probe)
+        os.unlink(name)
+    except OSError as error:
+        raise InputError(f"{path}: the folder {folder} cannot be written to: {error.strerror}") from None
 
 
 def write_text(path: Path, text: str) -> None:

@@ -14,7 +14,8 @@ def check(
     signals: SignalsFile = None,
     json: JsonFile = None,
 ) -> None:
-    """Report data quality: topics, rates, gaps, duplicates, jitter, clock."""
+    """Report data quality: topics, rates, gaps, duplicates, jitter, clock. Exit code 2 if it cannot be used."""
+    from rhythmid.errors import InputError
     from rhythmid.record.bag_report import quality_report
 
     require_new(json)
@@ -23,3 +24,5 @@ def check(
         typer.echo(line)
     if json is not None:
         write_json(json, report.to_dict())
+    if not report.usable:
+        raise InputError("; ".join(report.problems))

@@ -48,8 +48,7 @@ def identify(
     from rhythmid.model import Model
     from rhythmid.record.read import load_records
 
-    for path in (json, report, save_model, save):
-        require_new(path)
+    require_new(json, report, save_model, save)
     if method not in get_args(Method):
         raise InputError(f"--method {method}: one of {', '.join(get_args(Method))} is expected")
     if forcing is not None and forcing not in get_args(Forcing):

@@ -22,8 +22,7 @@ def table1(
     from rhythmid.table1 import format_table
     from rhythmid.table1 import table1 as run
 
-    for path in (json, out):
-        require_new(path)
+    require_new(json, out)
     folder = out or Path(tempfile.mkdtemp(prefix="rhythmid_table1_"))
     with Console(stderr=True).status("simulating") as status:
         rows = run(folder, tell=status.update)

@@ -234,7 +234,8 @@ def _joint(
 
 
 def _notes(record: Record, result: PaperResult) -> Iterator[str]:
-    """What should make a user doubt the paper's method here."""
+    """What should make a user doubt the record, or the paper's method here."""
+    yield from (f"{record.name}: {note}" for note in record.quality.notes)
     window, operator = result.spectra.window, result.estimate.operator
     if window.leakage > LEAKAGE:
         yield (

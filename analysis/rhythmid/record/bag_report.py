@@ -94,7 +94,7 @@ class BagReport:
         }
 
     def lines(self) -> list[str]:
-        """The report as plain text."""
+        """The report as plain text, without the problems."""
         found = [f"{self.path}: {self.size / 1e6:.1f} MB, {self.duration:.3f} s, {len(self.topics)} topics"]
         width = max((len(topic.name) for topic in self.topics), default=0)
         for topic in self.topics:
@@ -110,7 +110,6 @@ class BagReport:
         for role, channel in self.channels.items():
             found.append(f"  {role}: {channel.source}: " + ("; ".join(channel.complaints()) or "flawless"))
         found += [f"  note: {note}" for note in self.notes]
-        found += [f"  problem: {problem}" for problem in self.problems]
         return found
 
 
@@ -121,6 +120,8 @@ def quality_report(source: str | Path, signals: Signals | str | Path | None = No
     recording at all.
     """
     source = Path(source)
+    if isinstance(signals, (str, Path)):
+        signals = Signals.load(signals)
     channels: dict[str, ChannelQuality] = {}
     problems: list[str] = []
     notes: list[str] = []

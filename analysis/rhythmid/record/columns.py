@@ -52,8 +52,12 @@ class _Reader:
     singly: int = 0
 
     def __post_init__(self) -> None:
+        types = type_fields(self.topic)
         for wanted in self.fields:
-            wanted.check(self.topic.type, type_fields(self.topic))
+            try:
+                wanted.check(self.topic.type, types)
+            except InputError as error:
+                raise InputError(f"topic {self.topic.name}: {error}") from None
         stamp = stamp_path(self.topic)
         self.has_stamp = stamp is not None
         self.paths = [*self.fields, *(Field.parse(f"{stamp}.{part}") for part in ("sec", "nanosec") if stamp)]

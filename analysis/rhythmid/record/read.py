@@ -20,6 +20,8 @@ from rhythmid.record.table import Table
 from rhythmid.record.timing import Timing, put_in_order
 from rhythmid.signal import Hold
 
+AMBIGUOUS = 0.01  # share of samples that may have the time of another one with another value
+CLOCKS_APART = 1.0  # seconds between the ages at receipt of two channels, from which their stamps hardly share a clock
 RUN_CLOCK = 10.0  # seconds; a clock that reads less at the first sample started with the run
 SAMPLES_PER_CYCLE = 100  # of a forcing that is given by formula
 
@@ -169,7 +171,8 @@ def _from_columns(
     """Times [ns] and samples of one channel, in the order of recording."""
     if source.topic not in bag.topics:
         listed = ", ".join(sorted(bag.topics)) or "none"
-        raise InputError(f"{source.place}topic {source.topic} is not in {bag.path}; its topics: {listed}")
+        mend = "" if signals.path else "; say with --signals which of them is what"
+        raise InputError(f"{source.place}topic {source.topic} is not in {bag.path}; its topics: {listed}{mend}")
     if source.topic not in columns:
         raise InputError(
             f"{source.place}topic {source.topic} in {bag.path} is empty: no message was recorded"
@@ -205,20 +208,27 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         timing = Timing.of(samples.time)
         kept = put_in_order(samples.time, label, mend)
         time, value = samples.time[kept], samples.value[kept]
+        conflicts = _conflicts(samples, time, value)
+        if conflicts > AMBIGUOUS * len(samples.time):
+            raise InputError(
+                f"{label}: {conflicts} of {len(samples.time)} samples have the time of another one with another value: "
+                f"two publishers, a clock set back or too coarse stamps; {mend}"
+            )
         judged[role] = ChannelQuality(
             str(samples.source),
             timing,
             nan=int(np.count_nonzero(~np.isfinite(samples.value))),
             clipped=clipped(value),
             missing=samples.missing,
-            conflicts=_conflicts(samples, time, value),
+            conflicts=conflicts,
             lateness_mean=None if samples.lateness is None else float(samples.lateness.mean()),
             lateness_max=None if samples.lateness is None else float(samples.lateness.max()),
         )
         channels[role] = Channel(time, value, samples.source.unit, str(samples.source))
+    notes = (*quality.notes, *_clock_notes(judged))
     return Record(
         name, input_kind=signals.input_kind, forcing_law=signals.forcing_law,
-        quality=replace(quality, channels=judged), **channels,
+        quality=replace(quality, channels=judged, notes=notes), **channels,
     )  # fmt: skip
 
 
@@ -243,6 +253,11 @@ def _finish(record: Record, signals: Signals) -> Record:
         raise InputError(
             f"{record.name}: {record.output.source} has only {len(record.output)} samples: too short"
         )
+    if np.ptp(record.output.value) == 0.0:
+        raise InputError(
+            f"{record.name}: {record.output.source} never changes; nothing can be learnt from it"
+        )
+    _require_overlap(record)
     frequency = _pumping_frequency(record)
     if frequency > 0.0 and record.duration * frequency < 1.0:
         raise InputError(
@@ -255,6 +270,30 @@ def _finish(record: Record, signals: Signals) -> Record:
     start = min(first for first, _ in ends)
     time = start + np.arange(np.ceil((max(last for _, last in ends) - start) / step) + 1) * step
     return replace(record, forcing=Channel(time, record.forcing_law(time), "N", "formula"))
+
+
+def _require_overlap(record: Record) -> None:
+    """Refuse channels that were not recorded at the time of the output: most likely their clocks differ."""
+    first, last = record.output.time[0], record.output.time[-1]
+    least = (SHORTEST - 1) * record.output.period
+    for role, channel in record.channels.items():
+        start, end = max(first, channel.time[0]), min(last, channel.time[-1])
+        if role == "input" and record.hold == "zero" and (end >= first or len(channel) == 1):
+            end = last  # the last command stays in force
+        if end - start < 0.999 * least:
+            raise InputError(
+                f"{record.name}: {role} ({channel.time[0]:.6g} to {channel.time[-1]:.6g} s) and output ({first:.6g} to "
+                f"{last:.6g} s) were not recorded at the same time; if their stamps come from two clocks, use  time: receive"
+            )
+
+
+def _clock_notes(channels: Mapping[str, ChannelQuality]) -> tuple[str, ...]:
+    """A note if channels are stamped by clocks that cannot be the same."""
+    age = {role: channel.lateness_mean for role, channel in channels.items() if channel.lateness_mean is not None}
+    if not age or max(age.values()) - min(age.values()) < CLOCKS_APART:
+        return ()
+    told = ", ".join(f"{role} {seconds:.6g} s" for role, seconds in age.items())
+    return (f"stamps of different clocks: received after their stamps by {told}; use  time: receive",)
 
 
 def _pumping_frequency(record: Record) -> float:

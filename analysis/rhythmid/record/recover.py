@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 
-import numpy as np
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import ReaderError
 from rosbags.rosbag2.metadata import parse_qos
@@ -47,17 +47,16 @@ def recover(path: str | Path, out: str | Path, storage: Storage = "mcap") -> Rec
                         connections[name] = _declare(writer, block.topic)
                     except InputError as error:
                         left_out[name] = f"left out: {error}"
-            blocks = [block for block in blocks if block.topic.name in connections]
             messages = [
-                (connections[block.topic.name], time, data)
+                (start, block.topic.name, time, data)
                 for block in blocks
-                for time, data in zip(block.log_ns.tolist(), block)
+                if block.topic.name in connections
+                for start, time, data in zip(block.start.tolist(), block.log_ns.tolist(), block)
+                if time >= 0  # no clock reads less: such a message is damaged
             ]
-            starts = [block.start for block in blocks] or [np.empty(0, dtype=np.int64)]
-            for index in np.argsort(np.concatenate(starts), kind="stable").tolist():
-                writer.write(*messages[index])
-            for block in blocks:
-                counts[block.topic.name] = counts.get(block.topic.name, 0) + len(block)
+            for _, name, time, data in sorted(messages, key=itemgetter(0)):
+                writer.write(connections[name], time, data)
+                counts[name] = counts.get(name, 0) + 1
         if not counts:
             raise InputError(f"{path}: holds no readable message; nothing was recovered")
     return Recovered(Path(out), counts, (*bag.notes, *left_out.values()))

@@ -1,9 +1,12 @@
 """sqlite3 storage files of rosbag2, also those whose recorder was killed in the middle of a transaction."""
 
+import os
 import shutil
 import sqlite3
+import struct
 from collections.abc import Iterator
 from contextlib import closing
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -19,13 +22,15 @@ class SqliteReader:
     """One .db3 file. `truncated` tells whether its recorder was killed; `topics` lists all topics once opened.
 
     A journal beside the file holds what sqlite needs to undo or finish the last transaction. That needs writing, so
-    file and journal are copied and the copy is opened; the recording itself is never changed.
+    file and journal are copied and the copy is opened; the recording itself is never changed. So is a file that was cut
+    off, to be read up to the cut.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.topics: dict[str, Topic] = {}
         self.damage: list[str] = []
+        self._fetched = 0
         self._journals = [
             journal for end in ("-journal", "-wal")
             if (journal := path.with_name(path.name + end)).is_file() and journal.stat().st_size
@@ -36,19 +41,26 @@ class SqliteReader:
         """Messages of the wanted topics, block by block in the order of recording."""
         try:
             with self.path.open("rb") as file:
-                if file.read(15) != b"SQLite format 3":
-                    raise InputError(
-                        f"{self.path}: is not an sqlite3 bag (it does not start like an sqlite database)"
-                    )
-            if not self._journals:
+                head = file.read(32)
+            if not head.startswith(b"SQLite format 3"):
+                raise InputError(
+                    f"{self.path}: is not an sqlite3 bag (it does not start like an sqlite database)"
+                )
+            whole = _size_by_header(head)
+            cut_off = self.path.stat().st_size < whole and not self._journals
+            if not self._journals and not cut_off:
                 yield from self._read(self.path, "mode=ro", wanted)
                 return
             with TemporaryDirectory(prefix="rhythmid-") as folder:
                 for file in (self.path, *self._journals):
-                    shutil.copy(file, folder)
-                yield from self._read(Path(folder) / self.path.name, "mode=rw", wanted)
+                    shutil.copyfile(file, Path(folder) / file.name)
+                copy = Path(folder) / self.path.name
+                if cut_off:
+                    os.truncate(copy, whole)  # zeros for what is lost, or sqlite would not even read what is there
+                yield from self._read(copy, "mode=rw", wanted)
         except sqlite3.Error as error:
-            raise InputError(f"{self.path}: is not a readable sqlite3 bag: {error}") from None
+            reason = " ".join(str(error).split())[:200]  # sqlite quotes whole columns
+            raise InputError(f"{self.path}: is not a readable sqlite3 bag: {reason}") from None
         except OSError as error:
             raise InputError(f"{self.path}: cannot be read: {error.strerror or error}") from None
 
@@ -61,13 +73,39 @@ class SqliteReader:
                 f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({','.join(map(str, chosen))})"
                 " ORDER BY id"
             )
-            while batch := rows.fetchmany(_ROWS):
+            while batch := self._fetch(rows):
                 number, log_ns, data = zip(*batch, strict=True)
                 size = np.fromiter(map(len, data), dtype=np.int64, count=len(data))
                 start = np.cumsum(size) - size
                 yield from by_topic(
                     chosen, np.array(number), b"".join(data), start, size, np.array(log_ns, dtype=np.int64)
                 )
+
+    def _fetch(self, rows: sqlite3.Cursor) -> list[tuple[int, int, bytes]]:
+        """The next rows; where the file is cut off or damaged, those that precede the break."""
+        batch: list[tuple[int, int, bytes]] = []
+        if self.damage:
+            return batch
+        try:
+            for row in islice(rows, _ROWS):
+                if list(map(type, row)) != [int, int, bytes]:
+                    raise sqlite3.DatabaseError("what follows is no message")
+                batch.append(row)
+        except sqlite3.DatabaseError as error:
+            if not self._fetched and not batch:
+                raise
+            self.damage.append(f"is damaged after {self._fetched + len(batch)} messages: {error}")
+            self.truncated = True
+        self._fetched += len(batch)
+        return batch
+
+
+def _size_by_header(head: bytes) -> int:
+    """Size [bytes] of a database by the first 32 of its bytes (https://sqlite.org/fileformat.html); 0 if not stated."""
+    if len(head) < 32:
+        return 0
+    page, pages = struct.unpack_from(">H", head, 16)[0], struct.unpack_from(">I", head, 28)[0]
+    return (65536 if page == 1 else page) * pages
 
 
 def _topics(database: sqlite3.Connection) -> dict[int, Topic]:
@@ -81,7 +119,10 @@ def _topics(database: sqlite3.Connection) -> dict[int, Topic]:
     stored = {column[1] for column in database.execute("PRAGMA table_info(topics)")}
     qos = "offered_qos_profiles" if "offered_qos_profiles" in stored else "''"
     query = f"SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id"
+    found = list(database.execute(query))
+    if not all(isinstance(number, int) and {*map(type, texts)} == {str} for number, *texts in found):
+        raise sqlite3.DatabaseError("its table 'topics' holds no names and types")
     return {
         number: Topic(name, msgtype, encoding, *definitions.get(msgtype, ("", "")), profiles)
-        for number, name, msgtype, encoding, profiles in database.execute(query)
+        for number, name, msgtype, encoding, profiles in found
     }

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment
+from rhythmid.output import require_writable
 
 from .arguments import command, ros_arguments
 from .environment import own_domain, run_environment
@@ -29,9 +30,7 @@ def load(path: Path, out: Path | None) -> Experiment:
     bag = (out or experiment.record.path).absolute()
     if os.path.lexists(bag):
         raise InputError(f"{bag}: exists already and is not overwritten; choose another path or remove it")
-    folder = next(parent for parent in bag.parents if parent.exists())
-    if not (folder.is_dir() and os.access(folder, os.W_OK)):
-        raise InputError(f"{bag}: {folder} is not a folder that can be written to")
+    require_writable(next(parent for parent in bag.parents if parent.exists()), bag)
     return experiment.with_record(path=bag)
 
 
