@@ -6,14 +6,14 @@ without either the motion itself, which then hides any constant delay.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import next_fast_len
 from scipy.interpolate import CubicSpline
-from scipy.optimize import minimize_scalar
+from scipy.optimize import fminbound
 
 from rhythmid.errors import InputError
 from rhythmid.ltp.pumping import Pumping, pumping_of
@@ -75,10 +75,8 @@ def white_level(value: Array) -> float:
 def align(simulation: Record, recording: Record) -> Alignment:
     """Align a simulation with a recording. Raises InputError when they cannot overlap long enough to be compared."""
     if simulation.input is not None and recording.input is not None and simulation.input_kind != recording.input_kind:
-        return replace_mismatch(
-            _by_output(simulation, recording),
-            f"the simulation's input is a {simulation.input_kind}, the recording's a {recording.input_kind}",
-        )
+        kinds = f"the simulation's input is a {simulation.input_kind}, the recording's a {recording.input_kind}"
+        return replace(_by_output(simulation, recording), mismatch=kinds)
     given, seen = active(simulation.input), active(recording.input)
     if given and seen:
         assert simulation.input is not None and recording.input is not None
@@ -86,22 +84,17 @@ def align(simulation: Record, recording: Record) -> Alignment:
     found = _by_forcing(simulation, recording) or _by_output(simulation, recording)
     if given != seen:
         who = "only the simulation" if given else "only the recording"
-        return replace_mismatch(found, f"{who} has a command that does anything")
+        return replace(found, mismatch=f"{who} has a command that does anything")
     return found
-
-
-def replace_mismatch(found: Alignment, mismatch: str) -> Alignment:
-    """The alignment with a reason why the excitations are not the same."""
-    return Alignment(found.by, found.offset, found.std, found.turn, found.difference, mismatch)
 
 
 def _correlation(recording: Array, simulation: Array) -> tuple[Array, NDArray[np.int64]]:
     """Normalised correlation of two signals on one grid and its lags; what hardly overlaps counts for little."""
     n, m = len(recording), len(simulation)
-    size = next_fast_len(n + m - 1)
+    size = int(next_fast_len(n + m - 1) or n + m - 1)
 
     def correlate(a: Array, b: Array) -> Array:
-        return np.asarray(irfft(rfft(a, size) * np.conj(rfft(b, size)), size))
+        return np.fft.irfft(np.fft.rfft(a, size) * np.conj(np.fft.rfft(b, size)), size)
 
     product = correlate(recording, simulation)
     one = correlate(recording**2, np.ones(m))
@@ -151,8 +144,8 @@ def _refined(recording: Channel, simulation: Channel, offset: float, step: float
     def left(shift: float) -> float:
         return float(np.sum((value - known(time - offset - shift)) ** 2))
 
-    found = minimize_scalar(left, bounds=(-1.5 * step, 1.5 * step), method="bounded", options={"xatol": 1e-6 * step})
-    shift = float(found.x) if found.fun < left(0.0) else 0.0
+    found = float(np.asarray(fminbound(left, -1.5 * step, 1.5 * step, xtol=1e-6 * step)))
+    shift = found if left(found) < left(0.0) else 0.0
     slope = float(np.sum(known(time - offset - shift, 1) ** 2))
     variance = left(shift) / len(time)
     size = math.sqrt(max(float(np.mean(value**2)), float(np.mean(known(time - offset) ** 2)), 1e-300))

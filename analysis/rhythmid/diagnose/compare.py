@@ -22,6 +22,8 @@ from rhythmid.identify.output_error import estimate, start_only
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
+from rhythmid.report.comparison import LABELS
+from rhythmid.report.run import Run
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
@@ -185,6 +187,24 @@ def _size(value: float, unit: str) -> str:
     return f"{1e3 * value:.4g} ms" if unit == "s" else f"{value:.4g} {unit}".strip()
 
 
+def run_of(found: Comparison) -> Run:
+    """Recording and simulation as figures show them."""
+    pair = found.pair
+    return Run(
+        name=found.recording,
+        time=pair.time,
+        measured=pair.recording,
+        before=pair.simulation,
+        after=pair.recording - found.left if found.explanations else None,
+        position=pair.recording,
+        velocity=pair.velocity,
+        phase=pair.phase,
+        used=pair.used,
+        hidden=np.zeros_like(pair.used),
+        labels=LABELS,
+    )
+
+
 def compare(
     simulation: Record, recordings: Sequence[Record], model: Model | None = None, tell: Tell = lambda _: None
 ) -> Comparison:
@@ -200,7 +220,7 @@ def compare(
         tell("fitting the model to the simulation and running it with the recording's inputs")
         known, through = in_its_place(simulation, recording, model), True
     pair, notes = pair_of(known, recording, replace(alignment, offset=0.0, turn=0.0) if through else alignment)
-    notes = [*notes, *(record_note for record_note in _unit_notes(simulation, recording))]
+    notes = [*notes, *_unit_notes(simulation, recording)]
     difference = pair.recording - pair.simulation
     tell("explaining the difference")
     if alignment.mismatch and not through:
@@ -253,7 +273,7 @@ def place_of(pair: Pair, difference: Array) -> Place:
         phase = (int(np.argmax(around)) + 0.5) / PHASES
         phase_share = float(around.max() / max(sums.sum(), 1e-300))
     x, v = pair.recording, pair.velocity
-    edges = [np.linspace(*np.quantile(q, [0.01, 0.99]), CELLS + 1) for q in (x, v)]
+    edges = [np.linspace(float(np.quantile(q, 0.01)), float(np.quantile(q, 0.99)), CELLS + 1) for q in (x, v)]
     weight = np.histogram2d(x, v, edges, weights=square)[0]
     count = np.histogram2d(x, v, edges)[0]
     mean = np.where(count > 0.005 * len(x), weight / np.maximum(count, 1), 0.0)

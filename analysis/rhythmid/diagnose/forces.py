@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
-from scipy.optimize import minimize_scalar
+from scipy.optimize import fminbound
 
 from rhythmid.diagnose.pair import Pair
 from rhythmid.diagnose.ways import late_by
@@ -72,5 +72,5 @@ def foreign_line(pair: Pair, residual: Array) -> tuple[float, Array] | None:
         columns = waves(at)
         return float(np.sum((residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0]) ** 2))
 
-    found = minimize_scalar(left, bounds=(best - resolution, best + resolution), method="bounded")
-    return float(found.x), waves(float(found.x))
+    found = float(np.asarray(fminbound(left, best - resolution, best + resolution)))
+    return found, waves(found)

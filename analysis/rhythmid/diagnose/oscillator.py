@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import next_fast_len
 
 Array = NDArray[np.float64]
 
@@ -21,11 +21,11 @@ class Oscillator:
     def response(self, forces: Array, step: float) -> Array:
         """Motion (n, …) from rest under forces (n, …)."""
         n = len(forces)
-        size = next_fast_len(2 * n)
+        size = int(next_fast_len(2 * n) or 2 * n)
         s = 2j * np.pi * np.arange(size // 2 + 1) / (size * step)
         transfer = self.gain / (s * s + self.damping * s + self.omega**2)
         shape = (-1,) + (1,) * (forces.ndim - 1)
-        return np.asarray(irfft(transfer.reshape(shape) * rfft(forces, size, axis=0), size, axis=0))[:n]
+        return np.asarray(np.fft.irfft(transfer.reshape(shape) * np.fft.rfft(forces, size, axis=0), size, axis=0))[:n]
 
     def free(self, time: Array) -> Array:
         """What two unknown initial conditions do, (n, 2)."""
@@ -48,18 +48,18 @@ def oscillator_of(
         return fallback
     n = len(motion)
     window = np.hanning(n)
-    force = np.asarray(rfft((effort - effort.mean()) * window))
-    motion = np.asarray(rfft((motion - motion.mean()) * window))
+    force = np.fft.rfft((effort - effort.mean()) * window)
+    answer = np.fft.rfft((motion - motion.mean()) * window)
     frequency = np.arange(len(force)) / (n * step)
     kept = (frequency > 1.5 / (n * step)) & (frequency < bandwidth)
     kept &= np.abs(force) > 1e-3 * np.abs(force).max()
     if kept.sum() < 3:
         return fallback
-    s, force, motion = 2j * np.pi * frequency[kept], force[kept], motion[kept]
+    s, force, answer = 2j * np.pi * frequency[kept], force[kept], answer[kept]
     best, least = fallback, math.inf
     for delay in np.linspace(0.0, 0.5 / dominant, 26):
-        late = motion * np.exp(s * delay)
-        weight = np.ones(len(s))
+        late = answer * np.exp(s * delay)
+        weight, m, c, k = np.ones(len(s)), 1.0, 0.0, 1.0
         for _ in range(6):
             columns = np.column_stack([s * s * late, s * late, late]) * weight[:, None]
             target = force * weight

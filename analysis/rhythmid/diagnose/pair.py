@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, rfft
 
 from rhythmid.diagnose.align import Alignment, active, pumping, smooth, white_level
 from rhythmid.diagnose.oscillator import Oscillator, oscillator_of
@@ -50,11 +49,11 @@ class Pair:
         n = len(self.recording)
         line = np.linspace(self.recording[0], self.recording[-1], n)
         mirrored = np.concatenate([self.recording - line, -(self.recording - line)[-2:0:-1]])
-        spectrum = rfft(mirrored)
+        spectrum = np.fft.rfft(mirrored)
         frequency = np.arange(len(spectrum)) / (len(mirrored) * self.step)
         spectrum = spectrum * np.exp(-((frequency / (2.0 * self.bandwidth)) ** 4)) * 2j * np.pi * frequency
         slope = (self.recording[-1] - self.recording[0]) / ((n - 1) * self.step)
-        return np.asarray(irfft(spectrum, len(mirrored)))[:n] + slope
+        return np.asarray(np.fft.irfft(spectrum, len(mirrored)))[:n] + slope
 
 
 def harmonic_columns(time: Array, frequency: float, count: int) -> Array:

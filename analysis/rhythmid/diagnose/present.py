@@ -1,11 +1,13 @@
 """From a diagnosis' answer to the plain data that its report draws."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 
+from rhythmid.diagnose.compare import Comparison, run_of
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.diagnosis import Answer
 from rhythmid.diagnose.locate import Dependence
@@ -19,6 +21,7 @@ from rhythmid.ltp.htf import theoretical_htf
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
 from rhythmid.record.record import Record
+from rhythmid.report.comparison import comparison_page, comparison_section
 from rhythmid.report.diagnosis import diagnosis_page
 from rhythmid.report.findings import ElementScore, ElementWords, Findings, FreeFunction, TransferChange
 from rhythmid.report.page import Page
@@ -39,12 +42,24 @@ def present(
     holdout: Sequence[Record] = (),
     command: str = "",
     name: str = "the nominal model",
+    comparison: Comparison | None = None,
 ) -> Page:
     """The report of an answer.
 
-    `nominal`, `records` and `holdout` are what `diagnose` was given, `command` the command line, `name` the nominal model's.
+    `nominal`, `records` and `holdout` are what `diagnose` was given, `command` the command line, `name` the nominal model's;
+    a `comparison` with a simulation is put first.
     """
-    return diagnosis_page(findings(answer, nominal, records, holdout, command, name))
+    page = diagnosis_page(findings(answer, nominal, records, holdout, command, name))
+    if comparison is None:
+        return page
+    section = comparison_section(comparison.to_dict(), run_of(comparison), comparison.unit)
+    return replace(page, sections=(section, *page.sections))
+
+
+def present_comparison(found: Comparison, simulation: Record, records: Sequence[Record], command: str = "") -> Page:
+    """The report of a comparison without a model; `simulation` and `records` are what `compare` was given."""
+    quality = [quality_of(simulation, "simulation"), *(quality_of(one, "recording") for one in records)]
+    return comparison_page(found.to_dict(), run_of(found), found.unit, quality, command)
 
 
 def findings(

@@ -65,9 +65,9 @@ def residual_grid(run: Run, unit: str) -> Columns:
 
 
 def _curves(run: Run, factor: float) -> tuple[Curve, ...]:
-    curves = [Curve(run.time, factor * run.residual("before"), BEFORE, "before")]
+    curves = [Curve(run.time, factor * run.residual("before"), run.labels[0], "before")]
     if run.after is not None:
-        curves.append(Curve(run.time, factor * run.residual("after"), AFTER, "after"))
+        curves.append(Curve(run.time, factor * run.residual("after"), run.labels[1], "after"))
     return tuple(curves)
 
 
@@ -95,15 +95,15 @@ def _over_time(run: Run, factor: float, unit: str) -> Drawing:
 
 def _rms_words(run: Run, factor: float, unit: str) -> str:
     before, after = error_of([run], "before"), error_of([run], "after")
-    words = "" if before is None else f"rms {number(factor * before.rms, 3)} {unit} {BEFORE}"
+    words = "" if before is None else f"rms {number(factor * before.rms, 3)} {unit} {run.labels[0]}"
     if after is not None and run.after is not None:
-        words += f", {number(factor * after.rms, 3)} {unit} {AFTER}"
+        words += f", {number(factor * after.rms, 3)} {unit} {run.labels[1]}"
     return words + "."
 
 
 def _over_cycle(run: Run, factor: float, unit: str) -> Drawing | None:
     curves = []
-    shown: tuple[tuple[Which, str], ...] = (("before", BEFORE), ("after", AFTER))
+    shown: tuple[tuple[Which, str], ...] = (("before", run.labels[0]), ("after", run.labels[1]))
     for which, label in shown:
         found = by_phase(run, which)
         if found is None or (which == "after" and run.after is None):
@@ -152,9 +152,9 @@ def _over_frequency(run: Run, output: str) -> Drawing:
     _, before = density(run, run.residual("before"))
     factor, unit = scaled(float(np.quantile(before, 0.9)), output)
     curves = [Curve(frequency, factor * motion, "measured motion", "measured"),
-              Curve(frequency, factor * before, BEFORE, "before")]  # fmt: skip
+              Curve(frequency, factor * before, run.labels[0], "before")]  # fmt: skip
     if run.after is not None:
-        curves.append(Curve(frequency, factor * density(run, run.residual("after"))[1], AFTER, "after"))
+        curves.append(Curve(frequency, factor * density(run, run.residual("after"))[1], run.labels[1], "after"))
     return drawing(
         "Over frequency",
         Chart(

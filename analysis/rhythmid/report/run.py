@@ -34,6 +34,7 @@ class Run:
     hidden : bool[n] samples of a record that the fit was not shown although it saw the rest.
     heldout : whether no fit has seen this record.
     quiet : whether nothing but the forcing drove the machine.
+    labels : what `before` and `after` are called in figures.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Run:
     hidden: Mask
     heldout: bool = False
     quiet: bool = False
+    labels: tuple[str, str] = ("refitted nominal model", "with the added effect")
 
     def residual(self, which: Which) -> Array:
         """Measured minus simulated, float64[n]."""
