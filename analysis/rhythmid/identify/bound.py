@@ -23,6 +23,7 @@ from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 
 Array = NDArray[np.float64]
+FINE = 0.05  # of a block, integrated in one step: at a delay that meets the samples' grid coarser ones mislead the differences
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,6 @@ def expected_fit(
     slow = math.sqrt((1.0 + correlation) / (1.0 - correlation))
     noise = NoiseModel(np.empty(0), std * slow / math.sqrt(series[0].block))
     plain = [replace(one, ignored=None) for one in series]
-    begun = start_only(ready, plain, noise, 0.2 * series[0].period * series[0].block)
+    begun = start_only(ready, plain, noise, FINE * series[0].period * series[0].block)
     run = replace(begun.run, series=tuple(series))
     return minimise(ready, run, ready.free, noise, begun.starts, iterations=0)
