@@ -32,7 +32,9 @@ from rhythmid.errors import InputError
 from rhythmid.model import INERTIA, Model, Term
 
 _LOCK = threading.Lock()
-InputKind = Literal["force", "base_displacement", "base_acceleration"]
+InputKind = Literal["force", "base_displacement", "base_acceleration", "reference"]
+OutputKind = Literal["position", "velocity", "acceleration"]
+DRIVES: tuple[InputKind, ...] = ("force", "reference")  # inputs that go through the command path
 
 
 def cache_folder() -> Path:
@@ -114,13 +116,16 @@ class _Writer:
         self.lines.append(f"{targets} = {element.name}({', '.join([*arguments, *values, *states])})")
 
 
-def _right_hand_side(terms: tuple[Term, ...], excited: InputKind) -> _Writer:
+def _right_hand_side(
+    terms: tuple[Term, ...], excited: InputKind, disturbed: bool, measured: OutputKind
+) -> _Writer:
     writer = _Writer()
     kernels = [term for term in terms if term.element.kernel is not None]
     force = [term for term in kernels if term.element.slot == "force"]
-    writer.lines.append("f = u" if excited == "force" else "f = 0.0")
-    for term in (term for term in kernels if term.element.slot == "command" and excited == "force"):
-        writer.call(term, ["f", "t"], "f")
+    writer.lines.append("f = u" if excited in DRIVES else "f = 0.0")
+    command = [term for term in kernels if term.element.slot == "command" and excited in DRIVES]
+    for term in sorted(command, key=lambda term: term.element.acts == "feedback"):  # the controller gets what is left of u
+        writer.call(term, ["f", "s0", "s1", "t"] if term.element.acts == "feedback" else ["f", "t"], "f")
     writer.lines.append("f = f + w")
     for term in (term for term in force if term.element.acts == "drive"):
         if term.element.states:
@@ -139,7 +144,8 @@ def _right_hand_side(terms: tuple[Term, ...], excited: InputKind) -> _Writer:
     for term in (term for term in force if term.element.acts == "modifier"):
         at = ["s0 - u", "s1 - du"] if excited == "base_displacement" else ["s0", "s1"]
         writer.call(term, ["leg", *at, "t", "f"], "leg")
-    writer.lines.append("y = s0")
+    writer.lines.append("absolute = (f + leg + body + d) / p0" if disturbed else "absolute = (f + leg + body) / p0")
+    writer.lines.append({"position": "y = s0", "velocity": "y = s1", "acceleration": "y = absolute"}[measured])
     for term in (term for term in kernels if term.element.slot == "sensor"):
         writer.call(term, ["y", "t"], "y")
     return writer
@@ -150,21 +156,24 @@ def _indent(lines: list[str], depth: int) -> str:
 
 
 def generate(
-    terms: tuple[Term, ...], disturbed: bool = False, excited: InputKind = "force", smooth: bool = False
+    terms: tuple[Term, ...],
+    disturbed: bool = False,
+    excited: InputKind = "force",
+    smooth: bool = False,
+    measured: OutputKind = "position",
 ) -> tuple[str, Layout]:
     """Source text of the module for this list of terms, and the layout of its arrays.
 
-    `excited` says what the command is: a force on the mass; the displacement of the base that the leg stands on; or
-    the base's acceleration, where position and velocity are relative to the base. Steps end at the command's knots,
-    where a held command jumps, unless it is `smooth`.
+    `excited` says what the command is: a force on the mass; the reference of a controller in the command path; the
+    displacement of the base that the leg stands on; or the base's acceleration, where position and velocity are
+    relative to the base. Steps end at the command's knots, where a held command jumps, unless it is `smooth`.
+    `measured` is what the sensor sees; an acceleration is the mass's own, whatever the base does.
     """
-    writer = _right_hand_side(terms, excited)
+    writer = _right_hand_side(terms, excited, disturbed, measured)
     n = len(writer.states)
     p = ", ".join(f"p{i}" for i in range(len(writer.parameters)))
     s = ", ".join(f"s{i}" for i in range(n))
-    total = "(f + leg + body + d) / p0" if disturbed else "(f + leg + body) / p0"
-    if excited == "base_acceleration":
-        total += " - u"
+    total = "absolute - u" if excited == "base_acceleration" else "absolute"
     known = ", ".join(["t, u, w", *(["du"] if excited == "base_displacement" else []), *(["d"] if disturbed else [])])
     rates = ", ".join(["s1", total, *(f"d{i}" for i in range(2, n))])
     sources: dict[str, str] = {}
@@ -319,9 +328,9 @@ def _key(terms: tuple[Term, ...]) -> Hashable:
 
 @lru_cache(maxsize=512)
 def _structure(
-    key: Hashable, terms: "_Terms", disturbed: bool, excited: InputKind, smooth: bool
+    key: Hashable, terms: "_Terms", disturbed: bool, excited: InputKind, smooth: bool, measured: OutputKind
 ) -> Compiled:
-    text, layout = generate(terms.terms, disturbed, excited, smooth)
+    text, layout = generate(terms.terms, disturbed, excited, smooth, measured)
     return Compiled(layout, load_module(text))
 
 
@@ -339,21 +348,25 @@ class _Terms:
 
 
 def compile_model(
-    model: Model, disturbed: bool = False, excited: InputKind = "force", smooth: bool = False
+    model: Model,
+    disturbed: bool = False,
+    excited: InputKind = "force",
+    smooth: bool = False,
+    measured: OutputKind = "position",
 ) -> Compiled:
     """The compiled structure of a model; parameter values play no part.
 
-    With `disturbed` the structure takes a further, arbitrary force on the mass as a signal; `excited` and `smooth` as in
-    `generate`.
+    With `disturbed` the structure takes a further, arbitrary force on the mass as a signal; `excited`, `smooth` and
+    `measured` as in `generate`.
     """
     terms = tuple(term for term in model.terms if term.element.kernel is not None)
-    return _structure(_key(terms), _Terms(terms), disturbed, excited, smooth)
+    return _structure(_key(terms), _Terms(terms), disturbed, excited, smooth, measured)
 
 
 def generate_rates(terms: tuple[Term, ...], excited: InputKind = "force") -> tuple[str, Layout]:
     """Source text of a module whose `run` evaluates the right-hand side at given points, and the layout of its arrays."""
     text, layout = generate(terms, False, excited)
-    writer = _right_hand_side(terms, excited)
+    writer = _right_hand_side(terms, excited, False, "position")
     n, p = len(layout.states), len(layout.parameters)
     targets = ", ".join(f"out[k, {i}]" for i in range(n + 2))
     known = "t, u, w, 0.0" if excited == "base_displacement" else "t, u, w"

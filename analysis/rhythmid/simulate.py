@@ -60,6 +60,15 @@ def delayed_command(model: Model, command: PPoly | None) -> PPoly | None:
     return command if knots is command.x else PPoly(command.c, knots, extrapolate=True)
 
 
+def delay_of_command(model: Model, stamps: Array) -> Array:
+    """How much later [s] than its stamp a command acts; (n,) -> (n,)."""
+    late = np.zeros(len(stamps))
+    for term in model.terms:
+        if term.element.slot == "command" and term.element.delay is not None:
+            late = late + term.element.delay(stamps, **{n: v.value for n, v in term.values.items()})
+    return late
+
+
 def start_states(model: Model, compiled: Compiled, position: float, velocity: float) -> Array:
     """State vector at the start: position [m], velocity [m/s], and the elements' own states at rest there."""
     start = np.zeros(len(compiled.layout.states))

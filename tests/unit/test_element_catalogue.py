@@ -14,7 +14,8 @@ from rhythmid.simulate import simulate
 
 CATALOGUE = load_catalogue()
 NOMINAL = ("gravity", "linear_spring", "switched_damper", "input_delay", "measurement_delay")
-ADDABLE = [name for name in CATALOGUE if name not in NOMINAL]
+CONTROLLERS = [name for name in CATALOGUE if CATALOGUE[name].acts == "feedback"]  # they change what u is
+ADDABLE = [name for name in CATALOGUE if name not in (*NOMINAL, *CONTROLLERS)]
 WITHOUT_STARTS = {
     "periodic_forcing": {"amplitude": 0.5, "frequency": 1.3},
     "constant_force": {"force": 0.1},

@@ -71,3 +71,41 @@ def test_an_input_delay_drift_stretches_the_command(rig):
     run = rig.run(rig.model("input_delay_drift", {"rate": rate}), 1.0, command=ramp)
     assert run.effort == pytest.approx(ramp(run.time) / (1 + rate), abs=3.1e-3)  # one held sample
     assert ramp(1.0) - run.effort[-1] > 0.1
+
+
+def test_position_control_settles_a_step_as_a_second_order_system(rig):
+    """x/r = k_p / (m s² + k_d s + k_p), whose step response is known; the forcing still acts as a force."""
+    mass, proportional, derivative = 2.0, 800.0, 24.0
+    model = rig.model("position_control", {"proportional": proportional, "derivative": derivative}, mass=mass)
+    run = rig.run(model, 1.0, command=lambda t: np.full_like(t, 0.1))
+    omega, zeta = math.sqrt(proportional / mass), derivative / (2.0 * math.sqrt(proportional * mass))
+    damped, t = omega * math.sqrt(1.0 - zeta**2), run.time
+    turned = np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t)
+    assert run.position == pytest.approx(0.1 * (1.0 - np.exp(-zeta * omega * t) * turned), abs=1e-8)
+    assert run.effort == pytest.approx(proportional * (0.1 - run.position) - derivative * run.velocity, abs=1e-9)
+    pushed = rig.run(model, 3.0, forcing=spline(np.arange(0.0, 4.0, 0.5), np.full(8, 4.0)))
+    assert pushed.position[-1] == pytest.approx(4.0 / proportional, rel=1e-6)
+
+
+def test_velocity_control_approaches_the_reference_speed_exponentially(rig):
+    run = rig.run(rig.model("velocity_control", {"gain": 5.0}, mass=2.0), 1.0, command=lambda t: np.full_like(t, 0.3))
+    assert run.velocity == pytest.approx(0.3 * (1.0 - np.exp(-2.5 * run.time)), abs=1e-9)
+
+
+def test_other_command_elements_act_on_the_reference_whatever_their_order(rig, catalogue):
+    loop, lag = {"proportional": 800.0, "derivative": 24.0}, {"time_constant": 0.05}
+    first = rig.model("command_lag", lag, mass=2.0).with_element(catalogue["position_control"], loop)
+    last = rig.model("position_control", loop, mass=2.0).with_element(catalogue["command_lag"], lag)
+    runs = [rig.run(model, 0.5, command=ramp).position for model in (first, last)]
+    assert np.array_equal(*runs) and np.ptp(runs[0]) > 0.1
+
+
+def test_reference_rate_limit_follows_at_most_at_its_rate_from_where_the_machine_is(rig, catalogue):
+    loop = rig.model("position_control", {"proportional": 1e4, "derivative": 200.0}, mass=1.0)
+    limited = loop.with_element(catalogue["reference_rate_limit"], {"rate": 0.5})
+    run = rig.run(limited, 1.0, initial=(0.2, 0.0), command=lambda t: np.full_like(t, 0.6))
+    point = (run.effort + 200.0 * run.velocity) / 1e4 + run.position
+    assert point == pytest.approx(np.minimum(0.2 + 0.5 * (run.time + 2.5e-4), 0.6), abs=3e-4)
+    slope = spline(np.array([0.0, 0.5, 1.0, 1.5]), np.array([0.0, 0.15, 0.3, 0.45]))
+    slow, free = rig.run(limited, 1.0, command=slope), rig.run(loop, 1.0, command=slope)
+    assert slow.position == pytest.approx(free.position, abs=1e-9)

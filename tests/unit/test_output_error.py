@@ -7,8 +7,9 @@ import pytest
 
 from machines import CATALOGUE, SHORT, hopper, record, records
 from rhythmid.errors import InputError
+from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import estimate, start_only
-from rhythmid.identify.series import block_length, hold_out_tail, prepare, split
+from rhythmid.identify.series import block_length, hold_out_tail, prepare
 from rhythmid.model import Prior
 
 TRUTH = {

@@ -13,8 +13,9 @@ import numpy as np
 
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
-from rhythmid.identify.series import Series, dominant_frequency, split
+from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import Model
 from rhythmid.signal import band_limited, first_order_hold
 

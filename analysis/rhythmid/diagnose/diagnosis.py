@@ -7,7 +7,7 @@ lacks, the winner is held against noise, rivals and records that no fit has seen
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,9 @@ from rhythmid.diagnose.verdict import element_of, significant, twins_of, verdict
 from rhythmid.diagnose.wording import location_of, recalibrated, summary_of
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.drive import drive_of, driven
 from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.multiple_shooting import forgets, scoring_of, windows
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.repeats import noise_from_repeats
@@ -85,15 +87,23 @@ def diagnose(
     same whenever the records are. Raises InputError for records or models that cannot be judged.
     """
     known = catalogue or load_catalogue()
-    everything = prepare([*records, *holdout])
+    given = [driven(record, model) for record in (*records, *holdout)]
+    everything = prepare(given)
     check_comparable(everything)
     count = len(records)
+    notes = dict.fromkeys(drive_of(a, b) for a, b in zip((*records, *holdout), given))
+    scoring = "free run"
+    if not forgets(model, everything):
+        count = len(windows(everything[:count]))
+        everything = windows(everything)
+        scoring = scoring_of(everything)
+        tell(f"scoring in {scoring}")
     if holdout:
         seen, unseen = everything[:count], everything[count:]
         heldout = f"held out: {', '.join(one.name for one in unseen)}"
     else:
         seen, unseen = hold_out_tail(everything[:count])
-        heldout = "held out: the last fifth of every record"
+        heldout = f"held out: the last fifth of every {'record' if scoring == 'free run' else 'window'}"
     # the matrices are tall and thin, and workers run side by side: threads inside linear algebra only get in the way
     with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
         calibration = calibrate(model, seen, known, pool, tell)
@@ -109,6 +119,8 @@ def diagnose(
         after = dependences(trajectories(found.fit), pool) if found.best.added else before
         judge = HeldOut(found, unseen if holdout else None)
         diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful)
+        said = (*diagnosis.notes, *(note for note in notes if note is not None))
+        diagnosis = replace(diagnosis, scoring=scoring, notes=said)
         nominal_run, augmented_run = judge.fit(found.nominal.model), judge.fit(found.fit.model)
     evidence = Evidence(
         tuple(seen),

@@ -132,8 +132,8 @@ def dependences(
     fit = known.fit
     found: list[Dependence] = []
     quantities: dict[str, list[Array]] = {
-        "position": [p.position for p in known.paths],
-        "velocity": [p.velocity for p in known.paths],
+        "position": [p.position for p in known.legs],
+        "velocity": [p.velocity for p in known.legs],
         "time": [p.time - p.time[0] for p in known.paths],
     }
     if any(np.ptp(p.effort) > 0 for p in known.paths):

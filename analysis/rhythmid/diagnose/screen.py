@@ -20,12 +20,13 @@ from rhythmid.effect import Path, effect_along
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales
 from rhythmid.errors import InputError
-from rhythmid.identify.free_run import FreeRun, prepare_run
+from rhythmid.identify.drive import controlled
+from rhythmid.identify.free_run import FreeRun, prepare_run, with_series
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.model import Model
 from rhythmid.signal import first_order_hold
-from rhythmid.simulate import delayed_command, physical_times
+from rhythmid.simulate import delay_of_command, delayed_command, physical_times
 
 Array = NDArray[np.float64]
 
@@ -73,11 +74,15 @@ class Score:
 
 @dataclass(frozen=True)
 class Trajectories:
-    """The fitted free run: paths of all series and the structure that takes disturbances."""
+    """The fitted free run: paths of all series and the structure that takes disturbances.
+
+    `legs` are the paths as the leg sees them: relative to its base where that moves.
+    """
 
     fit: Fit
     disturbed: FreeRun
     paths: tuple[Path, ...]
+    legs: tuple[Path, ...]
     outputs: tuple[Array, ...]  # of each series at its block centres, as the sensor says
     commands: tuple[Array, ...]
 
@@ -88,7 +93,7 @@ def trajectories(fit: Fit) -> Trajectories:
     disturbed = replace(
         prepare_run(fit.model, run.series, run.max_step, disturbed=True), max_step=run.max_step
     )
-    paths, outputs, commands = [], [], []
+    paths, legs, outputs, commands = [], [], [], []
     q = run.states
     for index, (one, start) in enumerate(zip(run.series, fit.starts)):
         rows = disturbed.rows(fit.model, index, start)
@@ -98,13 +103,19 @@ def trajectories(fit: Fit) -> Trajectories:
         time = one.centres - float(np.mean(one.centres - physical_times(fit.model, one.centres)))
         acceleration = np.gradient(rows[:, 1], time)
         body = _body_force(fit.model, time, rows[:, 0], rows[:, 1], rows[:, q + 1])
-        leg = fit.model.mass.value * acceleration - rows[:, q + 1] - body
         command = delayed_command(fit.model, one.command)
         signal = np.zeros(one.blocks) if command is None else _evaluate(command, time)
+        if one.kind == "base_acceleration":
+            acceleration = acceleration + signal
+        leg = fit.model.mass.value * acceleration - rows[:, q + 1] - body
         paths.append(Path(time, rows[:, 0], rows[:, 1], rows[:, q + 1], leg, rows[:, q]))
+        legs.append(paths[-1])
+        if one.kind == "base_displacement" and command is not None:
+            rate = _evaluate(command.derivative(), time)
+            legs[-1] = replace(paths[-1], position=rows[:, 0] - signal, velocity=rows[:, 1] - rate)
         outputs.append(rows[:, q].copy())
         commands.append(signal)
-    return Trajectories(fit, disturbed, tuple(paths), tuple(outputs), tuple(commands))
+    return Trajectories(fit, disturbed, tuple(paths), tuple(legs), tuple(outputs), tuple(commands))
 
 
 def _evaluate(signal, time: Array) -> Array:
@@ -151,6 +162,14 @@ def change_of_output(
             path = replace(path, signal=path.effort)
         elif element.slot == "command":
             path = replace(path, signal=known.commands[index])
+            if controlled(fit.model):
+                change = _change_of_reference(known, index, effect_along(element, values, fit.model, path))
+                if change is None:
+                    return None
+                changes.append(change)
+                continue
+        elif element.acts != "body":
+            path = known.legs[index]
         force = effect_along(element, values, fit.model, path)
         if not np.isfinite(force).all():
             return None
@@ -162,6 +181,22 @@ def change_of_output(
             return None
         changes.append(one.of_block(rows[:, run.states] - known.outputs[index]))
     return changes
+
+
+def _change_of_reference(known: Trajectories, index: int, change: Array) -> Array | None:
+    """Change of the block-averaged output when a controller's reference changes; None when the model diverges."""
+    fit, run, one = known.fit, known.disturbed, known.disturbed.series[index]
+    if not np.isfinite(change).all():
+        return None
+    stamped = known.paths[index].time - float(np.mean(delay_of_command(fit.model, known.paths[index].time)))
+    both = []
+    for reference in (known.commands[index], known.commands[index] + change):
+        moved = replace(one, command=first_order_hold(stamped, reference))
+        rows = with_series(run, index, moved).rows(fit.model, index, fit.starts[index])
+        if rows is None:
+            return None
+        both.append(rows[:, run.states])
+    return one.of_block(both[1] - both[0])
 
 
 def whitened(fit: Fit, samples: Sequence[Array], noise: NoiseModel) -> list[Array]:
@@ -193,6 +228,8 @@ def guesses(catalogue: Catalogue, model: Model, sizes: Scales) -> list[tuple[Ele
         if present & set(element.needless_with):
             continue
         if element.rotational and model.units.position != "rad":
+            continue
+        if element.controlled and not controlled(model):
             continue
         if any(model.borrowed(source, default) is None for source, default in element.borrows.values()):
             continue

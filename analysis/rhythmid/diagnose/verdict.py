@@ -95,4 +95,4 @@ def verdict_of(
 
 def _weak(series: Sequence[Series]) -> bool:
     """Records that hold fewer than a few periods of motion."""
-    return all((one.time[-1] - one.time[0]) * dominant_frequency(one) < PERIODS for one in series)
+    return sum((one.time[-1] - one.time[0]) * dominant_frequency(one) for one in series) < PERIODS

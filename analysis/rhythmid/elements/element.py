@@ -4,6 +4,7 @@ A file in `elements/<slot>/` defines one `ELEMENT`. Exactly one of these says wh
 
 - `kernel`   a pure numeric function of one instant, compiled into the simulator. Its arguments by slot:
                command, actuator   (f, t, <parameters>, <borrowed>, <states>)            -> new f
+               command, `acts="feedback"`  (f, x, v, t, <parameters>, …)                 -> force, of a controller
                force               (x, v, t, f, <parameters>, <borrowed>, <states>)      -> force on the mass
                force, `acts="modifier"`  (leg, x, v, t, f, <parameters>, …)              -> new sum of the leg's forces
                force, `acts="drive"`     (t, <parameters>, …)                            -> added to f before the actuator
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 Slot = Literal["command", "actuator", "force", "sensor", "timing"]
 STEP = "simulation.step"  # borrowed under this name: the largest integration step [s], which no effect can be faster than
 SLOTS: tuple[Slot, ...] = ("command", "actuator", "force", "sensor", "timing")
-Acts = Literal["body", "leg", "modifier", "drive"]
+Acts = Literal["body", "leg", "modifier", "drive", "feedback"]
 Sampler = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
 
@@ -64,6 +65,7 @@ class Scales:
     period: float  # [s] sample period
     forcing_frequency: float = 0.0  # [Hz] pumping frequency, 0 where there is none
     residual_frequency: float = 0.0  # [Hz] strongest line that the nominal model leaves unexplained, 0 where unknown
+    reference: float = 0.0  # standard deviation of a controller's reference, 0 where there is none
 
     @property
     def force(self) -> float:
@@ -90,7 +92,8 @@ class Element:
     measures how much of the effect there is; with it at `absent` the model behaves as without the element, whatever its
     other parameters. `starts` proposes first guesses of physical size from the record's scales, several where the shape
     matters. `special_case_of` names richer elements that contain this one, exactly or in a limit of their parameters;
-    `confusable` maps another element's name to what tells the two apart. A `rotational` effect needs an angle for x.
+    `confusable` maps another element's name to what tells the two apart. A `rotational` effect needs an angle for x, a
+    `controlled` one a controller in the model.
     `ranges` bounds parameters by the record's scales to where the effect still is what its name says: a ripple repeats
     within the travel, or it is but another spring.
     """
@@ -117,6 +120,7 @@ class Element:
     candidate: bool = True  # takes part in the search for missing physics
     needless_with: tuple[str, ...] = ()  # elements beside which another candidate says the same
     rotational: bool = False  # makes sense only where the position is an angle
+    controlled: bool = False  # makes sense only where a controller in the command path closes the loop
     starts: Callable[[Scales], list[dict[str, float]]] | None = None
     ranges: Callable[[Scales], Mapping[str, tuple[float, float]]] | None = None
     source: str = ""  # file that defines it

@@ -70,6 +70,8 @@ def describe(element: Element) -> str:
         facts.append(f"- States of its own: {_names(element.states)}.")
     if element.rotational:
         facts.append("- For rotational machines only.")
+    if element.controlled:
+        facts.append("- For machines whose controller is in the model.")
     facts.append("- Candidate." if element.candidate else "- Not a candidate.")
     if element.special_case_of:
         facts.append(f"- Special case of {_names(element.special_case_of)}.")

@@ -128,17 +128,29 @@ def prepare_run(
             f"records with different kinds of input ({', '.join(sorted(kinds))}) cannot be fitted together"
         )
     excited: InputKind = kinds.pop() if kinds else "force"
+    sensors = {one.measured for one in series}
+    if len(sensors) > 1:
+        raise InputError(f"records that measure different things ({', '.join(sorted(sensors))}) cannot be fitted together")
+    measured = sensors.pop() if sensors else "position"
     inputs = tuple(_inputs(one) for one in series)
     smooth = all(i.smooth is not None or len(i.command[0]) <= 2 for i in inputs)
     if not smooth:
         inputs = tuple(replace(i, smooth=None) for i in inputs)
     return FreeRun(
-        compile_model(model, disturbed, excited, smooth),
-        lambda: compile_model(model, disturbed, excited),
+        compile_model(model, disturbed, excited, smooth, measured),
+        lambda: compile_model(model, disturbed, excited, measured=measured),
         tuple(series),
         inputs,
         max_step or min(one.period * one.block for one in series),
     )
+
+
+def with_series(run: FreeRun, index: int, series: Series) -> FreeRun:
+    """The run with one series exchanged, such as for one with another command; its steps end at the command's knots."""
+    inputs = [replace(one, smooth=None) for one in run.inputs]
+    inputs[index] = replace(_inputs(series), smooth=None)
+    every = (*run.series[:index], series, *run.series[index + 1 :])
+    return replace(run, compiled=run.stopping(), series=every, inputs=tuple(inputs))
 
 
 def _contiguous(pair: Pieces) -> Pieces:

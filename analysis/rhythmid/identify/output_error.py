@@ -78,7 +78,10 @@ def first_guess(model: Model, run: FreeRun) -> list[Array]:
         span = 0.05 / max(dominant_frequency(one), 1e-9)
         n = int(np.clip(round(span / one.period), 3, len(one.time) // 4))
         slope, level = np.polyfit(one.time[:n] - one.time[0], one.value[:n], 1)
-        found.append(start_states(model, run.compiled, float(level), float(slope)))
+        begin = {"position": (level, slope), "velocity": (0.0, level), "acceleration": (0.0, 0.0)}[one.measured]
+        if one.kind == "base_displacement" and one.command is not None and one.measured != "position":
+            begin = float(one.command(one.centres[0])) + begin[0], begin[1]
+        found.append(start_states(model, run.compiled, float(begin[0]), float(begin[1])))
     return found
 
 

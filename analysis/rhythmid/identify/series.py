@@ -11,9 +11,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import PPoly
 
-from rhythmid.compiled import InputKind
+from rhythmid.compiled import InputKind, OutputKind
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
 from rhythmid.model import Model
@@ -43,6 +44,7 @@ class Series:
     used: Mask
     period: float
     kind: InputKind = "force"
+    measured: OutputKind = "position"
     ignored: Array | None = None
 
     @property
@@ -103,6 +105,14 @@ def _spline_of(time: Array, value: Array) -> PPoly:
     return spline(time[keep], value[keep])
 
 
+def _held_before(time: Array, value: Array) -> tuple[Array, Array]:
+    """A reference that held its first value before the record, too: the machine was there already."""
+    step = float(np.median(np.diff(time)))
+    count = int(np.clip(np.ceil(1.0 / step), 1, 10_000))
+    earlier = time[0] + step * np.arange(-count, 0)
+    return np.concatenate([earlier, time]), np.concatenate([np.full(count, value[0]), value])
+
+
 def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]:
     """Series of all records. With `block` None the averaging is chosen from the records' bandwidth.
 
@@ -120,6 +130,8 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
         if record.input is not None and len(record.input.time) > 1:
             if record.input_kind == "base_displacement" and record.hold == "zero":
                 command = _spline_of(record.input.time, record.input.value)
+            elif record.input_kind == "reference" and record.hold == "zero":
+                command = continuous(*_held_before(record.input.time, record.input.value), "zero")
             else:
                 command = continuous(record.input.time, record.input.value, record.hold)
         forcing = None
@@ -136,6 +148,7 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
                 np.ones(len(time), bool),
                 period,
                 record.input_kind,
+                record.output_kind,
             )
         )
     if block is None:
@@ -150,22 +163,6 @@ def _whole_blocks(series: Series, block: int) -> Mask:
         return np.ones(n, bool)
     times = series.time[: n * block].reshape(n, block)
     return times[:, -1] - times[:, 0] < 1.5 * block * series.period
-
-
-def split(series: Series, length: float) -> list[Series]:
-    """Cut a series into windows of about `length` [s], each of which gets a start of its own (multiple shooting)."""
-    size = max(8 * series.block, round(length / series.period / series.block) * series.block)
-    parts: list[Series] = []
-    for first in range(0, len(series.time) - 4 * series.block, size):
-        window = slice(first, min(first + size, len(series.time)))
-        used = series.used[
-            first // series.block : first // series.block + (window.stop - first) // series.block
-        ]
-        parts.append(
-            replace(series, name=f"{series.name}@{series.time[first]:.2f}s", time=series.time[window],
-                    value=series.value[window], used=used)
-        )  # fmt: skip
-    return parts
 
 
 def hold_out_tail(series: Sequence[Series], share: float = 0.2) -> tuple[list[Series], list[Series]]:
@@ -195,21 +192,24 @@ def _fast_length(least: int) -> int:
 def scales(series: Sequence[Series], model: Model) -> Scales:
     """Sizes that the records show, for first guesses of parameters."""
     biggest = max(series, key=lambda s: float(np.std(s.averaged)))
-    position = max(float(np.std(biggest.averaged)), 1e-12)
-    step = biggest.period * biggest.block
-    velocity = float(np.std(np.gradient(biggest.averaged, step))) if biggest.blocks > 2 else position
     frequency = dominant_frequency(biggest)
+    motions = [_motion(one) for one in series]
+    position = max(max(float(np.std(x)) for x, _ in motions), 1e-12)
+    velocity = max(float(np.std(v)) for _, v in motions)
     stiffness = (
         model.borrowed("linear_spring.stiffness", None) or model.mass.value * (2 * np.pi * frequency) ** 2
     )
-    effort, pumping = 0.0, 0.0
+    effort, pumping, reference = 0.0, 0.0, 0.0
     for one in series:
         total = np.zeros(len(one.time))
         for signal in (one.command, one.forcing):
             if signal is not None:
                 inside = (one.time >= signal.x[0]) & (one.time <= min(signal.x[-1], 1e200))
                 total[inside] += signal(one.time[inside])
-        effort = max(effort, float(np.std(total)))
+        if one.kind == "reference":
+            reference = max(reference, float(np.std(total)))
+        else:
+            effort = max(effort, float(np.std(total)))
         if one.forcing is not None:
             line = replace(one, value=np.asarray(one.forcing(one.time)))
             pumping = dominant_frequency(line)
@@ -217,13 +217,30 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         position=position,
         velocity=max(velocity, 1e-12),
         effort=effort or stiffness * position,
-        centre=float(np.mean(np.concatenate([s.averaged for s in series]))),
-        low=min(float(s.averaged.min()) for s in series),
-        high=max(float(s.averaged.max()) for s in series),
+        centre=float(np.mean(np.concatenate([x for x, _ in motions]))),
+        low=min(float(x.min()) for x, _ in motions),
+        high=max(float(x.max()) for x, _ in motions),
         mass=model.mass.value,
         stiffness=float(stiffness),
         frequency=frequency,
         duration=max(float(s.time[-1] - s.time[0]) for s in series),
         period=biggest.period,
         forcing_frequency=pumping,
+        reference=reference,
     )
+
+
+def _motion(series: Series) -> tuple[Array, Array]:
+    """Position and velocity that the force elements of the model see, as the measurement tells roughly: (blocks,) each.
+
+    Relative to the base where that moves; what is not measured is integrated, its mean set to zero.
+    """
+    step, value = series.period * series.block, series.averaged
+    if series.kind == "base_displacement" and series.command is not None and series.measured == "position":
+        value = value - series.command(series.centres)
+    for _ in range({"position": 0, "velocity": 1, "acceleration": 2}[series.measured]):
+        value = value - value.mean()
+        value = cumulative_trapezoid(value, dx=step, initial=0.0)
+    if series.measured == "velocity":
+        return value, series.averaged
+    return value, np.gradient(value, step) if len(value) > 2 else np.zeros_like(value)

@@ -227,7 +227,7 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         channels[role] = Channel(time, value, samples.source.unit, str(samples.source))
     notes = (*quality.notes, *_clock_notes(judged))
     return Record(
-        name, input_kind=signals.input_kind, forcing_law=signals.forcing_law,
+        name, input_kind=signals.input_kind, output_kind=signals.output_kind, forcing_law=signals.forcing_law,
         quality=replace(quality, channels=judged, notes=notes), **channels,
     )  # fmt: skip
 

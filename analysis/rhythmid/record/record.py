@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from rhythmid.errors import InputError
 from rhythmid.record.quality import Quality
-from rhythmid.record.signals import ROLES, InputKind, Sinusoid
+from rhythmid.record.signals import ROLES, InputKind, OutputKind, Sinusoid
 from rhythmid.record.timing import GAP, SAME, nominal_period
 from rhythmid.signal import Hold, continuous
 
@@ -79,7 +79,8 @@ class Record:
     forcing, velocity, effort, reference : where recorded; `effort` is the total actuator force.
     start_ns : time of the record's zero on the recording's clock [ns].
     hold : how the input continues between its samples. With 'zero', a value holds from its stamp until the next one.
-    input_kind : force, base_displacement or base_acceleration.
+    input_kind : force, base_displacement, base_acceleration or reference (of a controller that the model holds).
+    output_kind : position, velocity or acceleration.
     forcing_law : the forcing's formula, if that is how it is known; `forcing` then holds samples of it.
     run : the description of the experiment that the recording itself carries.
     """
@@ -97,6 +98,7 @@ class Record:
     quality: Quality = field(default_factory=lambda: Quality({}))
     forcing_law: Sinusoid | None = None
     run: Mapping[str, Any] | None = None
+    output_kind: OutputKind = "position"
 
     @property
     def channels(self) -> dict[str, Channel]:

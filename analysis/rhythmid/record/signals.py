@@ -5,6 +5,8 @@
     output:  {topic: /hopper/joint_states, field: "position[leg]"}
     forcing: {topic: /hopper/forcing,      field: "effort[leg]"}
     use: [10, 90]                     # seconds of the record's time, the end excluded
+    # on input: kind: force (default) | base_displacement | base_acceleration | reference; hold: zero | linear | band_limited
+    # on output: kind: position (default) | velocity | acceleration
 
 A channel is a field of a topic, or a `column` of a `file` (.mat, .csv, .npz; relative to signals.yaml; `tables: {file: …}`
 names one file for all). Its value is `scale` * recorded + `offset`, in `unit`. `input: none` says that nothing but the
@@ -26,10 +28,14 @@ from rhythmid.errors import InputError
 from rhythmid.record.field import Field
 from rhythmid.signal import Hold
 
-InputKind = Literal["force", "base_displacement", "base_acceleration"]
+InputKind = Literal["force", "base_displacement", "base_acceleration", "reference"]
+OutputKind = Literal["position", "velocity", "acceleration"]
 ROLES = ("input", "output", "forcing", "velocity", "effort", "reference")
 UNITS = {"input": "N", "output": "m", "forcing": "N", "velocity": "m/s", "effort": "N", "reference": "m"}
-INPUT_UNITS: dict[InputKind, str] = {"force": "N", "base_displacement": "m", "base_acceleration": "m/s^2"}
+INPUT_UNITS: dict[InputKind, str] = {
+    "force": "N", "base_displacement": "m", "base_acceleration": "m/s^2", "reference": "m",
+}  # fmt: skip
+OUTPUT_UNITS: dict[OutputKind, str] = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 HOLDS: tuple[Hold, ...] = ("zero", "linear", "band_limited")
 NOT_SI = {
     "mm": (1e-3, "m"), "cm": (1e-2, "m"), "um": (1e-6, "m"), "µm": (1e-6, "m"), "km": (1e3, "m"), "in": (0.0254, "m"),
@@ -88,6 +94,7 @@ class Signals:
     channels : role (`input`, `output`, `forcing`, `velocity`, `effort`, `reference`) -> source.
     forcing_law : the forcing where it is given by formula.
     input_kind : what the input is.
+    output_kind : what the output measures; an acceleration is the mass's own, not relative to a moving base.
     hold : how the input continues between its samples; None stands for the default of its kind of record.
     use : [t0, t1) in seconds of the record's time.
     optional : roles that may be absent from the bag (the forcing of the default signals).
@@ -97,6 +104,7 @@ class Signals:
     time: Clock = Clock()
     forcing_law: Sinusoid | None = None
     input_kind: InputKind = "force"
+    output_kind: OutputKind = "position"
     hold: Hold | None = None
     use: tuple[float, float] = (-math.inf, math.inf)
     optional: frozenset[str] = field(default_factory=frozenset)
@@ -138,6 +146,7 @@ def _signals(document: Node, path: Path) -> Signals:
     law: Sinusoid | None = None
     kind: InputKind = "force"
     hold: Hold | None = None
+    measured: OutputKind = "position"
     for role in ROLES:
         if role not in keys or keys[role].value in (None, "none"):
             continue
@@ -153,6 +162,9 @@ def _signals(document: Node, path: Path) -> Signals:
             if "hold" in options:
                 hold = cast(Hold, options["hold"].choice(HOLDS))
             unit = INPUT_UNITS[kind]
+        if role == "output" and "kind" in options:
+            measured = cast(OutputKind, options["kind"].choice(OUTPUT_UNITS))
+            unit = OUTPUT_UNITS[measured]
         channels[role] = _source(node, role, unit, path.parent, file)
     if "output" not in channels:
         document.fail("'output:' is missing: which channel is the measured motion?")
@@ -168,7 +180,7 @@ def _signals(document: Node, path: Path) -> Signals:
     else:
         use = -math.inf, math.inf
     clock = _clock(keys.get("time"), document, output.file is not None)
-    return Signals(channels, clock, law, kind, hold, use, path=path)
+    return Signals(channels, clock, law, kind, measured, hold, use, path=path)
 
 
 def _default_file(node: Node | None, folder: Path) -> Path | None:
@@ -184,7 +196,8 @@ def _default_file(node: Node | None, folder: Path) -> Path | None:
 
 def _source(node: Node, role: str, unit: str, folder: Path, default_file: Path | None) -> Source:
     known = ["topic", "field", "file", "column", "unit", "scale", "offset"]
-    keys = node.mapping([*known, "kind", "hold"] if role == "input" else known)
+    more = {"input": ["kind", "hold"], "output": ["kind"]}.get(role, [])
+    keys = node.mapping([*known, *more])
     if "unit" in keys:
         unit = keys["unit"].text()
         if unit in NOT_SI:

@@ -1,0 +1,40 @@
+"""Reference rate limit: a controller's reference follows the command, but changes by at most R per second.
+
+What hobby servos and drives with a set-point ramp do; it limits the speed, not the force. A memory follows the command,
+at most at the rate R, with the integration step h as time constant; the output leads the memory by what one step
+allows, R h. Where the limit is not reached the output is the input, exactly. It starts where the machine is.
+"""
+
+from math import inf, tau
+
+from rhythmid.elements.element import STEP, Element, Parameter
+
+
+def kernel(f, t, rate, step, memory):
+    output = memory + max(-rate * step, min(rate * step, f - memory))
+    return output, (output - memory) / step
+
+
+ELEMENT = Element(
+    name="reference_rate_limit",
+    slot="command",
+    title="Reference rate limit",
+    equation="|dr/dt| ≤ R",
+    parameters=(Parameter("rate", "m/s", "largest rate R of the reference", bounds=(0.0, inf)),),
+    borrows={"step": (STEP, 1e-3)},
+    kernel=kernel,
+    states=("memory",),
+    initial=lambda x, v, **_: (x,),
+    size="rate",
+    absent=inf,
+    controlled=True,
+    starts=lambda s: [{"rate": w * (s.reference or s.position) * tau * s.frequency} for w in (0.5, 1.0, 2.0, 4.0)],
+    also_known_as=("set-point ramp", "speed limit of a servo", "slew-rate limit"),
+    family="command nonlinearity",
+    confusable={
+        "actuator_rate_limit": "limits the force's rate, not the reference's",
+        "actuator_saturation": "limits the force: the acceleration of large moves, not their speed",
+        "command_lag": "its lag grows with amplitude",
+    },
+    reference="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, 1968",
+)

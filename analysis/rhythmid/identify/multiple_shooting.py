@@ -1,0 +1,97 @@
+"""Multiple shooting: windows of a record, each with an initial state of its own.
+
+H. G. Bock, Progress in Scientific Computing 2 (1983) 95. A free run of a machine that integrates, or is unstable, adds up
+every small disturbance and error of the model until it means nothing; in short windows it cannot get far.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import PPoly
+
+from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.output_error import first_guess
+from rhythmid.identify.series import Array, Series, dominant_frequency
+from rhythmid.model import Model
+from rhythmid.signal import first_order_hold
+
+MARGIN = 1.0  # [s] of a command kept before a window, for delays
+GROWTH = 1.5  # of the response to a constant force, from the middle to the end of a record, that calls for windows
+PERIODS = 2.0  # of the dominant motion in a window
+FEWEST = 4  # windows a record
+LEAST = 48  # blocks in a window
+
+
+def _around(signal: PPoly | None, begin: float, end: float) -> PPoly | None:
+    """The pieces of a signal that matter between two times [s]."""
+    if signal is None:
+        return None
+    first = max(int(np.searchsorted(signal.x, begin - MARGIN, side="right")) - 2, 0)
+    last = min(int(np.searchsorted(signal.x, end + MARGIN)) + 1, len(signal.x) - 1)
+    return PPoly(signal.c[:, first:last], signal.x[first : last + 1], extrapolate=True)
+
+
+def split(series: Series, length: float) -> list[Series]:
+    """Cut a series into windows of about `length` [s], each of which gets a start of its own."""
+    size = max(8 * series.block, round(length / series.period / series.block) * series.block)
+    parts: list[Series] = []
+    for first in range(0, len(series.time) - 4 * series.block, size):
+        window = slice(first, min(first + size, len(series.time)))
+        time = series.time[window]
+        blocks = slice(first // series.block, first // series.block + (window.stop - first) // series.block)
+        parts.append(
+            replace(
+                series, name=f"{series.name}@{time[0]:.2f}s", time=time, value=series.value[window],
+                used=series.used[blocks], ignored=None if series.ignored is None else series.ignored[blocks],
+                command=_around(series.command, time[0], time[-1]), forcing=_around(series.forcing, time[0], time[-1]),
+            )
+        )  # fmt: skip
+    return parts
+
+
+def windows(series: Sequence[Series]) -> list[Series]:
+    """All series cut into windows of a few periods of their motion; a short rest at the end of one is left out."""
+    found: list[Series] = []
+    for one in series:
+        step = one.period * one.block
+        length = max(PERIODS / dominant_frequency(one), LEAST * step)
+        length = min(length, one.blocks * step / FEWEST)
+        parts = split(one, length)
+        found += [part for part in parts if part.blocks >= min(LEAST, parts[0].blocks) // 2]
+    return found
+
+
+def scoring_of(series: Sequence[Series]) -> str:
+    """How windows are scored, in words."""
+    lengths = [one.blocks * one.block * one.period for one in series]
+    return (
+        f"windows of {float(np.median(lengths)):.2g} s with initial states of their own (multiple shooting): the model "
+        "integrates or is unstable, so that a long free run would add up every small disturbance"
+    )
+
+
+def forgets(model: Model, series: Sequence[Series]) -> bool:
+    """Whether the effect of a small constant force on the model levels off within every record.
+
+    Where it keeps growing the machine integrates or is unstable, and so does the effect of whatever the model leaves out.
+    """
+    run = prepare_run(model, series, disturbed=True)
+    for index, (one, start) in enumerate(zip(series, first_guess(model, run))):
+        span = one.centres[-1] - one.centres[0]
+        scale = float(np.std(one.averaged)) * model.mass.value * (2.0 * math.pi * dominant_frequency(one)) ** 2
+        push = first_order_hold(np.array([one.centres[0] - span, one.centres[-1] + span]), np.full(2, 1e-3 * scale))
+        free, pushed = run.rows(model, index, start), run.rows(model, index, start, push)
+        if free is None or pushed is None:
+            return False
+        response = np.abs(pushed[:, run.states] - free[:, run.states])
+        n = len(response)
+        middle, end = _rms(response[int(0.4 * n) : int(0.5 * n)]), _rms(response[int(0.9 * n) :])
+        if end > GROWTH * middle:
+            return False
+    return True
+
+
+def _rms(samples: Array) -> float:
+    return float(np.sqrt(np.mean(samples**2)))

@@ -1,0 +1,354 @@
+"""Synthetic twins of real machines' records: plainly written equations under scipy's adaptive integrator.
+
+Nothing here comes from the package but the container of a record. Every twin is made with or without the effect that its
+nominal model lacks, from a seed.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from rhythmid.record.record import Channel, Record
+
+Array = NDArray[np.float64]
+Signal = Callable[[float], float]
+
+
+@dataclass(frozen=True)
+class Twin:
+    """Records of a machine, the nominal model of it (YAML), and what that model lacks: an element's name, "" for
+    nothing, and its true parameters by name."""
+
+    records: list[Record]
+    nominal: str
+    lacks: str
+    truth: Mapping[str, float] = field(default_factory=dict)
+
+
+def sign(v: float, width: float) -> float:
+    """The sign of a speed, turning over `width`."""
+    return float(np.tanh(v / width))
+
+
+def tones(rng: np.random.Generator, rms: float, low: float, high: float, count: int = 12) -> Signal:
+    """A sum of sines of random frequency [Hz] and phase."""
+    frequency = np.geomspace(low, high, count) * rng.uniform(0.9, 1.1, count)
+    phase = rng.uniform(0.0, 2.0 * np.pi, count)
+    size = rms * np.sqrt(2.0 / count)
+    return lambda t: float(size * np.sin(2.0 * np.pi * frequency * t + phase).sum())
+
+
+def moves(rng: np.random.Generator, travel: float, duration: float, dwell: float = 0.5) -> Signal:
+    """Point-to-point moves with smooth (quintic) profiles and pauses between them."""
+    times, places = [0.0], [0.0]
+    while times[-1] < duration:
+        times += [times[-1] + dwell * rng.uniform(0.5, 1.0), 0.0]
+        times[-1] = times[-2] + rng.uniform(0.4, 1.5)
+        places += [places[-1], rng.uniform(-travel, travel)]
+    knots, values = np.array(times), np.array(places)
+
+    def at(t: float) -> float:
+        i = int(np.clip(np.searchsorted(knots, t, side="right") - 1, 0, len(knots) - 2))
+        s = min(max((t - knots[i]) / (knots[i + 1] - knots[i]), 0.0), 1.0)
+        return float(values[i] + (values[i + 1] - values[i]) * s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
+
+    return at
+
+
+def integrate(rates: Callable[[float, Array], list[float]], start: list[float], time: Array, step: float) -> Array:
+    """States (n, q) at the times; `step` [s] is the longest that the integrator may take."""
+    done = solve_ivp(
+        rates, (time[0], time[-1]), start, t_eval=time, method="LSODA", rtol=1e-7, atol=1e-10, max_step=step
+    )
+    return done.y.T
+
+
+def sampled(signal: Signal, time: Array) -> Array:
+    return np.array([signal(t) for t in time])
+
+
+def noisy(rng: np.random.Generator, value: Array, std: float) -> Array:
+    return value + std * rng.standard_normal(len(value))
+
+
+def rounded(value: Array, step: float) -> Array:
+    return step * np.round(value / step)
+
+
+def axis(friction: float = 3.0, seed: int = 0, count: int = 2, duration: float = 12.0, known: str = "effort") -> Twin:
+    """Linear axis under PD position control at 1 kHz, Coulomb friction [N] missing; encoder of 1 µm.
+
+    `known` is what was recorded beside the position: the motor's `effort`, or the `reference` of the known controller.
+    """
+    rng = np.random.default_rng([1, seed])
+    m, c, kp, kd, period = 2.0, 8.0, 2000.0, 60.0, 1e-3
+    records = []
+    for index in range(count):
+        way = moves(rng, 0.08, duration) if index % 2 == 0 else tones(rng, 0.03, 0.2, 4.0)
+        time = np.arange(0.0, duration, period)
+        reference = sampled(way, time)
+        state, effort = np.array([reference[0], 0.0]), np.zeros(len(time))
+        position, sub = np.zeros(len(time)), 10
+        h = period / sub
+
+        def rate(v: float, u: float) -> float:
+            return (u - c * v - friction * np.tanh(v / 2e-4)) / m
+
+        x, v = float(state[0]), 0.0
+        for k in range(len(time)):
+            position[k] = x
+            effort[k] = u = kp * (reference[k] - x) - kd * v
+            for _ in range(sub):  # Runge-Kutta of fourth order, the controller's force held
+                a1 = rate(v, u)
+                a2 = rate(v + 0.5 * h * a1, u)
+                a3 = rate(v + 0.5 * h * a2, u)
+                a4 = rate(v + h * a3, u)
+                x += h * v + h * h * (a1 + a2 + a3) / 6.0
+                v += h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
+        measured = rounded(noisy(rng, position, 1e-6), 1e-6)
+        given = effort if known == "effort" else reference
+        records.append(
+            Record(
+                f"axis {index}", Channel(time, measured, "m"), Channel(time, given, "N" if known == "effort" else "m"),
+                input_kind="force" if known == "effort" else "reference",
+            )
+        )  # fmt: skip
+    loop = "" if known == "effort" else (
+        "command: [{position_control: {proportional: {value: 2000.0, fixed: true}, derivative: {value: 60.0, fixed: true}}}]\n"
+    )
+    nominal = (
+        "inertia: {mass: {value: 1.7, unit: kg}}\n" + loop
+        + "force: [{viscous_damper: {damping: {value: 12.0, unit: N*s/m}}}]\n"
+    )
+    return Twin(records, nominal, "coulomb_friction" if friction else "", {"force": friction})
+
+
+def joint(friction: float = 0.4, seed: int = 0, count: int = 2, duration: float = 15.0) -> Twin:
+    """Robot joint driven by a current [A] (500 Hz), of which only the velocity is measured; Coulomb friction missing."""
+    rng = np.random.default_rng([2, seed])
+    inertia, c, constant, period = 0.05, 0.08, 0.6, 2e-3
+    records = []
+    for index in range(count):
+        current = tones(rng, 1.2 if index else 2.5, 0.15, 5.0)
+        time = np.arange(0.0, duration, period)
+        held = sampled(current, time)
+        states = np.zeros((len(time), 2))
+        for k in range(len(time) - 1):
+            states[k + 1] = integrate(
+                lambda t, s: [s[1], (constant * held[k] - c * s[1] - friction * sign(s[1], 5e-3)) / inertia],
+                list(states[k]), time[k : k + 2], period,
+            )[-1]  # fmt: skip
+        velocity = noisy(rng, states[:, 1], 0.02)
+        records.append(
+            Record(f"joint {index}", Channel(time, velocity, "rad/s"), Channel(time, held, "A"), output_kind="velocity")
+        )
+    nominal = """
+units: {force: A, position: rad}
+inertia: {mass: {value: 0.07}}
+force: [{viscous_damper: {damping: {value: 0.1}}}]
+"""
+    truth = {"force": friction / constant}
+    return Twin(records, nominal, "coulomb_friction" if friction else "", truth)
+
+
+def pendulum(large: bool = True, seed: int = 0, count: int = 2, duration: float = 20.0, driven: bool = True) -> Twin:
+    """Pendulum at 200 Hz with large swings (or a linear torsional spring), a linear nominal model."""
+    rng = np.random.default_rng([3, seed])
+    inertia, c, moment, period = 0.02, 0.004, 0.9, 5e-3
+    records = []
+    for index in range(count):
+        torque = tones(rng, 0.25 if driven else 0.0, 0.3, 2.0)
+        time = np.arange(0.0, duration, period)
+        start = [1.8, 0.0] if index == 0 else [-0.5, 2.0]
+        states = integrate(
+            lambda t, s: [s[1], (torque(t) - c * s[1] - moment * (np.sin(s[0]) if large else s[0])) / inertia],
+            start, time, 0.02,
+        )  # fmt: skip
+        angle = rounded(noisy(rng, states[:, 0], 5e-4), 2.0 * np.pi / 8192)
+        records.append(
+            Record(
+                f"pendulum {index}", Channel(time, angle, "rad"),
+                Channel(time, sampled(torque, time), "N*m") if driven else None, hold="band_limited",
+            )
+        )  # fmt: skip
+    nominal = """
+inertia: {mass: {value: 0.02, unit: kg*m^2, fixed: true}}
+force:
+  - linear_spring: {stiffness: {value: 0.7, unit: N*m/rad}, rest_length: {value: 0.0, unit: rad}}
+  - viscous_damper: {damping: {value: 0.002, unit: N*m*s/rad}}
+"""
+    return Twin(records, nominal, "pendulum_gravity" if large else "", {"moment": moment})
+
+
+def rig(cubic: float = 4e7, seed: int = 0, count: int = 2, duration: float = 12.0, kind: str = "base_displacement") -> Twin:
+    """Mass on a shaken base at 500 Hz; the input is the base's displacement or its acceleration, the cubic is missing.
+
+    The output is the mass's position, absolute where the base's displacement is known, else relative to the base.
+    """
+    rng = np.random.default_rng([4, seed])
+    m, c, k, period = 0.5, 1.5, 1800.0, 2e-3
+    records = []
+    for index in range(count):
+        frequency = np.geomspace(2.0, 20.0, 15) * rng.uniform(0.95, 1.05, 15)
+        phase = rng.uniform(0.0, 2.0 * np.pi, 15)
+        size = (0.6e-3 if index else 0.3e-3) * (6.0 / frequency)
+        w = 2.0 * np.pi * frequency
+        time = np.arange(0.0, duration, period)
+
+        def base(t: float, order: int) -> float:
+            return float((size * w**order * np.sin(w * t + phase + 0.5 * np.pi * order)).sum())
+
+        def rates(t: float, s: Array) -> list[float]:
+            e, de = s[0] - base(t, 0), s[1] - base(t, 1)
+            return [s[1], (-k * e - c * de - cubic * e**3) / m]
+
+        states = integrate(rates, [base(0.0, 0), base(0.0, 1)], time, 4e-3)
+        displacement = np.array([base(t, 0) for t in time])
+        if kind == "base_displacement":
+            output, given, unit = states[:, 0], noisy(rng, displacement, 1e-7), "m"
+        else:
+            output, given, unit = states[:, 0] - displacement, noisy(rng, np.array([base(t, 2) for t in time]), 2e-3), "m/s^2"
+        records.append(
+            Record(
+                f"rig {index}", Channel(time, noisy(rng, output, 3e-6), "m"), Channel(time, given, unit),
+                hold="band_limited", input_kind=kind,
+            )
+        )  # fmt: skip
+    nominal = """
+inertia: {mass: {value: 0.5, unit: kg, fixed: true}}
+force:
+  - linear_spring: {stiffness: {value: 1500.0, unit: N/m}, rest_length: {value: 0.0, unit: m}}
+  - viscous_damper: {damping: {value: 2.0, unit: N*s/m}}
+"""
+    return Twin(records, nominal, "cubic_stiffness" if cubic else "", {"coefficient": cubic})
+
+
+def servo(effect: str = "actuator_saturation", seed: int = 0, count: int = 2, duration: float = 12.0) -> Twin:
+    """Position servo at 100 Hz of which only command and motion (degrees) are known.
+
+    Effects: `actuator_saturation` (of its torque), `command_rate_limit` (of its set point), `actuator_deadband`
+    (it does not push when the error is small), `coulomb_friction`, or none ("").
+    """
+    rng = np.random.default_rng([5, seed])
+    omega, zeta, period = 25.0, 0.7, 1e-2
+    top, slew, dead, friction = 4000.0, 120.0, 300.0, 400.0  # deg/s^2, deg/s, deg/s^2, deg/s^2
+    records = []
+    for index in range(count):
+        way = moves(rng, 40.0, duration, 0.4) if index % 2 == 0 else tones(rng, 15.0, 0.2, 3.0)
+        time = np.arange(0.0, duration, period)
+        command = sampled(way, time)
+        if index % 2 == 0:
+            command = rounded(command, 10.0)  # steps, as a program sends them
+
+        def held(t: float) -> float:
+            return float(command[min(int(t / period + 1e-9), len(command) - 1)])
+
+        def rates(t: float, s: Array) -> list[float]:
+            point = s[2] if effect == "command_rate_limit" else held(t)
+            push = omega**2 * (point - s[0]) - 2.0 * zeta * omega * s[1]
+            if effect == "actuator_saturation":
+                push = float(np.clip(push, -top, top))
+            elif effect == "actuator_deadband":
+                push = float(np.sign(push) * max(abs(push) - dead, 0.0))
+            elif effect == "coulomb_friction":
+                push -= friction * sign(s[1], 0.5)
+            return [s[1], push, float(np.clip((held(t) - s[2]) / 1e-3, -slew, slew))]
+
+        states = integrate(rates, [command[0], 0.0, command[0]], time, 2e-3)
+        angle = noisy(rng, states[:, 0], 0.05)
+        records.append(
+            Record(f"servo {index}", Channel(time, angle, "deg"), Channel(time, command, "deg"), input_kind="reference")
+        )
+    nominal = """
+units: {force: deg/s^2, position: deg}
+inertia: {mass: {value: 1.0, fixed: true}}
+command:
+  - position_control: {proportional: {value: 400.0}, derivative: {value: 25.0}}
+"""
+    truth = {
+        "actuator_saturation": {"limit": top}, "command_rate_limit": {"rate": slew}, "actuator_deadband": {"width": dead},
+        "coulomb_friction": {"force": friction},
+    }  # fmt: skip
+    return Twin(records, nominal, effect, truth.get(effect, {}))
+
+
+def decay(effect: str = "quadratic_drag", seed: int = 0, count: int = 3, duration: float = 10.0) -> Twin:
+    """Free decays at 250 Hz after being let go; no input at all. Effects: `quadratic_drag`, `coulomb_friction`, ""."""
+    rng = np.random.default_rng([6, seed])
+    m, c, k, drag, friction, period = 1.2, 0.5, 180.0, 0.8, 0.15, 4e-3
+    records = []
+    for index in range(count):
+        time = np.arange(0.0, duration, period)
+
+        def rates(t: float, s: Array) -> list[float]:
+            force = -k * (s[0] - 0.02) - c * s[1]
+            if effect == "quadratic_drag":
+                force -= drag * s[1] * abs(s[1])
+            elif effect == "coulomb_friction":
+                force -= friction * sign(s[1], 1e-4)
+            return [s[1], force / m]
+
+        states = integrate(rates, [0.02 + (0.1, -0.06, 0.03)[index % 3], 0.0], time, 4e-3)
+        records.append(Record(f"decay {index}", Channel(time, noisy(rng, states[:, 0], 5e-5), "m")))
+    nominal = """
+inertia: {mass: {value: 1.2, unit: kg, fixed: true}}
+force:
+  - linear_spring: {stiffness: {value: 150.0, unit: N/m}, rest_length: {value: 0.0, unit: m}}
+  - viscous_damper: {damping: {value: 0.8, unit: N*s/m}}
+"""
+    truth = {"quadratic_drag": {"coefficient": drag}, "coulomb_friction": {"force": friction}}
+    return Twin(records, nominal, effect, truth.get(effect, {}))
+
+
+def camera(effect: str = "coulomb_friction", seed: int = 0, count: int = 3, duration: float = 20.0) -> Twin:
+    """A swing filmed at 30 Hz, position in pixels, no input; Coulomb friction missing (or nothing, "")."""
+    rng = np.random.default_rng([7, seed])
+    omega, zeta, friction, period = 2.0 * np.pi * 1.1, 0.01, 130.0, 1.0 / 30.0
+    records = []
+    for index in range(count):
+        time = np.arange(0.0, duration, period)
+        rub = friction if effect else 0.0
+        states = integrate(
+            lambda t, s: [s[1], -(omega**2) * (s[0] - 640.0) - 2.0 * zeta * omega * s[1] - rub * sign(s[1], 1.0)],
+            [640.0 + (400.0, -250.0, 120.0)[index % 3], 0.0], time, 0.01,
+        )  # fmt: skip
+        records.append(Record(f"film {index}", Channel(time, noisy(rng, states[:, 0], 0.5), "px")))
+    nominal = """
+units: {force: px/s^2, position: px}
+inertia: {mass: {value: 1.0, fixed: true}}
+force:
+  - linear_spring: {stiffness: {value: 40.0}, rest_length: {value: 600.0}}
+  - viscous_damper: {damping: {value: 0.3}}
+"""
+    return Twin(records, nominal, effect, {"force": friction})
+
+
+def circuit(cubic: float = 0.8, seed: int = 0, count: int = 2, duration: float = 1.0) -> Twin:
+    """An electronic oscillator (300 Hz) sampled at 10 kHz, volts in and out; the cubic is missing."""
+    rng = np.random.default_rng([8, seed])
+    omega, zeta, period = 2.0 * np.pi * 300.0, 0.04, 1e-4
+    records = []
+    for index in range(count):
+        drive = tones(rng, 0.1 if index else 0.2, 20.0, 900.0, 30)
+        time = np.arange(0.0, duration, period)
+        states = integrate(
+            lambda t, s: [s[1], omega**2 * (drive(t) - s[0] - cubic * s[0] ** 3) - 2.0 * zeta * omega * s[1]],
+            [0.0, 0.0], time, 2e-4,
+        )  # fmt: skip
+        records.append(
+            Record(
+                f"circuit {index}", Channel(time, noisy(rng, states[:, 0], 5e-4), "V"),
+                Channel(time, sampled(drive, time), "V"), hold="band_limited",
+            )
+        )  # fmt: skip
+    nominal = """
+units: {force: V, position: V}
+inertia: {mass: {value: 2.5e-7}}
+force:
+  - linear_spring: {stiffness: {value: 0.9}, rest_length: {value: 0.0, fixed: true}}
+  - viscous_damper: {damping: {value: 5.0e-5}}
+"""
+    return Twin(records, nominal, "cubic_stiffness" if cubic else "", {"coefficient": cubic})
