@@ -23,6 +23,15 @@ def test_frequency_amplitude_and_phase_of_a_recorded_cosine_are_found(frequency:
     assert found(TIME - found.origin) == pytest.approx(0.7 * np.cos(2 * np.pi * frequency * TIME + phase), abs=1e-8)
 
 
+@pytest.mark.parametrize("periods", [2.1, 2.5, 3.0, 4.0, 5.0, 6.3, 9.0])
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_few_periods_are_enough_and_their_period_is_not_doubled(periods: float, noise: float) -> None:
+    time = np.arange(round(1000 * periods)) * 1e-3
+    value = np.cos(2 * np.pi * time + 0.7) + noise * np.random.default_rng(2).standard_normal(len(time))
+    found = pumping_of_channel(channel(value, time))
+    assert found.frequency == pytest.approx(1.0, abs=1e-9 + 0.05 * noise)
+
+
 def test_a_stated_cosine_and_its_recording_are_the_same_pumping() -> None:
     stated = Pumping.cosine(-0.4, 1.25, 0.3)
     recorded = pumping_of_channel(channel(-0.4 * np.cos(2 * np.pi * 1.25 * TIME + 0.3)))

@@ -16,6 +16,7 @@ from rhythmid.signal import spline
 
 Array = NDArray[np.float64]
 HARMONICS = 9  # of the forcing that are looked for
+HARMONIC = 1e-3  # share of a forcing that its best period may leave before multiples of that period are tried
 GRID = 1024  # knots a period of the forcing as a signal; a cubic spline then follows a sinusoid to 1e-12
 
 
@@ -89,19 +90,28 @@ def fundamental_frequency(time: Array, value: Array) -> float:
     grid = np.interp(even, time, value)
     window = np.hanning(n)
     spectrum = np.abs(np.fft.rfft((grid - np.average(grid, weights=window)) * window, 4 * n))
-    peak = int(np.argmax(spectrum))
-    for divisor in (2, 3):  # the strongest line may be a harmonic
-        lower = round(peak / divisor)
-        if lower >= 6 and spectrum[lower - 2 : lower + 3].max() > 0.01 * spectrum[peak]:
-            peak = lower
-    frequency = peak * (n - 1) / (span * 4 * n)
-    for harmonics in (1, max(1, int(np.clip(0.25 * n / (span * frequency), 1, HARMONICS)))):
-        frequency = _refined(time - time.mean(), value, frequency, harmonics)
+    line = int(np.argmax(spectrum)) * (n - 1) / (span * 4 * n)
+    frequency, left = _refined(time - time.mean(), value, line)
+    for divisor in (2, 3):  # the strongest line may be a harmonic: then a multiple of its period leaves less
+        if left > HARMONIC * np.std(value) and line * span > 1.5 * divisor:
+            lower, rest = _refined(time - time.mean(), value, line / divisor)
+            if rest < 0.7 * left:
+                frequency, left = lower, rest
     return frequency
 
 
-def _refined(time: Array, value: Array, frequency: float, harmonics: int) -> float:
-    """Gauss-Newton on the frequency of a Fourier series with so many harmonics."""
+def _refined(time: Array, value: Array, frequency: float) -> tuple[float, float]:
+    """The frequency of a Fourier series near `frequency`, first with one harmonic; and the rms of what it leaves."""
+    rate = (len(time) - 1) / (time[-1] - time[0])
+    left = 0.0
+    for harmonics in (1, int(np.clip(0.25 * rate / frequency, 1, HARMONICS))):
+        frequency, left = _fourier_fit(time, value, frequency, harmonics)
+    return frequency, left
+
+
+def _fourier_fit(time: Array, value: Array, frequency: float, harmonics: int) -> tuple[float, float]:
+    """Gauss-Newton on the frequency of a Fourier series with so many harmonics; and the rms of what it leaves."""
+    left = 0.0
     h = np.arange(1, harmonics + 1)
     columns = np.ones((2 * harmonics + 2, len(time)))
     for _ in range(8):
@@ -112,6 +122,7 @@ def _refined(time: Array, value: Array, frequency: float, harmonics: int) -> flo
             columns[n], columns[harmonics + n] = np.real(power), np.imag(power)
         fourier = columns[:-1]
         solution = np.linalg.solve(fourier @ fourier.T, fourier @ value)
+        left = float(np.sqrt(np.mean((value - solution @ fourier) ** 2)))
         a, b = solution[1 : harmonics + 1], solution[harmonics + 1 :]
         columns[-1] = 2 * np.pi * time * ((h * b) @ fourier[1 : harmonics + 1] - (h * a) @ fourier[harmonics + 1 :])
         size = np.sqrt(np.sum(columns**2, axis=1))
@@ -120,7 +131,7 @@ def _refined(time: Array, value: Array, frequency: float, harmonics: int) -> flo
         frequency += step
         if abs(step) < 1e-13 * frequency:
             break
-    return frequency
+    return frequency, left
 
 
 def pumping_of_channel(channel: Channel, source: str = "forcing channel") -> Pumping:
