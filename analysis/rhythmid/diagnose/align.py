@@ -178,21 +178,23 @@ def _by_command(simulation: Record, recording: Record, sent: Channel, seen: Chan
             mismatch = mismatch or "no stretch of the recorded command is the simulation's"
         elif difference > SAME + 3.0 * white_level(seen.value) / size:
             mismatch = mismatch or f"the commands differ by {100 * difference:.0f} % of their size where they agree best"
-        cost = difference + abs(turn) + 0.1 * (1.0 - _agreement(simulation, recording, offset))
+        agreement, common = _agreement(simulation, recording, offset)
+        cost = difference + abs(turn) + 0.1 * (1.0 - agreement) + 0.2 * (1.0 - common)
         found.append((cost, Alignment("command", offset, std, turn, difference, mismatch)))
     return min(found, key=lambda pair: pair[0])[1]
 
 
-def _agreement(simulation: Record, recording: Record, offset: float) -> float:
-    """Correlation of the motions at an offset."""
+def _agreement(simulation: Record, recording: Record, offset: float) -> tuple[float, float]:
+    """Correlation of the motions at an offset, and the share of the shorter record that is common to both."""
     a, b = simulation.output, recording.output
     inside = (b.time >= a.time[0] + offset) & (b.time <= a.time[-1] + offset)
+    common = float(inside.sum() * b.period / min(simulation.duration, recording.duration))
     if inside.sum() < 8:
-        return -1.0
+        return -1.0, common
     one, other = np.interp(b.time[inside] - offset, a.time, a.value), b.value[inside]
     if np.ptp(one) == 0.0 or np.ptp(other) == 0.0:
-        return 0.0
-    return float(np.corrcoef(one, other)[0, 1])
+        return 0.0, common
+    return float(np.corrcoef(one, other)[0, 1]), common
 
 
 def _by_forcing(simulation: Record, recording: Record) -> Alignment | None:
@@ -209,9 +211,7 @@ def _by_forcing(simulation: Record, recording: Record) -> Alignment | None:
         return None
     offsets = [float(turn + count * b.period) for count in counts]
     near = sorted(offsets, key=lambda o: abs(o - (recording.output.time[0] - simulation.output.time[0])))
-    agreed = [(_agreement(simulation, recording, offset), offset) for offset in near[:200]]
-    top = max(agreement for agreement, _ in agreed)
-    offset = next(offset for agreement, offset in agreed if agreement > top - 1e-3)
+    offset = max(near[:200], key=lambda o: sum(w * part for w, part in zip((1.0, 0.2), _agreement(simulation, recording, o))))
     _, mismatch = _forcings(simulation, recording, offset)
     return Alignment("forcing", offset, 0.0, mismatch=mismatch)
 

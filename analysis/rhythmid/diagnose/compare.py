@@ -141,7 +141,7 @@ class Comparison:
     def summary(self) -> str:
         """The answer in a few sentences."""
         if not self.comparable:
-            return f"Not comparable: different excitation ({self.alignment.mismatch}); with --model the model is compared instead."
+            return f"Not comparable: different excitation ({self.alignment.mismatch}); with --model the model is run in the simulation's place."
         size = f"{100 * self.nrmse:.3g} % of the motion"
         started = any(one.slot is None for one in self.explanations)
         if not self.parted:
@@ -226,7 +226,9 @@ def compare(
     if alignment.mismatch and not through:
         explanations, left = [], difference
     else:
-        explanations, left = explain(pair, recording.output.unit, blind=alignment.by == "output")
+        explanations, left = explain(
+            pair, recording.output.unit, alignment.by == "output" and not through, alignment.turn != 0.0 and not through
+        )
     spread = float(np.std(pair.recording[pair.used]))
     return Comparison(
         simulation.name, recording.name, alignment, through,

@@ -22,6 +22,7 @@ FOLDS, DEALT = 5, 20  # folds of a cross-validation, stretches in each
 LEAST = 0.02  # share of what is left that an explanation has to take away to be one
 FAINT = 0.01  # share of the whole difference that it has to take away where the oscillator limits what can be explained
 SLIGHT = 0.001  # the same among ways in and out, which are applied exactly
+ROUGH = 0.05  # the same where limit cycle and response had to be shifted each for itself
 SIMPLER = 0.03  # share by which a simpler explanation may fall behind
 MOST = 4  # explanations
 UNITS = {"time": "s", "lag": "s", "gain": "", "skew": ""}
@@ -149,7 +150,7 @@ class Difference:
         for way in WAYS:
             if way.name in self.values or (blind and way.name == "measurement_delay"):
                 continue
-            if self.pair.cycle is None and way.slot == "command":
+            if (self.pair.cycle is None and way.slot == "command") or (self.pair.effort is None and way.slot == "actuator"):
                 continue
             square, values = self.fitted([*self.values, way.name], way)
             extra = ("input_delay",) if way.name == "measurement_delay" and self.pair.cycle is None else ()
@@ -163,7 +164,7 @@ class Difference:
         line = foreign_line(self.pair, self.whole())
         if line is not None:
             what = Explanation("periodic_disturbance", "force", 0.0, {"frequency": (line[0], "Hz")})
-            found.append(Trial(self.left_out(line[1]), 1, what, columns=line[1]))
+            found.append(Trial(self.left_out(line[1]), 3, what, columns=line[1]))
         late = self.values.get("measurement_delay", 0.0)
         for name, slot, rank, functions in force_functions(self.pair, late):
             columns = self.pair.oscillator.response(functions, self.pair.step)
@@ -181,27 +182,28 @@ class Difference:
         return replace(trial.what, explained=float(np.clip(self.share(trial.square), 0.0, 1.0)))
 
 
-def explain(pair: Pair, unit: str, blind: bool = False) -> tuple[list[Explanation], Array]:
+def explain(pair: Pair, unit: str, blind: bool = False, rough: bool = False) -> tuple[list[Explanation], Array]:
     """What explains the difference of a pair whose motions are in `unit`, step by step, and what is left of it (n,).
 
-    `blind` says that the motions themselves were aligned, which hides a constant delay.
+    `blind` says that the motions themselves were aligned, which hides a constant delay; `rough` that the pair is not exact.
     """
     known = Difference(pair)
     raw = (pair.recording - pair.simulation)[pair.used]
-    whole = known.square
+    whole = float(raw @ raw)
     found: list[Explanation] = []
-    if whole < 0.5 * float(raw @ raw):
-        found.append(Explanation("another start", None, 1.0 - whole / float(raw @ raw)))
+    if known.square < 0.5 * whole:
+        found.append(Explanation("another start", None, 1.0 - known.square / whole))
+        rough = True
     floor = max(1.05 * len(known.residual) * pair.noise**2, 1e-12 * float(np.sum(pair.recording**2)))
     for _ in range(MOST):
         if known.square <= floor:
             break
-        trials = known.ways(blind) + (known.forces() if known.force is None else [])
-        if not trials:
+        if known.force is not None and pair.effort is None:
             break
+        trials = known.ways(blind) + (known.forces() if known.force is None else [])
         chosen = known.simplest(trials)
         gain = known.square - chosen.square
-        faint = SLIGHT if known.force is None and chosen.values is not None else FAINT
+        faint = ROUGH if rough else SLIGHT if known.force is None and chosen.values is not None else FAINT
         if gain < LEAST * known.square or gain < faint * whole:
             break
         found.append(known.told(chosen))

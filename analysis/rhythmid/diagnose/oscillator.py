@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 Array = NDArray[np.float64]
+FEWEST = 8  # frequencies that a force has to hold; a single line takes three
 
 
 @dataclass(frozen=True)
@@ -35,28 +36,25 @@ class Oscillator:
         return np.column_stack([wave.real, wave.imag])
 
 
-def oscillator_of(
-    effort: Array | None, motion: Array, step: float, dominant: float, bandwidth: float
-) -> Oscillator:
+def oscillator_of(effort: Array, motion: Array, step: float, dominant: float, bandwidth: float) -> Oscillator | None:
     """Oscillator that turns a force (n,) into a motion (n,), both at steps [s], by what moves below `bandwidth` [Hz].
 
     Iterated weighted least squares over frequency (C. K. Sanathanan, J. Koerner, IEEE Trans. Autom. Control 8 (1963) 56) with a
-    delay that is tried out; a lightly damped oscillator at the `dominant` frequency [Hz] where no force is known.
+    delay that is tried out, up to half a period of the `dominant` motion [Hz]. None where the force holds too few frequencies.
     """
-    fallback = Oscillator(2.0 * np.pi * dominant, 0.1 * 2.0 * np.pi * dominant)
-    if effort is None or np.ptp(effort) == 0.0:
-        return fallback
     n = len(motion)
     window = np.hanning(n)
     force = np.fft.rfft((effort - effort.mean()) * window)
     answer = np.fft.rfft((motion - motion.mean()) * window)
     frequency = np.arange(len(force)) / (n * step)
     kept = (frequency > 1.5 / (n * step)) & (frequency < bandwidth)
+    if np.sum(np.abs(force) > 1e-2 * np.abs(force).max()) < FEWEST:
+        return None
     kept &= np.abs(force) > 1e-3 * np.abs(force).max()
-    if kept.sum() < 3:
-        return fallback
+    if kept.sum() < FEWEST:
+        return None
     s, force, answer = 2j * np.pi * frequency[kept], force[kept], answer[kept]
-    best, least = fallback, math.inf
+    best, least = None, math.inf
     for delay in np.linspace(0.0, 0.5 / dominant, 26):
         late = answer * np.exp(s * delay)
         weight, m, c, k = np.ones(len(s)), 1.0, 0.0, 1.0
@@ -74,3 +72,19 @@ def oscillator_of(
     return best
 
 
+
+
+def ringing(motion: Array, step: float, dominant: float) -> Oscillator | None:
+    """Oscillator that a free motion (n,) shows around its `dominant` frequency [Hz], by regression on itself a quarter and half a
+    period earlier; None where it does not ring down."""
+    lag = max(1, round(0.25 / (dominant * step)))
+    if len(motion) < 4 * lag:
+        return None
+    y = motion - motion.mean()
+    columns = np.column_stack([y[lag:-lag], y[: -2 * lag], np.ones(len(y) - 2 * lag)])
+    first, second, _ = np.linalg.lstsq(columns, y[2 * lag :], rcond=None)[0]
+    root = complex(np.roots([1.0, -first, -second])[0])
+    if not 0.0 < abs(root) < 1.0 or abs(root.imag) < 1e-3:
+        return None
+    decay, turn = -math.log(abs(root)) / (lag * step), abs(math.atan2(root.imag, root.real)) / (lag * step)
+    return Oscillator(math.hypot(turn, decay), 2.0 * decay)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.align import Alignment, active, pumping, smooth, white_level
-from rhythmid.diagnose.oscillator import Oscillator, oscillator_of
+from rhythmid.diagnose.oscillator import Oscillator, oscillator_of, ringing
 from rhythmid.errors import InputError
 from rhythmid.identify.series import bandwidth, block_length
 from rhythmid.record.record import Record
@@ -86,8 +86,7 @@ def pair_of(simulation: Record, recording: Record, alignment: Alignment) -> tupl
         return np.asarray(samples)[: count * block].reshape(count, block).mean(axis=1)
 
     time, step, real = average(common), block * grid.period, average(value)
-    spectrum = np.abs(np.fft.rfft((real - real.mean()) * np.hanning(count))) ** 2
-    frequency = max(1, int(np.argmax(spectrum[1:])) + 1) / (count * step)
+    frequency = _dominant(real, step)
     if frequency * (time[-1] - time[0]) < PERIODS:
         raise InputError(
             f"{simulation.name} and {recording.name} have {frequency * (time[-1] - time[0]):.2g} periods of the motion in common "
@@ -101,15 +100,40 @@ def pair_of(simulation: Record, recording: Record, alignment: Alignment) -> tupl
     highest = min(bandwidth(value, grid.period), 0.5 / step)
     pumped = pumping(recording)
     noise = math.hypot(white_level(recording.output.value), white_level(simulation.output.value)) / math.sqrt(block)
+    oscillator = None if effort is None else oscillator_of(effort, simulated, step, frequency, highest)
+    if oscillator is None:
+        oscillator = _free(real, simulated, time, step, noise, effort is None, None if pumped is None else pumped.frequency)
     pair = Pair(
         time, step, real, simulated, average(grid.valid[inside].astype(float)) == 1.0, noise, frequency, highest,
-        oscillator_of(effort, simulated, step, frequency, highest), None, command, effort,
+        oscillator or Oscillator(3.0 * np.pi * frequency, 1.5 * np.pi * frequency), None, command, effort,
         None if pumped is None else ((time - pumped.origin) * pumped.frequency) % 1.0,
         None if pumped is None else pumped.frequency,
     )  # fmt: skip
     if pumped is None or command is None or not active(recording.input):
         return pair, []
     return _with_cycle(pair, pumped.frequency, alignment.turn)
+
+
+def _dominant(motion: Array, step: float) -> float:
+    """Frequency [Hz] of the strongest line of a motion (n,)."""
+    power = np.abs(np.fft.rfft((motion - motion.mean()) * np.hanning(len(motion)))) ** 2
+    return max(1, int(np.argmax(power[1:])) + 1) / (len(motion) * step)
+
+
+def _free(
+    real: Array, simulated: Array, time: Array, step: float, noise: float, free: bool, pumping: float | None
+) -> Oscillator | None:
+    """The oscillator that shows where no rich force does: in the simulated motion if that is `free`, else in the difference
+    between the harmonics of the forcing; None if neither rings."""
+    if free and pumping is None:
+        return ringing(simulated, step, _dominant(simulated, step))
+    rest = real - simulated
+    if pumping is not None:
+        columns = harmonic_columns(time, pumping, int(np.clip(0.25 / (step * pumping), 1, HARMONICS)))
+        rest = rest - columns @ np.linalg.lstsq(columns, rest, rcond=1e-10)[0]
+    if np.std(rest) < 3.0 * noise:
+        return None
+    return ringing(rest, step, _dominant(rest, step))
 
 
 def _with_cycle(pair: Pair, frequency: float, turn: float) -> tuple[Pair, list[str]]:

@@ -42,7 +42,8 @@ def _verdict(result: Mapping[str, Any]) -> tuple[str, Tone]:
         return "Not comparable", "open"
     if not result["parted"]:
         return "Simulation and recording agree", "good"
-    return f"They part first in the slot: {result['slot']}", "found"
+    names = " + ".join(_name(one) for one in result["explanations"] if one["slot"] is not None)
+    return f"They part: {names}", "found"
 
 
 def _tiles(result: Mapping[str, Any]) -> Tiles:
@@ -62,11 +63,11 @@ def _seconds(value: float) -> str:
 
 def comparison_section(result: Mapping[str, Any], run: Run, unit: str, path: bool = False) -> Section:
     """What a comparison found; `path` says to draw the signal path as well."""
-    blocks: list[Block] = [Paragraph(result["summary"], "lead")]
+    blocks: list[Block] = [] if path else [Paragraph(result["summary"], "lead")]
     if path and result["slot"] is not None:
         names = [one for one in result["explanations"] if one["slot"] is not None]
         slots = {
-            slot: SlotContent((), tuple(_name(one) for one in names if one["slot"] == slot))
+            slot: SlotContent(("as simulated",), tuple(_name(one) for one in names if one["slot"] == slot))
             for slot in ("command", "actuator", "force", "sensor", "timing")
         }
         alt = f"Signal path from the command u to the output y. Marked: {', '.join(one['slot'] for one in names)}."
@@ -91,7 +92,9 @@ def comparison_section(result: Mapping[str, Any], run: Run, unit: str, path: boo
 
 def _name(one: Mapping[str, Any]) -> str:
     """An explanation's name: an element, or a force that goes with something."""
-    return pretty_name(one["name"]) if "_" in one["name"] or one["slot"] is None else f"goes with {one['name']}"
+    if "_" in one["name"] or one["slot"] is None:
+        return pretty_name(one["name"])
+    return f"{'force' if one['slot'] == 'force' else 'effect'} that goes with {one['name']}"
 
 
 def _explanations(result: Mapping[str, Any]) -> Table:

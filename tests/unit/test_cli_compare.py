@@ -1,0 +1,52 @@
+"""`rhythmid diagnose --sim`: from two bags to terminal, JSON and page, without a model."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+EXPERIMENT = """
+model: machine.yaml
+excitation: {{type: chirp, amplitude: 1.0, band: [0, 7], sweep: 8.0}}
+forcing: {{amplitude: 1.0, frequency: 1.0}}
+noise: {{measurement_std: {noise}}}
+delays: {{input: {delay}, measurement: 0.0}}
+"""
+HOPPER = Path(__file__).parents[2] / "analysis/rhythmid/models/paper_hopper.yaml"
+
+
+@pytest.fixture
+def bags(rhythmid, tmp_path):
+    """A simulation's bag and a real one whose command arrives 20 ms late."""
+    (tmp_path / "machine.yaml").write_text(HOPPER.read_text())
+    for name, noise, delay in (("sim", 0.0, 0.0), ("real", 1e-4, 0.02)):
+        (tmp_path / f"{name}.yaml").write_text(EXPERIMENT.format(noise=noise, delay=delay))
+        done = rhythmid("simulate", "machine.yaml", "--experiment", f"{name}.yaml", "--out", name)
+        assert done.returncode == 0, done.stderr
+    return tmp_path
+
+
+def test_two_bags_are_enough(rhythmid, bags):
+    done = rhythmid("diagnose", "real", "--sim", "sim", "--json", "out.json", "--report", "out.html")
+    assert done.returncode == 0, done.stderr
+    assert "input delay" in " ".join(done.stdout.split())
+    found = json.loads((bags / "out.json").read_text())["comparison"]
+    assert found["slot"] == "command"
+    assert found["explanations"][0]["parameters"]["delay"]["value"] == pytest.approx(0.02, abs=1e-3)
+    page = (bags / "out.html").read_text()
+    assert "Simulation against recording" in page and "they part here" in page
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((), "give --model NOMINAL.yaml, --sim BAG, or both"),
+        (("--sim", "sim", "--save-model", "x.yaml"), "belong to a model"),
+        (("--sim", "nowhere"), "nowhere: no such file"),
+    ],
+)
+def test_what_is_missing_is_said_in_one_line(rhythmid, bags, arguments, words):
+    done = rhythmid("diagnose", "real", *arguments)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert done.stderr.count("error:") == 1
