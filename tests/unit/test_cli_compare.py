@@ -5,6 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from rhythmid.experiment import Experiment, perform
+from rhythmid.record.bag_writer import write_bag
+
 EXPERIMENT = """
 model: machine.yaml
 excitation: {{type: chirp, amplitude: 1.0, band: [0, 7], sweep: 8.0}}
@@ -15,19 +18,20 @@ delays: {{input: {delay}, measurement: 0.0}}
 HOPPER = Path(__file__).parents[2] / "analysis/rhythmid/models/paper_hopper.yaml"
 
 
-@pytest.fixture
-def bags(rhythmid, tmp_path):
-    """A simulation's bag and a real one whose command arrives 20 ms late."""
-    (tmp_path / "machine.yaml").write_text(HOPPER.read_text())
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory):
+    """Folder with a simulation's bag and a real one whose command arrives 20 ms late."""
+    folder = tmp_path_factory.mktemp("bags")
+    (folder / "machine.yaml").write_text(HOPPER.read_text())
     for name, noise, delay in (("sim", 0.0, 0.0), ("real", 1e-4, 0.02)):
-        (tmp_path / f"{name}.yaml").write_text(EXPERIMENT.format(noise=noise, delay=delay))
-        done = rhythmid("simulate", "machine.yaml", "--experiment", f"{name}.yaml", "--out", name)
-        assert done.returncode == 0, done.stderr
-    return tmp_path
+        (folder / f"{name}.yaml").write_text(EXPERIMENT.format(noise=noise, delay=delay))
+        messages = perform(Experiment.load(folder / f"{name}.yaml"))
+        write_bag(folder / name, {topic: messages[topic] for topic in ("excitation", "forcing", "joint_states")})
+    return folder
 
 
 def test_two_bags_are_enough(rhythmid, bags):
-    done = rhythmid("diagnose", "real", "--sim", "sim", "--json", "out.json", "--report", "out.html")
+    done = rhythmid("diagnose", "real", "--sim", "sim", "--json", "out.json", "--report", "out.html", cwd=bags)
     assert done.returncode == 0, done.stderr
     assert "input delay" in " ".join(done.stdout.split())
     found = json.loads((bags / "out.json").read_text())["comparison"]
@@ -46,7 +50,7 @@ def test_two_bags_are_enough(rhythmid, bags):
     ],
 )
 def test_what_is_missing_is_said_in_one_line(rhythmid, bags, arguments, words):
-    done = rhythmid("diagnose", "real", *arguments)
+    done = rhythmid("diagnose", "real", *arguments, cwd=bags)
     assert done.returncode == 2
     assert words in done.stderr
     assert done.stderr.count("error:") == 1
