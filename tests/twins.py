@@ -157,10 +157,10 @@ force: [{viscous_damper: {damping: {value: 0.1}}}]
 def pendulum(large: bool = True, seed: int = 0, count: int = 2, duration: float = 20.0, driven: bool = True) -> Twin:
     """Pendulum at 200 Hz with large swings (or a linear torsional spring), a linear nominal model."""
     rng = np.random.default_rng([3, seed])
-    inertia, c, moment, period = 0.02, 0.004, 0.9, 5e-3
+    inertia, c, moment, period = 0.02, 0.02, 0.9, 5e-3
     records = []
     for index in range(count):
-        torque = tones(rng, 0.25 if driven else 0.0, 0.3, 2.0)
+        torque = tones(rng, 0.15 if driven else 0.0, 0.3, 2.0)
         time = np.arange(0.0, duration, period)
         start = [1.8, 0.0] if index == 0 else [-0.5, 2.0]
         states = integrate(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from rhythmid.diagnose.calibrate import Calibration, calibrate, causal, reconstructed
+from rhythmid.diagnose.calibrate import Calibration, causal
 from rhythmid.diagnose.confidence import probabilities
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.gate import admitted
@@ -29,6 +29,7 @@ from rhythmid.diagnose.result import (
     MissingEffect,
     Remainder,
 )
+from rhythmid.diagnose.scoring import settle
 from rhythmid.diagnose.screen import trajectories
 from rhythmid.diagnose.search import WORTH, Search, search
 from rhythmid.diagnose.verdict import element_of, significant, twins_of, verdict_of
@@ -37,11 +38,10 @@ from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import drive_of, driven
 from rhythmid.identify.free_run import prepare_run
-from rhythmid.identify.multiple_shooting import forgets, scoring_of, windows
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.repeats import noise_from_repeats
-from rhythmid.identify.series import Series, hold_out_tail, prepare, scales
+from rhythmid.identify.series import Series, prepare, scales
 from rhythmid.model import Model
 from rhythmid.parallel import cores
 from rhythmid.record.record import Record
@@ -92,24 +92,14 @@ def diagnose(
     check_comparable(everything)
     count = len(records)
     notes = dict.fromkeys(drive_of(a, b) for a, b in zip((*records, *holdout), given))
-    scoring = "free run"
-    if not forgets(model, everything):
-        count = len(windows(everything[:count]))
-        everything = windows(everything)
-        scoring = scoring_of(everything)
-        tell(f"scoring in {scoring}")
-    if holdout:
-        seen, unseen = everything[:count], everything[count:]
-        heldout = f"held out: {', '.join(one.name for one in unseen)}"
-    else:
-        seen, unseen = hold_out_tail(everything[:count])
-        heldout = f"held out: the last fifth of every {'record' if scoring == 'free run' else 'window'}"
     # the matrices are tall and thin, and workers run side by side: threads inside linear algebra only get in the way
     with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
-        calibration = calibrate(model, seen, known, pool, tell)
-        seen = list(calibration.series)
-        if calibration.reconstructed:
-            unseen = [reconstructed(one) for one in unseen]
+        scoring = settle(model, everything[:count], everything[count:], known, pool, tell)
+        calibration, seen, unseen = scoring.calibration, list(scoring.calibration.series), list(scoring.unseen)
+        if holdout:
+            heldout = f"held out: {', '.join(record.name for record in holdout)}"
+        else:
+            heldout = f"held out: the last fifth of every {'record' if scoring.free_run else 'window'}"
         known = known.within(scales(seen, calibration.fit.model))
         found = search(seen, calibration.fit, known, pool, tell)
         tell("judging on held-out records")
@@ -120,7 +110,7 @@ def diagnose(
         judge = HeldOut(found, unseen if holdout else None)
         diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful)
         said = (*diagnosis.notes, *(note for note in notes if note is not None))
-        diagnosis = replace(diagnosis, scoring=scoring, notes=said)
+        diagnosis = replace(diagnosis, scoring=scoring.words, notes=said)
         nominal_run, augmented_run = judge.fit(found.nominal.model), judge.fit(found.fit.model)
     evidence = Evidence(
         tuple(seen),

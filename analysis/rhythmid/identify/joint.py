@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.harmonic_likelihood import DELAYS, INPUT_DELAY, MEASUREMENT_DELAY, harmonic_likelihood
-from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
 from rhythmid.identify.multiple_shooting import split
+from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
 from rhythmid.identify.series import Series, dominant_frequency, prepare
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model

@@ -51,25 +51,20 @@ def split(series: Series, length: float) -> list[Series]:
     return parts
 
 
-def windows(series: Sequence[Series]) -> list[Series]:
-    """All series cut into windows of a few periods of their motion; a short rest at the end of one is left out."""
+def periods_long(series: Series) -> float:
+    """Length [s] of windows that hold a few periods of the motion."""
+    step = series.period * series.block
+    length = max(PERIODS / dominant_frequency(series), LEAST * step)
+    return min(length, series.blocks * step / FEWEST)
+
+
+def windows(series: Sequence[Series], length: float) -> list[Series]:
+    """All series cut into windows of about `length` [s]; a short rest at the end of one is left out."""
     found: list[Series] = []
     for one in series:
-        step = one.period * one.block
-        length = max(PERIODS / dominant_frequency(one), LEAST * step)
-        length = min(length, one.blocks * step / FEWEST)
         parts = split(one, length)
-        found += [part for part in parts if part.blocks >= min(LEAST, parts[0].blocks) // 2]
+        found += [part for part in parts if part.blocks >= parts[0].blocks // 2]
     return found
-
-
-def scoring_of(series: Sequence[Series]) -> str:
-    """How windows are scored, in words."""
-    lengths = [one.blocks * one.block * one.period for one in series]
-    return (
-        f"windows of {float(np.median(lengths)):.2g} s with initial states of their own (multiple shooting): the model "
-        "integrates or is unstable, so that a long free run would add up every small disturbance"
-    )
 
 
 def forgets(model: Model, series: Sequence[Series]) -> bool:

@@ -23,6 +23,7 @@ from rhythmid.simulate import start_states
 
 Array = NDArray[np.float64]
 WHITE = NoiseModel(np.empty(0), 1.0)
+LOST = 0.3  # error, as a share of the motion, above which a model has lost the machine
 Progress = Callable[[str], None]
 
 
@@ -281,6 +282,8 @@ def estimate(
     scaled = NoiseModel(np.empty(0), spread * 1e-2)
     fit = minimise(model, run, chosen, scaled, guess, iterations, pool)
     rms = math.sqrt(fit.chi2 / max(fit.samples, 1)) * scaled.std
+    if fit.nrmse() > LOST:  # what is left is no noise: taken for colour, it would lead the parameters anywhere
+        return minimise(fit.model, run, chosen, NoiseModel(np.empty(0), rms), fit.starts, iterations, pool)
     if max_step is None:
         finer = accurate(run, fit.model, fit.starts, max(0.1 * rms, 1e-7 * spread))
         run = finer

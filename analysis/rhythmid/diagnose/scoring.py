@@ -1,0 +1,108 @@
+"""How records are scored: in free run where that means something, else in windows with starts of their own.
+
+A free run means nothing where the machine integrates, or where the nominal model loses it altogether: a score along a
+trajectory that the machine never took says nothing of what the model lacks. Windows are made shorter until the model
+follows the machine through them.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from rhythmid.diagnose.calibrate import Calibration, calibrate, reconstructed
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.errors import InputError
+from rhythmid.identify.multiple_shooting import LEAST, forgets, periods_long, windows
+from rhythmid.identify.output_error import LOST, Fit
+from rhythmid.identify.series import Series, hold_out_tail
+from rhythmid.model import Model
+
+BETTER = 0.7  # share to which shorter windows have to lower the error
+SHORTER = 3.0  # factor from one length of windows to the next
+INTEGRATES = "the model integrates or is unstable, so that a long free run would add up every small disturbance"
+LOSES = "in free run the nominal model loses the machine"
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Scoring:
+    """The calibrated nominal model, `unseen` held-out series where they are separate ones, and in `words` how all is scored:
+    "free run", or in windows and why."""
+
+    calibration: Calibration
+    unseen: tuple[Series, ...]
+    words: str
+
+    @property
+    def free_run(self) -> bool:
+        return self.words == "free run"
+
+
+def settle(
+    model: Model,
+    series: Sequence[Series],
+    separate: Sequence[Series],
+    catalogue: Catalogue,
+    pool: ThreadPoolExecutor | None = None,
+    tell: Tell = lambda _: None,
+) -> Scoring:
+    """Calibrate the nominal model in the longest runs through which it follows the machine.
+
+    Without `separate` held-out series the last fifth of every run is held out. Raises InputError when no length works.
+    """
+    best: Scoring | None = None
+    failure: InputError | None = None
+    for length, reason in _ladder(model, series):
+        words = "free run" if math.isinf(length) else _words(length, reason)
+        if not math.isinf(length):
+            tell(f"scoring in {words}")
+        cut, unseen = _cut(series, length), _cut(separate, length)
+        if not separate:
+            cut, unseen = hold_out_tail(cut)
+        try:
+            calibration = calibrate(model, cut, catalogue, pool, tell)
+        except InputError as error:
+            failure = failure or error
+            continue
+        if best is not None and _error(calibration.fit) > BETTER * _error(best.calibration.fit):
+            break
+        if calibration.reconstructed:
+            unseen = [reconstructed(one) for one in unseen]
+        best = Scoring(calibration, tuple(unseen), words)
+        if calibration.fit.nrmse() < LOST:
+            break
+    if best is None:
+        assert failure is not None
+        raise failure
+    return best
+
+
+def _cut(series: Sequence[Series], length: float) -> list[Series]:
+    return list(series) if math.isinf(length) else windows(series, length)
+
+
+def _ladder(model: Model, series: Sequence[Series]) -> Iterator[tuple[float, str]]:
+    """Lengths of windows [s] to try, the longest first, infinite for a free run; with the reason for windows."""
+    try:
+        free = forgets(model, series)
+    except InputError:
+        free = False
+    if free:
+        yield math.inf, ""
+    length = float(np.median([periods_long(one) for one in series]))
+    shortest = LEAST * max(one.period * one.block for one in series)
+    while length >= shortest:
+        yield length, LOSES if free else INTEGRATES
+        length /= SHORTER
+
+
+def _error(fit: Fit) -> float:
+    """rms of the residuals, in the output's unit."""
+    return float(np.sqrt(np.mean(np.concatenate([r[one.used] for r, one in zip(fit.residuals, fit.run.series)]) ** 2)))
+
+
+def _words(length: float, reason: str) -> str:
+    return f"windows of {length:.2g} s with initial states of their own (multiple shooting): {reason}"
