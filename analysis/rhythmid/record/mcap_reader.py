@@ -8,6 +8,7 @@ import mmap
 import struct
 import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from rhythmid.record.compression import decompress
 from rhythmid.record.mcap_writer import CHANNEL, CHUNK, FOOTER, MAGIC, MESSAGE, SCHEMA
 
 _head = struct.Struct("<BQ")
+_FOOTER_SIZE = 9 + 8 + 8 + 4
 _MESSAGE_BATCH = 100_000  # messages that lie outside of chunks are handed out in blocks of at most this many
 
 
@@ -108,6 +110,7 @@ class McapReader:
                 raise ValueError("its checksum is wrong")
         except (ValueError, struct.error) as error:
             self.damage.append(f"chunk at byte {at - 9} is damaged and was skipped: {error}")
+            self._declare_from_summary()  # the chunk may have been the one that did
             return
         found, stop = self._scan(plain, 0, len(plain))
         if whole and stop < len(plain):
@@ -115,6 +118,17 @@ class McapReader:
                 f"chunk at byte {at - 9} is damaged: its last {len(plain) - stop} bytes were skipped"
             )
         yield from self._split(plain, found, wanted)
+
+    def _declare_from_summary(self) -> None:
+        """Declare the topics that the summary at the end of the file repeats, where there is one."""
+        end = len(self._data) - len(MAGIC)
+        footer = end - _FOOTER_SIZE
+        if footer < 0 or bytes(self._data[end:]) != MAGIC or self._data[footer] != FOOTER:
+            return
+        (at,) = struct.unpack_from("<Q", self._data, footer + 9)
+        if 0 < at < footer:
+            with suppress(struct.error):  # it may be damaged, too
+                self._scan(self._data, at, footer)
 
     def _declare_schema(self, body: bytes) -> None:
         (number,) = struct.unpack_from("<H", body)

@@ -46,8 +46,9 @@ class SqliteReader:
                 raise InputError(
                     f"{self.path}: is not an sqlite3 bag (it does not start like an sqlite database)"
                 )
-            whole = _size_by_header(head)
-            cut_off = self.path.stat().st_size < whole and not self._journals
+            page, whole = _sizes_by_header(head)
+            size = self.path.stat().st_size
+            cut_off = size < whole and not self._journals
             if not self._journals and not cut_off:
                 yield from self._read(self.path, "mode=ro", wanted)
                 return
@@ -55,8 +56,9 @@ class SqliteReader:
                 for file in (self.path, *self._journals):
                     shutil.copyfile(file, Path(folder) / file.name)
                 copy = Path(folder) / self.path.name
-                if cut_off:
-                    os.truncate(copy, whole)  # zeros for what is lost, or sqlite would not even read what is there
+                if cut_off:  # zeros for the pages that are lost, or sqlite would not even read those that are there
+                    os.truncate(copy, size - size % page)
+                    os.truncate(copy, whole)
                 yield from self._read(copy, "mode=rw", wanted)
         except sqlite3.Error as error:
             reason = " ".join(str(error).split())[:200]  # sqlite quotes whole columns
@@ -75,6 +77,8 @@ class SqliteReader:
             )
             while batch := self._fetch(rows):
                 number, log_ns, data = zip(*batch, strict=True)
+                if {*map(type, number), *map(type, log_ns)} != {int} or {*map(type, data)} != {bytes}:
+                    raise sqlite3.DatabaseError("not every row of its table 'messages' is a message")
                 size = np.fromiter(map(len, data), dtype=np.int64, count=len(data))
                 start = np.cumsum(size) - size
                 yield from by_topic(
@@ -88,8 +92,6 @@ class SqliteReader:
             return batch
         try:
             for row in islice(rows, _ROWS):
-                if list(map(type, row)) != [int, int, bytes]:
-                    raise sqlite3.DatabaseError("what follows is no message")
                 batch.append(row)
         except sqlite3.DatabaseError as error:
             if not self._fetched and not batch:
@@ -100,12 +102,13 @@ class SqliteReader:
         return batch
 
 
-def _size_by_header(head: bytes) -> int:
-    """Size [bytes] of a database by the first 32 of its bytes (https://sqlite.org/fileformat.html); 0 if not stated."""
+def _sizes_by_header(head: bytes) -> tuple[int, int]:
+    """Sizes [bytes] of a page and of the whole database by the first 32 of its bytes (https://sqlite.org/fileformat.html)."""
     if len(head) < 32:
-        return 0
+        return 1, 0
     page, pages = struct.unpack_from(">H", head, 16)[0], struct.unpack_from(">I", head, 28)[0]
-    return (65536 if page == 1 else page) * pages
+    page = 65536 if page == 1 else max(1, page)
+    return page, page * pages
 
 
 def _topics(database: sqlite3.Connection) -> dict[int, Topic]:
