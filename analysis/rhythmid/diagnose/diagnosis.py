@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.diagnose.calibrate import Calibration, causal
 from rhythmid.diagnose.confidence import probabilities
 from rhythmid.diagnose.delays import delays_of
+from rhythmid.diagnose.exclusions import unscored
 from rhythmid.diagnose.gate import admitted
 from rhythmid.diagnose.heldout import HeldOut, tail_error
 from rhythmid.diagnose.locate import Dependence, dependences
@@ -32,6 +33,8 @@ from rhythmid.diagnose.result import (
 from rhythmid.diagnose.scoring import settle
 from rhythmid.diagnose.screen import trajectories
 from rhythmid.diagnose.search import WORTH, Search, search
+from rhythmid.diagnose.sufficiency import check_driven, tempered, without_clipped
+from rhythmid.diagnose.units import check_units
 from rhythmid.diagnose.verdict import element_of, significant, twins_of, verdict_of
 from rhythmid.diagnose.wording import location_of, recalibrated, summary_of
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
@@ -86,14 +89,21 @@ def diagnose(
     `holdout` records are used to judge only; without any, the last fifth of every record is held out. The result is the
     same whenever the records are. Raises InputError for records or models that cannot be judged.
     """
+    if not records:
+        raise InputError("no record is given; name at least one bag or table")
     known = catalogue or load_catalogue()
-    given = [driven(record, model) for record in (*records, *holdout)]
+    remark = check_driven((*records, *holdout), model)
+    cleaned = [without_clipped(record) for record in (*records, *holdout)]
+    given = [driven(record, model) for record, _ in cleaned]
     everything = prepare(given)
     check_comparable(everything)
     count = len(records)
-    notes = dict.fromkeys(drive_of(a, b) for a, b in zip((*records, *holdout), given))
+    notes = dict.fromkeys(
+        (remark, *(note for _, note in cleaned), *(drive_of(a, b) for (a, _), b in zip(cleaned, given)))
+    )
     # the matrices are tall and thin, and workers run side by side: threads inside linear algebra only get in the way
     with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
+        check_units(model, everything[:count], pool)
         scoring = settle(model, everything[:count], everything[count:], known, pool, tell)
         calibration, seen, unseen = scoring.calibration, list(scoring.calibration.series), list(scoring.unseen)
         if holdout:
@@ -110,7 +120,9 @@ def diagnose(
         judge = HeldOut(found, unseen if holdout else None)
         diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful)
         said = (*diagnosis.notes, *(note for note in notes if note is not None))
-        diagnosis = replace(diagnosis, scoring=scoring.words, notes=said)
+        excluded = (*diagnosis.excluded, *unscored(found, known, pool))
+        diagnosis = replace(diagnosis, scoring=scoring.words, notes=said, excluded=excluded)
+        diagnosis = tempered(diagnosis, everything[:count], found, pool)
         nominal_run, augmented_run = judge.fit(found.nominal.model), judge.fit(found.fit.model)
     evidence = Evidence(
         tuple(seen),
@@ -136,7 +148,10 @@ def check_comparable(series: Sequence[Series]) -> None:
         for j in range(i):
             jump = abs(level[i] - level[j])
             size = max(spread[i], spread[j])
-            if jump > 300.0 * size or max(spread[i], spread[j]) > 2000.0 * min(spread[i], spread[j]):
+            decades = [abs(math.log10(max(abs(a), 1e-300) / max(abs(b), 1e-300))) for a, b in
+                       ((spread[i], spread[j]), (level[i], level[j]))]  # fmt: skip
+            thousand = all(2.5 < one < 3.5 for one in decades)
+            if thousand or jump > 300.0 * size or max(spread[i], spread[j]) > 2000.0 * min(spread[i], spread[j]):
                 raise InputError(
                     f"{series[j].name} and {one.name} do not look like one machine in one unit (outputs "
                     f"{level[j]:.3g} ± {spread[j]:.3g} and {level[i]:.3g} ± {spread[i]:.3g}); check units and files"

@@ -122,27 +122,36 @@ class Quality:
 
 
 def clipped(value: NDArray[np.float64]) -> int:
-    """Number of samples in runs of at least 4 at the largest or smallest value.
+    """Number of samples in runs of at least 4 at the largest or smallest value; see `clipped_samples`."""
+    return int(np.count_nonzero(clipped_samples(value)))
+
+
+def clipped_samples(value: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Whether samples lie in runs of at least 4 at the largest or smallest value, as a limit leaves them.
 
     Coarse rounding and plateaus also make such runs; it is clipping only if the next value inwards is far rarer than
     the extreme one, for a signal that passes through has no reason to be. Signals of few levels have no such next value.
     """
     if len(value) < CLIPPED_RUN:
-        return 0
-    return sum(_at_limit(side) for side in (value, -value))
+        return np.zeros(len(value), dtype=bool)
+    return _at_limit(value) | _at_limit(-value)
 
 
-def _at_limit(value: NDArray[np.float64]) -> int:
+def _at_limit(value: NDArray[np.float64]) -> NDArray[np.bool_]:
+    found = np.zeros(len(value), dtype=bool)
     top = value.max()
     at_top = value == top
     if at_top.sum() < CLIPPED_RUN:
-        return 0
+        return found
     edges = np.flatnonzero(np.diff(np.concatenate([[False], at_top, [False]])))
-    runs = edges[1::2] - edges[::2]
-    count = int(runs[runs >= CLIPPED_RUN].sum())
+    runs = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2])]
+    for begin, end in runs:
+        found[begin:end] = end - begin >= CLIPPED_RUN
     below = value.max(where=~at_top, initial=-math.inf)
     at_ends = (
         at_top[0] and at_top[-1] and len(runs) <= 2
     )  # at rest before and after: a limit would act in between
     few_levels = below == -math.inf or value.min() == below
-    return count if not (few_levels or at_ends) and count > CLIPPED_EXCESS * np.sum(value == below) else 0
+    if few_levels or at_ends or found.sum() <= CLIPPED_EXCESS * np.sum(value == below):
+        return np.zeros(len(value), dtype=bool)
+    return found

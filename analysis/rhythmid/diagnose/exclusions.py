@@ -1,0 +1,35 @@
+"""Candidates that could not even be scored because the simulation blows up with them: said, not passed over."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+
+from rhythmid.diagnose.screen import change_of_output, guesses, residual_line, trajectories
+from rhythmid.diagnose.search import Search
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.identify.series import scales
+
+
+def unscored(found: Search, catalogue: Catalogue, pool: ThreadPoolExecutor | None = None) -> list[str]:
+    """A sentence about each element of the catalogue that makes the simulation diverge whatever its size."""
+    fit = found.nominal
+    scored = {score.element.name for score in found.rounds[0].scores}
+    sizes = replace(scales(fit.run.series, fit.model), residual_frequency=residual_line(fit))
+    left = [case for case in guesses(catalogue, fit.model, sizes) if case[0].name not in scored]
+    if not left:
+        return []
+    known = trajectories(fit)
+
+    def diverges(case) -> bool:
+        with np.errstate(all="ignore"):
+            outputs = change_of_output(known, *case)
+        return outputs is None or not all(np.isfinite(one).all() for one in outputs)
+
+    results = list(pool.map(diverges, left)) if pool else [diverges(case) for case in left]
+    names = dict.fromkeys(element.name for element, _ in left)
+    return [
+        f"{name}: the simulation diverges with it from every first guess"
+        for name in names
+        if all(result for (element, _), result in zip(left, results) if element.name == name)
+    ]
