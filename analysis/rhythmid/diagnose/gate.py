@@ -15,6 +15,7 @@ from rhythmid.diagnose.refit import Proposal, run_trials, whole_fit
 from rhythmid.diagnose.search import Search
 from rhythmid.identify.series import Series
 
+FAINT = 3.0  # standard deviations from its absence, nearer than which an effect's size is no size
 HARM = 0.01  # share by which the held-out error falls without an effect that does harm
 USE = 0.003  # share by which the error on seen and held-out records together has to rise without an effect of use
 
@@ -28,6 +29,12 @@ def admitted(
     """
     dropped: list[str] = []
     while found.best.added:
+        faint = next((label for label in found.best.added if _faint(found, label)), None)
+        slim = _without(found, faint, pool) if faint is not None else None
+        if slim is not None:
+            found = slim
+            dropped.append(f"{faint}: its size is within {FAINT:g} standard deviations of its absence")
+            continue
         seen, error = found.fit.nrmse(), _held_out(found, separate)
         if error is None:
             break
@@ -47,6 +54,16 @@ def admitted(
         least, label, found = min(doubtful, key=lambda case: case[0])
         dropped.append(f"{label}: the held-out error is {least:.3g} without it and {error:.3g} with it")
     return found, tuple(dropped)
+
+
+def _faint(found: Search, label: str) -> bool:
+    """Whether the size of an effect of the chosen model cannot be told from its absence."""
+    term = found.fit.model.term(label)
+    if term is None or not term.element.size or math.isinf(term.element.absent):
+        return False
+    name = f"{label}.{term.element.size}"
+    distance = abs(found.fit.model.value(name) - term.element.absent)
+    return name in found.fit.std and distance < FAINT * found.fit.std[name]
 
 
 def _held_out(found: Search, separate: Sequence[Series] | None) -> float | None:

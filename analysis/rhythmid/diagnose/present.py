@@ -95,7 +95,7 @@ def findings(
         runs=tuple(runs),
         output_unit=nominal.units.position,
         noise=repeats.variance**0.5 if repeats else None,
-        slow_noise=(repeats or noise_of(found.fit)).long_run_variance ** 0.5,
+        slow_noise=(repeats or noise_of(found.fit.residuals, found.fit.run.series)).long_run_variance ** 0.5,
         scores=_scores(found),
         threshold=float(chi2_distribution.isf(LEVEL / count, 1)),
         functions=_functions(evidence.before, evidence.after if found.best.added else (), runs, nominal),

@@ -6,6 +6,7 @@ that is missing from the others must not be taken for coloured noise.
 
 import math
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,15 +16,16 @@ from rhythmid.elements.element import STEP, Element
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import FreeRun, prepare_run
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.output_error import Fit, minimise
+from rhythmid.identify.output_error import Descent, Fit, descend, minimise
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
 from rhythmid.simulate import start_states
 
 Array = NDArray[np.float64]
-BRIEF, THOROUGH = 6, 20  # iterations
-PROMISING = 0.5  # share of the spread of chi2 within which a model is carried to convergence
+SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
+PROMISING = 0.3  # share of the spread of chi2 within which a model is carried to convergence
+TOLERANCE = 0.05  # of chi2, at which a trial has converged: far below what an element has to earn
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,7 @@ class Trial:
     free: int
     converged: bool
     noise: NoiseModel  # under which chi2 was reached
+    differences: tuple[Array, Array] | None = None  # steps by which its sensitivities were taken
 
     def bic(self, inflation: float = 1.0) -> float:
         """Bayesian information criterion (G. Schwarz, Ann. Stat. 6 (1978) 461); `inflation` >= 1 deflates chi2."""
@@ -53,16 +56,19 @@ class _Outcome:
     chi2: float
     samples: int
     converged: bool
+    differences: tuple[Array, Array]
 
 
-def _outcome(fit: Fit) -> _Outcome:
-    values = {name: float(value) for name, value in zip(fit.names, fit.values)}
-    return _Outcome(values, fit.starts, fit.chi2, fit.samples, fit.converged)
+def _outcome(end: Descent) -> _Outcome:
+    values = {name: end.model.value(name) for name in end.model.free}
+    return _Outcome(values, end.starts, end.chi2, end.samples, end.converged, end.differences)
 
 
 def _trial(added: tuple[str, ...], model: Model, done: _Outcome, noise: NoiseModel) -> Trial:
     fitted = model.with_values(done.values)
-    return Trial(added, fitted, done.starts, done.chi2, done.samples, len(done.values), done.converged, noise)
+    return Trial(
+        added, fitted, done.starts, done.chi2, done.samples, len(done.values), done.converged, noise, done.differences
+    )
 
 
 @dataclass(frozen=True)
@@ -98,30 +104,34 @@ def _fit_proposal(
     noise: NoiseModel,
     max_step: float,
     enough: float,
-    iterations: int,
 ) -> _Outcome:
-    """Fit a proposal from its guesses, starting in `starts` (whose states are `known` by name), stopping early once chi2 falls below `enough`.
+    """A few iterations from each guess, more from the best, starting in `starts` (whose states are `known` by name); no
+    further guess is tried once chi2 falls below `enough`.
 
     Raises InputError when the model diverges from every guess.
     """
     run = prepare_run(proposal.model, series, fine_enough(proposal.model, max_step))
-    best: Fit | None = None
+    names = tuple(proposal.model.free)
+    best: Descent | None = None
     failure: InputError | None = None
     for guess in proposal.guesses:
         model = proposal.model.with_values(guess)
         try:
             begin = [_extended(start, model, run, known) for start in starts]
-            fit = minimise(model, run, tuple(model.free), noise, begin, iterations)
+            end = descend(model, run, names, noise, begin, SKETCH, tolerance=TOLERANCE)
         except InputError as error:
             failure = error
             continue
-        if best is None or fit.chi2 < best.chi2:
-            best = fit
+        if best is None or end.chi2 < best.chi2:
+            best = end
         if best.chi2 < enough:
             break
     if best is None:
         assert failure is not None
         raise failure
+    if not best.converged:
+        more = BRIEF - SKETCH
+        best = descend(best.model, run, names, noise, best.starts, more, None, TOLERANCE, best.differences)
     return _outcome(best)
 
 
@@ -150,7 +160,7 @@ def run_trials(
     goals = list(enough) if enough is not None else [-math.inf] * len(proposals)
 
     def one(case: tuple[Proposal, float]) -> _Outcome:
-        return _fit_proposal(case[0], series, starts, known, noise, max_step, case[1], BRIEF)
+        return _fit_proposal(case[0], series, starts, known, noise, max_step, case[1])
 
     trials: list[Trial] = []
     excluded: list[tuple[tuple[str, ...], str]] = []
@@ -177,13 +187,23 @@ def whole_fit(
     noise: NoiseModel,
     max_step: float,
     iterations: int = 15,
-    pool=None,
+    pool: ThreadPoolExecutor | None = None,
 ) -> Fit:
     """The full fit of a trial under a noise model; one that has converged under it is only evaluated."""
     if trial.noise is noise and trial.converged:
         iterations = 1
     run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
-    return minimise(trial.model, run, tuple(trial.model.free), noise, trial.starts, iterations, pool)
+    names = tuple(trial.model.free)
+    return minimise(
+        trial.model, run, names, noise, trial.starts, iterations, pool, differences=trial.differences
+    )
+
+
+def _end(trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int) -> Descent:
+    """Where a trial's descent under a noise model ends; without `iterations`, the trial as it is."""
+    run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
+    names = tuple(trial.model.free)
+    return descend(trial.model, run, names, noise, trial.starts, iterations, None, TOLERANCE, trial.differences)
 
 
 def under_noise(
@@ -198,7 +218,7 @@ def under_noise(
     others = [trial for trial in trials if not (trial.noise is noise and trial.converged)]
 
     def one(trial: Trial) -> _Outcome:
-        return _outcome(whole_fit(trial, series, noise, max_step, iterations))
+        return _outcome(_end(trial, series, noise, max_step, iterations))
 
     again = [
         _trial(others[index].added, others[index].model, result, noise)
@@ -206,3 +226,14 @@ def under_noise(
         if not isinstance(result, Exception)
     ]
     return sorted([*done, *again], key=lambda trial: trial.bic())
+
+
+def near_under_noise(
+    trials: Sequence[Trial], series: Sequence[Series], noise: NoiseModel, max_step: float, near: float
+) -> list[Trial]:
+    """The trials, best first, under one noise model: as they are, but those `near` the best are fitted again."""
+    level = under_noise(trials, series, noise, max_step, 0)
+    close = [trial for trial in level if trial.bic() - level[0].bic() < near]
+    fitted = under_noise(close, series, noise, max_step)
+    known = {trial.added for trial in fitted}
+    return sorted([*fitted, *(t for t in level if t.added not in known)], key=lambda trial: trial.bic())

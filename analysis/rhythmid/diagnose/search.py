@@ -14,7 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.compiled import compile_model
-from rhythmid.diagnose.refit import Proposal, Trial, fine_enough, propose, run_trials, under_noise, whole_fit
+from rhythmid.diagnose.refit import (
+    Proposal,
+    Trial,
+    fine_enough,
+    near_under_noise,
+    propose,
+    run_trials,
+    under_noise,
+    whole_fit,
+)
 from rhythmid.diagnose.screen import (
     Change,
     Score,
@@ -29,9 +38,10 @@ from rhythmid.diagnose.screen import (
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.identify.free_run import accurate
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
-from rhythmid.identify.output_error import Fit, noise_of
+from rhythmid.identify.output_error import INTEGRATION, Fit, noise_of
 from rhythmid.identify.series import Series, scales
 from rhythmid.model import Model
+from rhythmid.parallel import fork_map
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
@@ -167,6 +177,7 @@ def search(
         len(nominal.names),
         nominal.converged,
         noise,
+        nominal.differences,
     )
     trials: dict[tuple[str, ...], Trial] = {(): base}
     best = base
@@ -186,11 +197,11 @@ def search(
         near = [t for t in found if t.bic() - found[0].bic() < NEAR]
         top = _most_likely(near, series, noise, step, floor)
         fit = whole_fit(top, series, noise, step, pool=pool)
-        finer = accurate(fit.run, fit.model, fit.starts, 0.1 * fit.noise.variance**0.5, 3)
+        finer = accurate(fit.run, fit.model, fit.starts, INTEGRATION * fit.noise.variance**0.5, 3)
         if finer.max_step < 0.45 * fine_enough(top.model, step):
             step = finer.max_step
             fit = whole_fit(replace(top, converged=False), series, noise, step, pool=pool)
-        settled = noise_of(fit, floor=floor)
+        settled = noise_of(fit.residuals, series, floor)
         compared = under_noise([*near, best], series, settled, step)
         trials |= {tuple(sorted(t.added)): t for t in compared}
         winner = compared[0]
@@ -210,13 +221,13 @@ def search(
         trials |= more
         if defended is not best:
             best = defended
-            noise = noise_of(whole_fit(best, series, noise, step, pool=pool), floor=floor)
-    ranked = under_noise(_contenders(trials, best), series, noise, step)
+            noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
+    ranked = near_under_noise(_contenders(trials, best), series, noise, step, NEAR)
     best = next(t for t in ranked if set(t.added) == set(best.added))
     if ranked[0].bic() < best.bic() - WORTH and ranked[0].added:
         best = ranked[0]  # a model set aside under an earlier noise model has overtaken the chosen one
-        noise = noise_of(whole_fit(best, series, noise, step, pool=pool), floor=floor)
-        ranked = under_noise(ranked, series, noise, step)
+        noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
+        ranked = near_under_noise(ranked, series, noise, step, NEAR)
         best = next(t for t in ranked if set(t.added) == set(best.added))
     fit = whole_fit(best, series, noise, step, pool=pool)
     return Search(
@@ -233,8 +244,12 @@ def _most_likely(
     """
     if len(near) == 1:
         return near[0]
-    left = [noise_of(whole_fit(trial, series, noise, step), floor=floor).std for trial in near]
-    return near[left.index(min(left))]
+
+    def left(trial: Trial) -> float:
+        return noise_of(whole_fit(trial, series, noise, step).residuals, series, floor).std
+
+    found = {index: std for index, std in fork_map(left, near) if not isinstance(std, Exception)}
+    return near[min(found, key=lambda index: (found[index], index), default=0)]
 
 
 def _could_pay(now: Round, best: Trial) -> bool:
@@ -298,7 +313,8 @@ def _defend(
             if starts and tuple(sorted((*rest, name))) not in trials:
                 swaps.append(propose(slim, catalogue[name], starts, rest))
     found = run(swaps)
-    simpler = [t for t in [*found, *trials.values()] if t.added and _simpler(t, best)]
+    earlier = [t for t in trials.values() if t.added and _stands_for(t, best)]
+    simpler = [t for t in [*found, *under_noise(earlier, series, noise, step)] if _simpler(t, best)]
     better = [t for t in found if t.bic() < best.bic()]
     if better:
         best = min(better, key=lambda t: t.bic())
@@ -313,10 +329,15 @@ def _rest(trial: Trial, label: str) -> tuple[str, ...]:
 
 def _simpler(trial: Trial, best: Trial) -> bool:
     """A model with fewer parameters that the information criterion does not reject, of the same family."""
-    if trial.free >= best.free or trial.bic() > best.bic() + WORTH:
+    return _stands_for(trial, best) and trial.bic() < best.bic() + WORTH
+
+
+def _stands_for(trial: Trial, best: Trial) -> bool:
+    """Whether a model says less than the best: some of its effects, or a special case in the place of one of them."""
+    if trial.free >= best.free:
         return False
     if set(trial.added) < set(best.added):
-        return trial.bic() < best.bic() + WORTH
+        return True
     extra = [trial.model.term(label) for label in trial.added if label not in best.added]
     gone = [best.model.term(label) for label in best.added if label not in trial.added]
     return len(extra) == len(gone) == 1 and gone[0].element.name in extra[0].element.special_case_of  # type: ignore[union-attr]

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 WHITE = NoiseModel(np.empty(0), 1.0)
 LOST = 0.3  # error, as a share of the motion, above which a model has lost the machine
 Progress = Callable[[str], None]
+INTEGRATION = 0.02  # of the residual, below which an error of integration has to stay: it must not count among models
 
 
 @dataclass(frozen=True)
@@ -59,17 +60,27 @@ class Fit:
             for name, v in zip(self.names, np.diag(self.covariance))
         }
 
+    @property
+    def differences(self) -> tuple[Array, Array]:
+        """Steps of parameters (p,) and initial states (q,) by which the sensitivities were taken."""
+        return np.abs(self.linearisation.steps), self.linearisation.state_steps
+
     def nrmse(self, unused: bool = False) -> float:
         """rms(simulated − measured) / std(measured) over the averages used, or over the unused ones."""
-        error, spread = 0.0, 0.0
-        for one, residual in zip(self.run.series, self.residuals):
-            mask = ~one.used if unused else one.used
-            if not mask.any():
-                continue
-            measured = one.averaged
-            error += float(np.sum(residual[mask] ** 2))
-            spread += float(np.sum((measured[mask] - measured.mean()) ** 2))
-        return math.sqrt(error / spread) if spread > 0 else math.nan
+        return normalised_error(self.residuals, self.run.series, unused)
+
+
+def normalised_error(residuals: Sequence[Array], series: Sequence[Series], unused: bool = False) -> float:
+    """rms(simulated − measured) / std(measured) over the averages used, or over the unused ones; nan without any."""
+    error, spread = 0.0, 0.0
+    for one, residual in zip(series, residuals):
+        mask = ~one.used if unused else one.used
+        if not mask.any():
+            continue
+        measured = one.averaged
+        error += float(np.sum(residual[mask] ** 2))
+        spread += float(np.sum((measured[mask] - measured.mean()) ** 2))
+    return math.sqrt(error / spread) if spread > 0 else math.nan
 
 
 def first_guess(model: Model, run: FreeRun) -> list[Array]:
@@ -117,6 +128,26 @@ def _step(jacobian: Array, residual: Array, damping: float, blocked: NDArray[np.
     return step
 
 
+@dataclass(frozen=True)
+class Descent:
+    """Where a search for the best parameters ended: what a `Fit` holds, without the sensitivities there.
+
+    `differences` are the steps (p,) and (q,) of parameters and initial states by which sensitivities are taken;
+    `linearisation` is there where the last one was taken at the end itself.
+    """
+
+    model: Model
+    starts: tuple[Array, ...]
+    residuals: tuple[Array, ...]
+    chi2: float
+    samples: int
+    converged: bool
+    message: str
+    at_bound: tuple[str, ...]
+    differences: tuple[Array, Array]
+    linearisation: Linearisation | None
+
+
 def minimise(
     model: Model,
     run: FreeRun,
@@ -126,13 +157,49 @@ def minimise(
     iterations: int = 30,
     pool: ThreadPoolExecutor | None = None,
     tolerance: float = 1e-3,
-    like: Linearisation | None = None,
+    differences: tuple[Array, Array] | None = None,
 ) -> Fit:
+    """The fit that `descend` leads to, with its sensitivities and covariance."""
+    end = descend(model, run, names, noise, starts, iterations, pool, tolerance, differences)
+    linearisation = end.linearisation
+    if linearisation is None:
+        problem = Problem(run, names, noise, pool)
+        problem.learn_hidden(end.model, end.starts)
+        linearisation, *_ = problem.linearise(end.model, end.starts, end.residuals, *end.differences)
+    return Fit(
+        model=end.model,
+        names=tuple(names),
+        values=np.array([end.model.value(name) for name in names]),
+        covariance=_covariance(linearisation.jacobian, [end.model.parameters[name].prior for name in names]),
+        starts=end.starts,
+        run=run,
+        residuals=end.residuals,
+        noise=noise,
+        chi2=end.chi2,
+        samples=end.samples,
+        converged=end.converged,
+        message=end.message,
+        linearisation=linearisation,
+        at_bound=end.at_bound,
+    )
+
+
+def descend(
+    model: Model,
+    run: FreeRun,
+    names: Sequence[str],
+    noise: NoiseModel = WHITE,
+    starts: Sequence[Array] | None = None,
+    iterations: int = 30,
+    pool: ThreadPoolExecutor | None = None,
+    tolerance: float = 1e-3,
+    differences: tuple[Array, Array] | None = None,
+) -> Descent:
     """Levenberg-Marquardt from the model's own values.
 
-    Stops when a further step would lower chi2 by less than `tolerance` (or by less than 1e-7 of itself). The steps of
-    differences are those of `like`, a linearisation of the same structure, or are sought. Raises InputError when the
-    model diverges at its initial values.
+    Stops when a further step lowers chi2, or promises to lower it, by less than `tolerance` (or 1e-7 of itself). `differences`
+    are steps known from another descent of the same structure; without them they are sought. Raises InputError when
+    the model diverges at its initial values.
     """
     problem = Problem(run, names, noise, pool)
     current = [np.array(s) for s in (starts if starts is not None else first_guess(model, run))]
@@ -143,25 +210,23 @@ def minimise(
         raise InputError(
             "the model diverges when simulated over the records with its initial values; check its parameters and units"
         )
-    if like is None:
+    if differences is None:
         velocity = 2 * np.pi * max(dominant_frequency(one) for one in run.series) * problem.spread
         state_steps = 1e-4 * np.array([problem.spread, velocity, *([problem.spread] * (run.states - 2))])
         steps, state_steps = problem.settle_steps(
             model, current, residuals, _first_steps(model, names, run), state_steps
         )
     else:
-        steps, state_steps = np.abs(like.steps), like.state_steps
+        steps, state_steps = differences
     damping, converged, message = 1e-6, False, f"no convergence in {iterations} iterations"
     low = np.array([model.parameters[name].bounds[0] for name in names])
     high = np.array([model.parameters[name].bounds[1] for name in names])
     priors = [model.parameters[name].prior for name in names]
-    linearisation: Linearisation | None = None
     blocked = np.zeros(len(names), bool)
+    here: Linearisation | None = None
     for _ in range(iterations):
-        linearisation, states, steps, state_steps_next = problem.linearise(
-            model, current, residuals, steps, state_steps
-        )
-        jacobian, residual = linearisation.jacobian, linearisation.residual
+        here, states, steps, state_steps_next = problem.linearise(model, current, residuals, steps, state_steps)
+        jacobian, residual = here.jacobian, here.residual
         values = np.array([model.value(name) for name in names])
         weight = [(i, prior) for i, prior in enumerate(priors) if prior is not None]
         if weight:
@@ -180,15 +245,21 @@ def minimise(
             proposed = np.clip(values + step, low, high)
             step = proposed - values
             trial = model.with_values(dict(zip(names, proposed)))
-            moved = []
+            moved, promised = [], _prior_cost(priors, proposed)
             for start, (error, slope, state) in zip(current, states):
-                moved.append(start + state_update(state, error + slope @ step) * state_steps)
+                ahead = error + slope @ step
+                change = state_update(state, ahead)
+                moved.append(start + change * state_steps)
+                promised += float(np.sum((ahead + state @ change) ** 2))
+            if damping <= 1e-6 and cost - promised < max(tolerance, 1e-7 * cost):
+                converged, message = True, "converged"
+                break
             trial_residuals = problem.residuals(trial, moved)
             trial_cost = problem.cost(trial, trial_residuals, moved)
             if trial_cost < cost:
                 gain = cost - trial_cost
                 model, current, cost = trial, moved, trial_cost
-                residuals = trial_residuals
+                residuals, here = trial_residuals, None
                 damping = max(damping * 0.1, 1e-12)
                 improved = True
                 if gain < tolerance or gain < 1e-7 * cost:
@@ -205,25 +276,23 @@ def minimise(
         if converged:
             break
     assert residuals is not None
-    linearisation, *_ = problem.linearise(model, current, residuals, steps, state_steps)
-    samples = len(linearisation.residual)
-    white = float(np.sum([np.sum(problem.whitened(i, r) ** 2) for i, r in enumerate(residuals)]))
-    return Fit(
+    white = [problem.whitened(i, r) for i, r in enumerate(residuals)]
+    return Descent(
         model=model,
-        names=tuple(names),
-        values=np.array([model.value(name) for name in names]),
-        covariance=_covariance(linearisation.jacobian, priors),
         starts=tuple(current),
-        run=run,
         residuals=tuple(residuals),
-        noise=noise,
-        chi2=white,
-        samples=samples,
+        chi2=float(sum(np.sum(w**2) for w in white)),
+        samples=sum(len(w) for w in white),
         converged=converged,
         message=message,
-        linearisation=linearisation,
         at_bound=tuple(name for name, stuck in zip(names, blocked) if stuck),
+        differences=(steps, state_steps),
+        linearisation=here,
     )
+
+
+def _prior_cost(priors: Sequence, values: Array) -> float:
+    return sum(((value - prior.mean) / prior.std) ** 2 for prior, value in zip(priors, values) if prior is not None)
 
 
 def _covariance(jacobian: Array, priors: Sequence) -> Array:
@@ -246,10 +315,10 @@ def _covariance(jacobian: Array, priors: Sequence) -> Array:
         return (vectors * inverse) @ vectors.T / np.outer(norms, norms)
 
 
-def noise_of(fit: Fit, floor: float = 0.0) -> NoiseModel:
-    """Noise model of a fit's residuals over the averages that were used."""
+def noise_of(residuals: Sequence[Array], series: Sequence[Series], floor: float = 0.0) -> NoiseModel:
+    """Noise model of residuals over the averages that were used."""
     stretches = []
-    for residual, one in zip(fit.residuals, fit.run.series):
+    for residual, one in zip(residuals, series):
         if one.ignored is not None:
             columns = one.ignored[one.used]
             residual = residual - one.ignored @ np.linalg.lstsq(columns, residual[one.used], rcond=1e-12)[0]
@@ -280,19 +349,24 @@ def estimate(
         return minimise(model, run, chosen, noise, guess, iterations, pool)
     spread = max(float(np.std(one.averaged)) for one in series)
     scaled = NoiseModel(np.empty(0), spread * 1e-2)
-    fit = minimise(model, run, chosen, scaled, guess, iterations, pool)
-    rms = math.sqrt(fit.chi2 / max(fit.samples, 1)) * scaled.std
-    if fit.nrmse() > LOST:  # what is left is no noise: taken for colour, it would lead the parameters anywhere
-        return minimise(fit.model, run, chosen, NoiseModel(np.empty(0), rms), fit.starts, iterations, pool)
-    if max_step is None:
-        finer = accurate(run, fit.model, fit.starts, max(0.1 * rms, 1e-7 * spread))
-        run = finer
-    for _ in range(2):
-        noise = noise_of(fit, floor=1e-9 * spread)
-        if progress is not None:
-            progress(f"residual {noise.variance**0.5:.3g}, colour of order {noise.order}")
-        fit = minimise(fit.model, run, chosen, noise, fit.starts, iterations, pool, like=fit.linearisation)
-    return fit
+    end = descend(model, run, chosen, scaled, guess, iterations, pool)
+    if normalised_error(end.residuals, series) > LOST:
+        # what is left is no noise: taken for colour, it would lead the parameters anywhere
+        rms = math.sqrt(end.chi2 / max(end.samples, 1)) * scaled.std
+        return minimise(end.model, run, chosen, NoiseModel(np.empty(0), rms), end.starts, iterations, pool)
+    while max_step is None:
+        rms = math.sqrt(end.chi2 / max(end.samples, 1)) * scaled.std
+        finer = accurate(run, end.model, end.starts, max(INTEGRATION * rms, 1e-7 * spread))
+        if finer.max_step > 0.4 * run.max_step:
+            break  # fine enough before any halving
+        run = finer  # whose smaller residual may ask for finer steps still
+        end = descend(end.model, run, chosen, scaled, end.starts, iterations, pool, differences=end.differences)
+    noise = noise_of(end.residuals, series, floor=1e-9 * spread)
+    if progress is not None:
+        progress(f"residual {noise.variance**0.5:.3g}, colour of order {noise.order}")
+    end = descend(end.model, run, chosen, noise, end.starts, iterations, pool, differences=end.differences)
+    noise = noise_of(end.residuals, series, floor=1e-9 * spread)
+    return minimise(end.model, run, chosen, noise, end.starts, iterations, pool, differences=end.differences)
 
 
 def start_only(model: Model, series: Sequence[Series], noise: NoiseModel, max_step: float) -> Fit:
