@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
-from rhythmid.compiled import Compiled, InputKind, compile_model
+from rhythmid.compiled import Compiled, InputKind, OutputKind, compile_model
 from rhythmid.errors import InputError
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
@@ -128,10 +128,10 @@ def prepare_run(
             f"records with different kinds of input ({', '.join(sorted(kinds))}) cannot be fitted together"
         )
     excited: InputKind = kinds.pop() if kinds else "force"
-    sensors = {one.measured for one in series}
+    sensors: set[OutputKind] = {one.measured for one in series}
     if len(sensors) > 1:
         raise InputError(f"records that measure different things ({', '.join(sorted(sensors))}) cannot be fitted together")
-    measured = sensors.pop() if sensors else "position"
+    measured: OutputKind = sensors.pop() if sensors else "position"
     inputs = tuple(_inputs(one) for one in series)
     smooth = all(i.smooth is not None or len(i.command[0]) <= 2 for i in inputs)
     if not smooth:

@@ -243,6 +243,7 @@ def descend(
         for _ in range(12):
             step = _step(jacobian, residual, damping, blocked)
             proposed = np.clip(values + step, low, high)
+            whole = bool(np.all(proposed == values + step))
             step = proposed - values
             trial = model.with_values(dict(zip(names, proposed)))
             moved, promised = [], _prior_cost(priors, proposed)
@@ -251,7 +252,7 @@ def descend(
                 change = state_update(state, ahead)
                 moved.append(start + change * state_steps)
                 promised += float(np.sum((ahead + state @ change) ** 2))
-            if damping <= 1e-6 and cost - promised < max(tolerance, 1e-7 * cost):
+            if whole and damping <= 1e-6 and cost - promised < max(tolerance, 1e-7 * cost):
                 converged, message = True, "converged"
                 break
             trial_residuals = problem.residuals(trial, moved)
