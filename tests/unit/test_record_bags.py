@@ -1,4 +1,4 @@
-"""Bags: what is written is read back, by the fast path and by the slow one alike; tables likewise."""
+"""Bags: what is written is read back, by the fast path and by the slow one alike."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from rhythmid.record.bag_writer import write_bag
 from rhythmid.record.columns import read_columns
 from rhythmid.record.field import Field
 from rhythmid.record.messages import Messages
-from rhythmid.record.read import load_records, read_record
+from rhythmid.record.read import read_record
 from rhythmid.record.recover import recover
 
 N = 4000
@@ -105,21 +105,3 @@ def test_an_empty_file_and_a_missing_one_are_refused(tmp_path):
     for name in ("empty.mcap", "nothing.mcap"):
         with pytest.raises(InputError):
             read_record(tmp_path / name)
-
-
-def test_a_table_named_in_signals_is_a_record(tmp_path):
-    t = np.arange(500) * 0.002
-    np.savetxt(tmp_path / "run.csv", np.column_stack([t, np.sin(t), np.cos(t)]), delimiter=",", header="t,u,y", comments="")
-    (tmp_path / "signals.yaml").write_text(
-        "time: {column: t}\ninput: {file: run.csv, column: u, unit: N}\noutput: {file: run.csv, column: y, unit: m}\nuse: [0.1, 0.8]\n"
-    )
-    (record,) = load_records([tmp_path / "signals.yaml"])
-    assert np.allclose(record.output.value, np.cos(record.output.time + record.start_ns * 1e-9), atol=1e-6)
-    assert record.duration == pytest.approx(0.7, abs=0.01)
-
-
-def test_an_unknown_column_is_refused_with_the_columns_that_exist(tmp_path):
-    (tmp_path / "run.csv").write_text("t,u,y\n" + "\n".join(f"{i},{i},{i}" for i in range(50)))
-    (tmp_path / "signals.yaml").write_text("time: {column: t}\noutput: {file: run.csv, column: z}\n")
-    with pytest.raises(InputError, match="z"):
-        load_records([tmp_path / "signals.yaml"])

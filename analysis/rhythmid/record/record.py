@@ -143,7 +143,7 @@ class Record:
         period = 1.0 / rate if rate is not None else self.output.period
         channels = self.channels
         if self.forcing_law is not None:
-            del channels["forcing"]
+            channels.pop("forcing", None)
         start = max(channel.time[0] for channel in channels.values())
         end = min(self._last(role, channel) for role, channel in channels.items())
         anchor = next((c.time[0] for role in ("output", "input", "forcing") if (c := channels.get(role)) is not None

@@ -81,6 +81,8 @@ def _text(path: Path) -> dict[str, Any]:
                 break
             comment = line.strip(" #\r\n") or comment
             skipped += 1
+    if not line.split("#")[0].strip():
+        raise InputError(f"{path}: is empty")
     delimiter = next((mark for mark in (",", ";", "\t") if mark in line), None)
     cells = _cells(line.split("#")[0], delimiter)
     named = not all(_is_number(cell) for cell in cells)

@@ -1,0 +1,144 @@
+"""What is said of a recording's quality: counts that are right, and nothing about a flawless one."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rhythmid.errors import InputError
+from rhythmid.record.bag_report import quality_report
+from rhythmid.record.bag_writer import write_bag
+from rhythmid.record.messages import Messages
+from rhythmid.record.quality import ChannelQuality, Quality, clipped
+from rhythmid.record.timing import Timing, nominal_period, put_in_order
+
+seeds = st.integers(0, 10_000)
+
+
+@given(seed=seeds, rate=st.sampled_from([7.0, 50.0, 60.0, 100.0, 333.0, 1000.0, 2500.0]), count=st.integers(20, 400))
+def test_the_nominal_period_survives_jitter_and_loss(seed, rate, count):
+    rng = np.random.default_rng(seed)
+    time = (np.arange(count) + rng.uniform(-0.1, 0.1, count)) / rate
+    kept = rng.random(count) > 0.1
+    kept[:3] = True
+    timing = Timing.of(time[kept])
+    assert timing.period == pytest.approx(1.0 / rate, rel=0.05)
+
+
+@given(seed=seeds, lost=st.integers(0, 20))
+def test_lost_samples_are_counted_exactly(seed, lost):
+    kept = np.ones(500, bool)
+    kept[np.random.default_rng(seed).choice(np.arange(1, 499), lost, replace=False)] = False
+    timing = Timing.of(np.arange(500)[kept] * 1e-3)
+    assert timing.lost == lost and timing.count == 500 - lost
+    runs = np.diff(np.concatenate([[0], ~kept, [0]]).astype(int))
+    assert timing.gaps == np.count_nonzero(runs == 1)
+    assert timing.jitter_std == pytest.approx(0.0, abs=1e-9)
+
+
+@given(seed=seeds, repeated=st.integers(0, 50))
+def test_duplicates_are_counted_exactly(seed, repeated):
+    time = np.arange(200) * 1e-3
+    again = np.random.default_rng(seed).choice(time, repeated)
+    timing = Timing.of(np.sort(np.concatenate([time, again])))
+    assert (timing.duplicates, timing.gaps, timing.lost) == (repeated, 0, 0)
+
+
+@given(seed=seeds, std=st.floats(1e-6, 1e-4))
+def test_the_jitter_is_that_of_the_steps(seed, std):
+    time = np.arange(4000) * 1e-3 + np.random.default_rng(seed).normal(0.0, std, 4000)
+    assert Timing.of(time).jitter_std == pytest.approx(np.sqrt(2.0) * std, rel=0.1)
+
+
+@pytest.mark.parametrize("rate", [1000.0, 610.3515625, 1024.0, 3.0])
+def test_an_even_rate_is_found_to_the_last_digit(rate):
+    assert nominal_period(np.diff(np.arange(5000) / rate)) == pytest.approx(1.0 / rate, rel=1e-12)
+
+
+def test_stamps_rounded_to_a_millisecond_do_not_bend_the_rate():
+    time = np.round(np.arange(3000) / 300.0, 3)
+    assert Timing.of(time).rate == pytest.approx(300.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_hardly_any_samples_have_no_rate(count):
+    timing = Timing.of(np.zeros(count))
+    assert (timing.count, timing.rate, timing.gaps) == (count, 0.0, 0)
+
+
+@given(seed=seeds)
+def test_samples_that_overtook_one_another_are_put_back(seed):
+    rng = np.random.default_rng(seed)
+    time = np.arange(300) * 1e-3
+    order = np.arange(300)
+    for at in rng.choice(np.arange(10, 280, 12), 5, replace=False):
+        order[at], order[at + 2] = order[at + 2], order[at]
+    kept = put_in_order(time[order], "output", "split it")
+    np.testing.assert_array_equal(time[order][kept], time)
+
+
+@pytest.mark.parametrize("back", [0.02, 1.0, 1e9])
+def test_a_clock_that_was_set_back_is_refused(back):
+    time = np.arange(300) * 1e-3 + 2e9
+    time[100:] -= back
+    with pytest.raises(InputError, match=r"^output: time goes backwards by .* \(sample 100 of 300\).*; split it$"):
+        put_in_order(time, "output", "split it")
+
+
+@given(seed=seeds, limit=st.floats(0.3, 0.9))
+def test_clipping_is_seen(seed, limit):
+    phase = np.random.default_rng(seed).uniform(0, 2 * np.pi)
+    value = np.clip(np.sin(2 * np.pi * np.arange(2000) / 200 + phase), -limit, limit)
+    assert clipped(value) >= np.count_nonzero(np.abs(value) == limit) - 8
+
+
+@given(seed=seeds)
+def test_what_is_not_clipped_is_not_called_so(seed):
+    rng = np.random.default_rng(seed)
+    smooth = np.sin(2 * np.pi * np.arange(2000) / 200 + rng.uniform(0, 6))
+    for value in (smooth, np.round(smooth, 1), rng.standard_normal(500), np.repeat([0.0, 1.0], 50), np.zeros(10)):
+        assert clipped(value) == 0
+
+
+def test_a_flawless_channel_gives_no_complaint():
+    flawless = ChannelQuality("/y position[0]", Timing.of(np.arange(100) * 1e-3))
+    assert flawless.complaints() == []
+    assert Quality({"output": flawless}).warnings() == []
+
+
+def test_every_flaw_is_named():
+    time = np.sort(np.concatenate([np.delete(np.arange(100), [50, 51]), [7]])) * 1e-3
+    flawed = ChannelQuality("/y", Timing.of(time), nan=1, clipped=4, missing=2, conflicts=1)
+    told = "; ".join(flawed.complaints())
+    for words in ("1 gaps, 2 samples lost, longest 0.003 s", "1 duplicates, 1 of them", "1 samples are not finite",
+                  "4 samples look clipped", "2 messages without"):  # fmt: skip
+        assert words in told
+    quality = Quality({"output": flawed}, truncated=True, notes=("breaks off",))
+    assert quality.warnings()[0] == "breaks off" and quality.lost == 2 and quality.clipped == 4
+    assert json.loads(json.dumps(quality.to_dict()))["channels"]["output"]["gaps"] == 1
+
+
+def test_the_report_of_a_bag_tells_rate_lateness_and_size(tmp_path):
+    stamps = np.arange(1000) * 2_000_000
+    late = stamps + np.random.default_rng(0).integers(200_000, 400_000, 1000)
+    topics = {
+        "excitation": Messages(stamps, effort=np.sin(stamps * 1e-9)),
+        "joint_states": Messages(stamps, position=np.cos(stamps * 1e-9), receive_ns=late),
+    }
+    report = quality_report(write_bag(tmp_path / "bag", topics))
+    found = {topic.name: topic.to_dict() for topic in report.topics}["/hopper/joint_states"]
+    assert found["rate"] == pytest.approx(500.0) and found["count"] == 1000
+    assert found["lateness_mean"] == pytest.approx(3e-4, rel=0.02)
+    assert found["lateness_max"] == pytest.approx(4e-4, rel=0.02)
+    assert report.usable and report.size > 100_000 and report.duration == pytest.approx(1.998, abs=1e-3)
+    told = "\n".join(report.lines())
+    assert "500 Hz" in told and "output: /hopper/joint_states position[leg]: flawless" in told
+
+
+def test_the_report_tells_why_a_bag_cannot_be_used(tmp_path):
+    topics = {"excitation": Messages(np.arange(100) * 1_000_000, effort=np.ones(100))}
+    report = quality_report(write_bag(tmp_path / "bag", topics))
+    assert not report.usable and "topic /hopper/joint_states is not in" in report.problems[0]
+    assert [topic.name for topic in report.topics] == ["/hopper/excitation"]
