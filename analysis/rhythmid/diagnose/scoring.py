@@ -16,12 +16,13 @@ from rhythmid.diagnose.calibrate import Calibration, calibrate, reconstructed
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import LEAST, forgets, periods_long, windows
-from rhythmid.identify.output_error import LOST, Fit
+from rhythmid.identify.output_error import Fit
 from rhythmid.identify.series import Series, hold_out_tail
 from rhythmid.model import Model
 
-BETTER = 0.7  # share to which shorter windows have to lower the error
-SHORTER = 3.0  # factor from one length of windows to the next
+FOLLOWS = 0.1  # error below which it follows the machine well enough for any score
+BETTER = 0.6  # share to which windows have to lower the error: one that adds up, not one that the effect makes at once
+SHORTER = 2.0  # factor from one length of windows to the next
 INTEGRATES = "the model integrates or is unstable, so that a long free run would add up every small disturbance"
 LOSES = "in free run the nominal model loses the machine"
 Tell = Callable[[str], None]
@@ -72,7 +73,7 @@ def settle(
         if calibration.reconstructed:
             unseen = [reconstructed(one) for one in unseen]
         best = Scoring(calibration, tuple(unseen), words)
-        if calibration.fit.nrmse() < LOST:
+        if calibration.fit.nrmse() < FOLLOWS:
             break
     if best is None:
         assert failure is not None

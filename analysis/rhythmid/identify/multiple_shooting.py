@@ -21,7 +21,7 @@ MARGIN = 1.0  # [s] of a command kept before a window, for delays
 GROWTH = 1.5  # of the response to a constant force, from the middle to the end of a record, that calls for windows
 PERIODS = 2.0  # of the dominant motion in a window
 FEWEST = 4  # windows a record
-LEAST = 48  # blocks in a window
+LEAST = 24  # blocks in a window
 
 
 def _around(signal: PPoly | None, begin: float, end: float) -> PPoly | None:

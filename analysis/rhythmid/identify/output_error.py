@@ -23,6 +23,8 @@ from rhythmid.simulate import start_states
 
 Array = NDArray[np.float64]
 WHITE = NoiseModel(np.empty(0), 1.0)
+STAY = 0.1  # share of its distance from a lower bound that one step leaves a parameter: a width of zero is hard to leave
+BRINK = 1e-3  # share of its first distance within which it may reach the bound
 LOST = 0.3  # error, as a share of the motion, above which a model has lost the machine
 Progress = Callable[[str], None]
 INTEGRATION = 0.02  # of the residual, below which an error of integration has to stay: it must not count among models
@@ -221,6 +223,7 @@ def descend(
     damping, converged, message = 1e-6, False, f"no convergence in {iterations} iterations"
     low = np.array([model.parameters[name].bounds[0] for name in names])
     high = np.array([model.parameters[name].bounds[1] for name in names])
+    brink = [a + BRINK * (model.value(n) - a) if math.isfinite(a) else math.inf for n, a in zip(names, low)]
     priors = [model.parameters[name].prior for name in names]
     blocked = np.zeros(len(names), bool)
     here: Linearisation | None = None
@@ -242,7 +245,8 @@ def descend(
         improved = False
         for _ in range(12):
             step = _step(jacobian, residual, damping, blocked)
-            proposed = np.clip(values + step, low, high)
+            floor = np.array([a + STAY * (v - a) if v > b else a for v, a, b in zip(values, low, brink)])
+            proposed = np.clip(values + step, floor, high)
             whole = bool(np.all(proposed == values + step))
             step = proposed - values
             trial = model.with_values(dict(zip(names, proposed)))
