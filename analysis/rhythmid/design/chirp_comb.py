@@ -36,24 +36,24 @@ def chirp_comb(requirements: Requirements, ring_down: float) -> SignalPlan:
         )
     periods = count * whole + 1
     repeat = periods * pumping / count
+    sweep = whole * pumping
     low, high = requirements.band
+    cycles = max(1, math.floor(0.5 * (low + high) * sweep + 1e-9))  # whole ones: a chirp ends at zero, without a jump
+    high = max(2.0 * cycles / sweep - low, low + 1.0 / sweep)
     teeth = count * np.arange(max(1, math.ceil(low * repeat - 1e-9)), math.floor(high * repeat + 1e-9) + 1)
     teeth = teeth[teeth % periods != 0]  # a tooth on a harmonic of the cycle tells nothing, and is not read
     response = ResponseLines(
         teeth.astype(np.int64), periods, 1.0 / (periods * pumping), requirements.harmonics
     )
     response.require_separate(f"use at least {2 * requirements.harmonics + 1} shifts")
-    sweep = whole * pumping
     comb = Chirp(
         amplitude=1.0, band=(low, high), sweep=sweep, shift=Shift(period=pumping, count=count),
         repetitions=math.ceil(requirements.duration / repeat) + 1,
     )  # fmt: skip
     facts = {
-        "chirps": count,
-        "sweep": sweep,
-        "repeat": repeat,
+        "chirps": count, "sweep": sweep, "highest": high, "repeat": repeat,
         "empty_classes": count - 2 * requirements.harmonics - 1,
-    }
+    }  # fmt: skip
     return SignalPlan(
         comb, repeat, periods * pumping, requirements.duration - periods * pumping, response, facts
     )

@@ -17,7 +17,8 @@ OVERSAMPLING = (
     12  # grid points in a period of the highest line; the peak between them is missed by less than 1 %
 )
 STARTS = 8  # Schroeder's and random ones
-ROUNDS = 1500
+ROUNDS = 1500  # of clipping
+WORK = 150_000_000  # grid points that are gone through; a long period then makes do with fewer starts
 GENTLEST, HARSHEST = 0.99, 0.80  # clipping level as a share of the peak
 
 
@@ -65,11 +66,12 @@ def least_crest(
     """
     rng = np.random.default_rng(seed)
     best, phases = np.inf, np.zeros(len(lines))
-    for start in range(STARTS):
+    starts = int(np.clip(WORK // (OVERSAMPLING * int(lines.max()) * ROUNDS), 1, STARTS))
+    for start in range(starts):
         first = schroeder_phases(weights) if start == 0 else rng.uniform(0.0, 2.0 * np.pi, len(lines))
         crest, found = clipped(lines, weights, first)
         if crest < best:
             best, phases = crest, found
         if progress is not None:
-            progress(f"minimising the crest factor: {best:.3f}, start {start + 1} of {STARTS}")
+            progress(f"minimising the crest factor: {best:.3f}, start {start + 1} of {starts}")
     return best, phases

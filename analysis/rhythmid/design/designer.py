@@ -29,6 +29,7 @@ from rhythmid.settings import Delay, Forcing, Noise, TimeMode
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
+LOOKED_AT = range(1, 9)  # harmonics that may stand out of the noise
 STRONG = 0.05  # distortion, as a share of the response, that deserves a word
 BIASED = 1.0  # standard deviations of bias that deserve a word
 
@@ -71,11 +72,12 @@ class Design:
                 f"a fit to transfer functions would be biased, {worst} by {abs(self.bias[worst]):.2g} standard deviations; the "
                 "joint fit of `rhythmid identify` simulates the nonlinear machine and is not"
             )
-        apart = self.requirements.harmonics + self.plan.facts.get("empty_classes", 0) // 2
+        apart = self.requirements.harmonics + self.plan.facts.get("empty_classes", 0)
         beyond = [m for m in self.visible if m > apart]
         if beyond:
             found.append(
-                f"harmonic ±{beyond[0]} of the response stands out of the noise too; --harmonics {beyond[-1]} keeps it apart"
+                f"harmonic ±{beyond[0]} of the response stands out of the noise too and falls on others; --harmonics "
+                f"{beyond[-1]} would keep it apart"
             )
         return tuple(found)
 
@@ -190,6 +192,6 @@ def design(
     density = requirements.noise_std**2 / requirements.rate
     return Design(
         requirements, plan, command, amplitude, experiment, linear, prediction, bent,
-        linearised_bias(prediction.fit, bent.signal), visible_sidebands(record, plain, pumping, density),
+        linearised_bias(prediction.fit, bent.signal), visible_sidebands(record, plain, pumping, density, LOOKED_AT),
         rehearsal.output(amplitude.peak), rehearsal.output(0.0),
     )  # fmt: skip

@@ -8,6 +8,7 @@ section 4.3). Equal spacing allows a small crest factor.
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -81,16 +82,24 @@ def thinned(lines: Lines, seed: int) -> Lines:
     return np.delete(lines, out)
 
 
-def interleaved_multisine(
-    requirements: Requirements, ring_down: float, progress: Callable[[str], None] | None = None
-) -> SignalPlan:
-    """The multisine with the longest period that fits twice behind its lead-in; `ring_down` [s] is the machine's.
+@dataclass(frozen=True, eq=False)
+class Interleaving:
+    """Excited `lines`, those of the `spaced` ones that are left out, in bins of one over the period, which holds `periods` P
+    pumping periods and comes `repeats` times."""
+
+    spaced: Lines
+    lines: Lines
+    periods: int
+    repeats: int
+
+
+def interleaved(requirements: Requirements, ring_down: float) -> Interleaving:
+    """The most closely spaced lines of the longest period that fits twice behind its lead-in; `ring_down` [s] is the machine's.
 
     Raises InputError when the run is too short for it, or when responses would fall on one another.
     """
-    frequency = requirements.forcing.frequency
     periods, repeats = _pumping_periods(requirements, ring_down)
-    period = periods / frequency
+    period = periods / requirements.forcing.frequency
     low = max(1, math.ceil(requirements.band[0] * period - 1e-9))
     high = math.floor(requirements.band[1] * period + 1e-9)
     harmonics = requirements.harmonics
@@ -110,22 +119,29 @@ def interleaved_multisine(
             )
         spaced = closest_lines(low, high, periods, harmonics, range(spacing, spacing + 1))
         if spaced is None:
-            tried = spaced_lines(low | 1, high, spacing)
-            ResponseLines(tried, periods, 1.0 / period, harmonics).require_separate(
-                "leave out --spacing and the closest that does not alias is chosen"
-            )
-            raise AssertionError("unreachable: the first offset was found to alias")
-    lines = thinned(spaced, requirements.seed)
+            spaced = spaced_lines(low | 1, high, spacing)
+            response = ResponseLines(spaced, periods, 1.0 / period, harmonics)
+            response.require_separate("leave out --spacing and the closest that does not alias is chosen")
+    return Interleaving(spaced, thinned(spaced, requirements.seed), periods, repeats)
+
+
+def interleaved_multisine(
+    requirements: Requirements, ring_down: float, progress: Callable[[str], None] | None = None
+) -> SignalPlan:
+    """The multisine of these lines with a small crest factor. Raises InputError as `interleaved` does."""
+    made = interleaved(requirements, ring_down)
+    lines, period = made.lines, made.periods / requirements.forcing.frequency
     weights = np.ones(len(lines))
     _, phases = least_crest(lines, weights, requirements.seed, progress)
     sine = Multisine(
         rms=1.0, period=period, periods=math.ceil(requirements.duration / period),
         lines=tuple(int(k) for k in lines), weights=tuple(weights), phases=tuple(float(p) for p in phases),
     )  # fmt: skip
-    window = repeats * period
-    response = ResponseLines(repeats * lines, repeats * periods, 1.0 / window, harmonics)
+    window = made.repeats * period
+    response = ResponseLines(made.repeats * lines, made.repeats * made.periods, 1.0 / window, requirements.harmonics)
     facts = {
-        "period": period, "repeats": repeats, "lines": len(lines), "spacing": float(spaced[1] - spaced[0]) / period,
-        "left_out": [float(k / period) for k in np.setdiff1d(spaced, lines)],
+        "period": period, "repeats": made.repeats, "lines": len(lines),
+        "spacing": float(made.spaced[1] - made.spaced[0]) / period,
+        "left_out": [float(k / period) for k in np.setdiff1d(made.spaced, lines)],
     }  # fmt: skip
     return SignalPlan(sine, period, window, requirements.duration - window, response, facts)

@@ -58,11 +58,18 @@ class ResponseLines:
                 f"the design aliases: the line at {self.frequency[n]:.6g} Hz lies on a harmonic of the forcing, where the limit "
                 f"cycle hides its response; {remedy}"
             )
-        order = np.argsort(bins, axis=None, kind="stable")
-        same = int(np.flatnonzero(np.diff(bins.ravel()[order]) == 0)[0])
-        (m, n), (other, k) = (np.unravel_index(order[same + i], bins.shape) for i in (0, 1))
-        raise InputError(
-            f"the design aliases: the responses to {self.frequency[n]:.6g} Hz at m = {self.orders[m]:+d} and to "
-            f"{self.frequency[k]:.6g} Hz at m = {self.orders[other]:+d} both fall on "
-            f"{bins[m, n] * self.resolution:.6g} Hz; {remedy}"
-        )
+        for nearest in range(1, self.harmonics + 1):  # the fewer the harmonics between them, the plainer the case
+            rows = np.flatnonzero(np.abs(self.orders) <= nearest)
+            order = np.argsort(bins[rows], axis=None, kind="stable")
+            same = np.flatnonzero(np.diff(bins[rows].ravel()[order]) == 0)
+            if len(same):
+                (i, n), (j, k) = (np.unravel_index(order[same[0] + step], bins[rows].shape) for step in (0, 1))
+                raise InputError(
+                    f"the design aliases: the responses to {self.frequency[n]:.6g} Hz at m = {_signed(rows[i] - self.harmonics)} and to "
+                    f"{self.frequency[k]:.6g} Hz at m = {_signed(rows[j] - self.harmonics)} both fall on "
+                    f"{bins[rows[i], n] * self.resolution:.6g} Hz; {remedy}"
+                )
+
+
+def _signed(m: int) -> str:
+    return f"{m:+d}" if m else "0"

@@ -1,0 +1,112 @@
+"""`rhythmid design`: a folder that can be played, the same numbers in terminal and JSON, refusals that leave nothing."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rhythmid as package
+from rhythmid.experiment import Experiment, perform
+
+PAPER = Path(package.__file__).parent / "models" / "paper_hopper.yaml"
+ARGUMENTS = ("--duration", 40, "--band", 0, 6, "--max-effort", 0.02, "--envelope", 0.13, 0.17, "--noise-std", 2e-5,
+             "--rate", 250, "--harmonics", 2, "--delays", 0.04, 0.05)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("design")
+
+
+@pytest.fixture
+def made(folder, rhythmid):
+    """A design made once by the command, and what it printed."""
+    if not (folder / "said").exists():
+        done = rhythmid("design", PAPER, *ARGUMENTS, "--output", "plan", "--json", "plan.json", cwd=folder)
+        assert (done.returncode, done.stderr) == (0, ""), done.stderr
+        (folder / "said").write_text(done.stdout, encoding="utf-8")
+    return folder / "plan", (folder / "said").read_text(encoding="utf-8")
+
+
+def played(plan: Path) -> tuple[np.ndarray, np.ndarray]:
+    """The samples in the file: seconds, effort."""
+    table = np.loadtxt(plan / "excitation.csv", delimiter=",", skiprows=1)
+    return table[:, 0], table[:, 1]
+
+
+def test_the_folder_holds_all_of_the_experiment(made):
+    plan, said = made
+    assert sorted(path.name for path in plan.iterdir()) == [
+        "design.json", "design.png", "excitation.csv", "experiment.yaml", "model.yaml"
+    ]  # fmt: skip
+    assert (plan / "model.yaml").read_bytes() == PAPER.read_bytes()
+    assert (plan / "design.png").read_bytes().startswith(b"\x89PNG")
+    assert json.loads((plan / "design.json").read_text()) == json.loads((plan.parent / "plan.json").read_text())
+    assert "predicted standard deviations" in said and "rhythmid run plan/experiment.yaml" in said
+
+
+def test_every_free_parameter_and_both_delays_have_a_predicted_standard_deviation(made):
+    plan, said = made
+    result = json.loads((plan / "design.json").read_text())
+    assert set(result["parameters"]) == {"linear_spring.stiffness", "linear_spring.rest_length", "switched_damper.stance"}
+    assert set(result["delays"]) == {"input", "measurement", "sum"}
+    for name, estimate in (result["parameters"] | result["delays"]).items():
+        assert 0.0 < estimate["std"] < 0.1 * estimate["value"]
+        assert f"{estimate['std']:.2g}" in said, name
+    assert result["amplitude"]["crest_factor"] < 1.8
+    assert result["distortion"]["even"] > result["distortion"]["odd"] > 0.0
+
+
+def test_what_is_played_is_the_file_sample_by_sample(made):
+    plan, _ = made
+    experiment = Experiment.load(plan / "experiment.yaml")
+    time, effort = played(plan)
+    assert len(time) == experiment.count == 10_000
+    topics = perform(experiment)
+    np.testing.assert_array_equal(topics["excitation"].effort, effort)
+    np.testing.assert_allclose(topics["excitation"].stamp_ns * 1e-9, time, atol=1e-12)
+    position = topics["joint_states"].position
+    low, high = experiment.safety.envelope
+    assert low < position.min() and position.max() < high
+    assert np.max(np.abs(effort)) <= experiment.safety.max_effort
+
+
+def test_simulating_and_identifying_the_design_gives_the_predicted_uncertainty(made, rhythmid):
+    plan, _ = made
+    done = rhythmid("simulate", plan / "model.yaml", "--experiment", plan / "experiment.yaml", "--out", "bag")
+    assert done.returncode == 0, done.stderr
+    done = rhythmid("identify", "bag", "--model", plan / "model.yaml", "--json", plan.parent / "found.json")
+    assert done.returncode == 0, done.stderr
+    predicted, found = (json.loads(path.read_text()) for path in (plan / "design.json", plan.parent / "found.json"))
+    for group, names in (("parameters", predicted["parameters"]), ("delays", ("input", "measurement", "sum"))):
+        for name in names:
+            expected, actual = predicted[group][name], found[group][name]
+            assert actual["std"] == pytest.approx(expected["std"], rel=0.1), name
+            assert abs(actual["value"] - expected["value"]) < 4.5 * expected["std"], name
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--harmonics", 6), "aliases"),
+        (("--envelope", 0.15, 0.16), "the limit cycle itself"),
+        (("--duration", 5), "too short"),
+        (("--kind", "sweep"), "one of comb, multisine"),
+        (("--noise-std", "much"), "--noise-std"),
+        (("--json", "no/where.json"), "does not exist"),
+    ],
+)
+def test_a_refusal_is_one_line_and_leaves_nothing(arguments, words, rhythmid, tmp_path):
+    done = rhythmid("design", PAPER, *ARGUMENTS, "--output", "plan", *arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("error: ") and done.stderr.count("\n") == 1, done.stderr
+    assert words in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_exists_is_not_overwritten(rhythmid, tmp_path):
+    (tmp_path / "plan").mkdir()
+    done = rhythmid("design", PAPER, *ARGUMENTS, "--output", "plan")
+    assert done.returncode == 2 and "exists already" in done.stderr
+    assert list((tmp_path / "plan").iterdir()) == []
