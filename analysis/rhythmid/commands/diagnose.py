@@ -145,4 +145,8 @@ def show(result: dict) -> None:
         console.print(f"{name.replace('_', ' ')}: NRMSE {fit['train_nrmse']:.5f} seen, {held} held out")
     for line in result["calibration"]:
         console.print(f"calibration: {line}")
+    for line in result["excluded"]:
+        console.print(f"excluded: {line}")
+    for line in result["notes"]:
+        console.print(f"note: {line}")
     console.print(f"next experiment: {result['next_experiment']}")

@@ -23,8 +23,10 @@ FAR = 0.05  # relative difference of that parameter
 def contradiction(found: Search, pool: ThreadPoolExecutor | None = None) -> str | None:
     """Which parameter the records disagree about, as a reason; None where they go together as well as apart."""
     fit = found.nominal
-    names = [one.name.split("@")[0] for one in fit.run.series]
-    groups = {name: [i for i, other in enumerate(names) if other == name] for name in dict.fromkeys(names)}
+    groups: dict[str, list[int]] = {}
+    for index, one in enumerate(fit.run.series):
+        record, _, window = one.name.partition("@")
+        groups.setdefault(record if window else f"{one.name} ({index + 1})", []).append(index)
     if len(groups) < 2:
         return None
     alone: dict[str, Fit] = {}

@@ -79,7 +79,7 @@ class Shortfall:
 
 
 def slowest(series: Series) -> float:
-    """Frequency [Hz] of the slower of motion and forcing."""
+    """Frequency [Hz] of the slower of motion and forcing; at least half a period of it is in the series."""
     own = dominant_frequency(series)
     if series.forcing is None:
         return own
@@ -87,7 +87,7 @@ def slowest(series: Series) -> float:
     value = np.asarray(series.forcing(inside))
     if np.ptp(value) == 0.0:
         return own
-    return min(own, fundamental_frequency(series.centres, value))
+    return max(min(own, fundamental_frequency(series.centres, value)), 0.5 / float(series.time[-1] - series.time[0]))
 
 
 def amplitudes(series: Series, frequency: float) -> Array:
@@ -125,7 +125,7 @@ def tempered(
     size = scales(series, found.nominal.model).effort
     shortfall = shortfall_of(series, size)
     left = diagnosis.detection.refitted_nominal_nrmse
-    if shortfall is None and diagnosis.verdict == "consistent" and left > NOISY:
+    if (shortfall is None or not shortfall.fatal) and diagnosis.verdict == "consistent" and left > NOISY:
         shortfall = Shortfall(
             f"the records are too quiet: noise makes {100.0 * min(left, 1.0):.0f} % of what was measured",
             f"excite at least {max(2, math.ceil(left / QUIET))} times as strongly (the efforts were {size:.3g} rms)", False,

@@ -1,0 +1,211 @@
+"""Diagnosis of records and models that cannot carry one: undecided with the reason and the experiment that would help, or one line."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from machines import CATALOGUE, hopper, records
+from rhythmid.diagnose.diagnosis import diagnose
+from rhythmid.diagnose.result import Diagnosis
+from rhythmid.elements.catalogue import Catalogue, load_catalogue
+from rhythmid.errors import InputError
+from rhythmid.model import Model
+from rhythmid.record.quality import clipped_samples
+from rhythmid.record.record import Record
+
+FEW = ("coulomb_friction", "cubic_stiffness")
+SMALL = CATALOGUE.without(*[n for n, e in CATALOGUE.items() if e.candidate and n not in FEW])
+WEAK = ({"type": "chirp", "amplitude": 0.3, "sweep": 8.0, "band": [0.0, 7.0]}, 1.0)
+STRONG = ({"type": "chirp", "amplitude": 1.2, "sweep": 8.0, "band": [7.0, 0.0]}, 1.0)
+CYCLE = ({"type": "silence", "length": 8.0}, 1.0)
+TINY = ({"type": "chirp", "amplitude": 0.004, "sweep": 8.0, "band": [0.0, 7.0]}, 1.0)
+
+
+def run(given: list[Record], model: Model | None = None, catalogue: Catalogue = SMALL, **options) -> Diagnosis:
+    return diagnose(given, model or hopper(), catalogue=catalogue, **options).diagnosis
+
+
+@pytest.fixture(scope="module")
+def plain() -> list[Record]:
+    return records(hopper(), (WEAK, STRONG), seed=1)
+
+
+@pytest.fixture(scope="module")
+def rubbing() -> list[Record]:
+    friction = CATALOGUE["coulomb_friction"]
+    return records(hopper().with_element(friction, {"force": 0.03, "transition": 0.002}), (WEAK, STRONG), seed=2)
+
+
+def scaled(record: Record, role: str, factor: float) -> Record:
+    channel = getattr(record, role)
+    return replace(record, **{role: replace(channel, value=factor * channel.value)})
+
+
+def limited(record: Record, share: float) -> Record:
+    """The record of a sensor that goes no further than this quantile."""
+    value = record.output.value
+    return replace(record, output=replace(record.output, value=np.minimum(value, np.quantile(value, share))))
+
+
+# undecided
+
+
+@pytest.mark.parametrize("length", [0.6, 2.0])
+def test_short_records_decide_nothing_and_say_how_long_to_record(plain, rubbing, length):
+    for given in (plain, rubbing):
+        found = run([one.cut(2.0, 2.0 + length) for one in given])
+        assert found.verdict == "undecided"
+        assert "too short" in found.summary and "periods" in found.summary
+        assert re.match(r"record at least 2\d s each of chirps", found.next_experiment)
+
+
+@pytest.mark.parametrize("protocol", [(CYCLE,), (TINY,), (CYCLE, CYCLE)])
+def test_one_amplitude_decides_nothing_and_asks_for_others(protocol):
+    found = run(records(hopper(), protocol, seed=3))
+    assert found.verdict == "undecided"
+    assert "one amplitude throughout" in found.summary
+    assert "0.212, 0.706, 2.12" in found.next_experiment
+
+
+def test_what_one_amplitude_suggests_is_no_more_than_the_best_so_far():
+    machine = hopper().with_element(CATALOGUE["coulomb_friction"], {"force": 0.03, "transition": 0.002})
+    found = run(records(machine, (CYCLE,), seed=4))
+    assert found.verdict == "undecided"
+    assert found.summary.endswith("Best so far: coulomb friction.")
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_records_that_are_mostly_noise_decide_nothing_and_ask_for_more_force():
+    quiet = ({"type": "chirp", "amplitude": 1e-3, "sweep": 8.0, "band": [0.0, 7.0]}, 1e-3)
+    found = run(records(hopper(), (quiet,), seed=5))
+    assert found.verdict == "undecided"
+    assert "too quiet" in found.summary
+    assert "times as strongly" in found.next_experiment
+
+
+def test_records_of_different_machines_are_told_with_the_parameter_that_differs(plain):
+    other = records(hopper().with_values({"linear_spring.stiffness": 400.0}), (STRONG,), seed=6)
+    found = run([plain[0], *other])
+    assert found.verdict == "undecided"
+    assert "contradict one another" in found.summary
+    assert "linear_spring.stiffness is 2" in found.summary
+
+
+def test_a_strong_effect_is_not_mistaken_for_two_machines():
+    machine = hopper().with_element(CATALOGUE["cubic_stiffness"], {"coefficient": 1e4})
+    found = run(records(machine, (WEAK, STRONG), seed=7))
+    assert found.verdict == "missing_physics"
+    assert [effect.element for effect in found.missing] == ["cubic_stiffness"]
+
+
+# one line
+
+
+def refused(given: list[Record], *words: str, model: Model | None = None, **options) -> None:
+    with pytest.raises(InputError) as refusal:
+        run(given, model, **options)
+    message = str(refusal.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message, message
+
+
+@pytest.mark.parametrize(
+    ("role", "factor"), [("output", 1000.0), ("output", 0.001), ("input", 1000.0), ("forcing", 1000.0)]
+)
+def test_a_unit_that_is_off_by_a_thousand_is_named_with_the_channel_and_the_scale(plain, role, factor):
+    wrong = [scaled(one, role, factor) for one in plain]
+    refused(wrong, f"the {role} seems to be in units 1000 times", f"scale: {1.0 / factor:g} under '{role}:'")
+
+
+def test_records_in_different_units_are_refused_by_name(plain):
+    refused([plain[0], scaled(plain[1], "output", 1000.0)], "do not look like one machine in one unit", "check units")
+    refused(plain, "do not look like one machine", holdout=[scaled(plain[0], "output", 1000.0)])
+
+
+def test_right_units_are_not_suspected_although_the_model_is_far_off(plain):
+    wrong = hopper().with_values({"linear_spring.stiffness": 330.0, "switched_damper.stance": 0.8})
+    assert run(plain, wrong).verdict == "consistent"
+
+
+def test_motion_that_nothing_recorded_drives_is_refused(plain):
+    alone = [replace(one, input=None, forcing=None) for one in plain]
+    refused(alone, "no input channel", "does not decay", "signals.yaml")
+
+
+def test_a_missing_input_beside_a_forcing_is_noted(plain):
+    found = run([replace(one, input=None) for one in plain])
+    assert found.verdict != "consistent"
+    assert any("no record has an input channel" in note for note in found.notes)
+
+
+def test_a_sensor_that_is_clipped_most_of_the_time_is_refused(plain):
+    refused([limited(one, 0.3) for one in plain], "% of the output is clipped at", "wider range")
+
+
+def test_a_model_without_anything_to_fit_is_refused_with_the_mend(plain):
+    model = hopper()
+    fixed = model.with_parameters({n: replace(v, fixed=True) for n, v in model.parameters.items()})
+    refused(plain, "every parameter", "drop 'fixed: true'", model=fixed)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_nominal_model_that_diverges_is_refused(plain):
+    stiff = hopper().with_values({"linear_spring.stiffness": 1e13})
+    refused(plain, "diverges", "check its parameters and units", model=stiff)
+
+
+def test_no_record_at_all_is_refused():
+    refused([], "no record is given")
+
+
+# reported exclusions
+
+
+def test_clipped_samples_are_left_out_and_counted(rubbing):
+    clipped = [limited(one, 0.97) for one in rubbing]
+    count = sum(int(clipped_samples(one.output.value).sum()) for one in clipped)
+    assert count > 200
+    found = run(clipped)
+    assert found.verdict == "missing_physics"
+    assert [effect.element for effect in found.missing] == ["coulomb_friction"]
+    said = [note for note in found.notes if "clipped" in note]
+    assert len(said) == 2 and sum(int(note.split(": ")[1].split()[0]) for note in said) == count
+
+
+EXPLOSIVE = '''
+"""A spring that pushes the further it is stretched, without limit."""
+
+import math
+
+from rhythmid.elements.element import Element, Parameter
+
+
+def kernel(x, v, t, f, coefficient):
+    return coefficient * math.sinh(1e9 * x)
+
+
+ELEMENT = Element(
+    name="explosive_spring",
+    slot="force",
+    title="Explosive spring",
+    equation="F = κ sinh x",
+    parameters=(Parameter("coefficient", "N", "strength κ", bounds=(0.0, math.inf)),),
+    kernel=kernel,
+    size="coefficient",
+    starts=lambda s: [{"coefficient": 1.0}, {"coefficient": 10.0}],
+    reference="none",
+)
+'''
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_a_candidate_that_blows_the_simulation_up_is_reported_as_excluded(plain, tmp_path):
+    (tmp_path / "explosive_spring.py").write_text(EXPLOSIVE)
+    known = load_catalogue([tmp_path])
+    few = known.without(*[n for n, e in known.items() if e.candidate and n not in (*FEW, "explosive_spring")])
+    found = run(plain, catalogue=few)
+    assert found.verdict == "consistent"
+    assert any("explosive_spring" in line and "diverges" in line for line in found.excluded)
