@@ -81,6 +81,7 @@ class PlantNode(GraphNode):
         else:
             self._wall = Clock()
             self._origin_ns: int | None = None
+            self._transport_ns = 0  # by which all commands together acted later than they were stamped
             self._done_ns = 0  # time since the origin up to which the plant has been integrated
             self._arrived: deque[tuple[int, int, float]] = deque()
             self.create_subscription(JointState, "command", self._on_realtime, profile, raw=True)
@@ -112,7 +113,11 @@ class PlantNode(GraphNode):
         figures = {"samples": str(self._samples), "commands": str(self._commands)}
         if self._grid is None:
             return figures
-        late = {"late_commands": str(self._late), "foreign_commands": str(self._foreign)}
+        late = {
+            "late_commands": str(self._late),
+            "transport_mean_ms": f"{1e-6 * self._transport_ns / max(1, self._commands):.6f}",
+            "foreign_commands": str(self._foreign),
+        }
         return {**figures, **late, **self._grid.figures()}
 
     def obstacles(self) -> list[str]:
@@ -175,7 +180,9 @@ class PlantNode(GraphNode):
             released_ns, received_ns, effort = self._arrived.popleft()
             act_ns = min(released_ns, received_ns) - self._origin_ns  # a foreign clock may be ahead of ours
             self._late += act_ns < self._done_ns
+            stamped_ns = act_ns
             act_ns = max(act_ns, self._done_ns, self._newest_ns + 1)
+            self._transport_ns += act_ns - stamped_ns
             self._plant.push(act_ns, effort)
             self._newest_ns = act_ns
             self._commands += 1

@@ -1,0 +1,83 @@
+"""Delays from real-time bags, recorded while the machine has other work, against what the injectors logged."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import yaml
+
+MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"
+DELAYS = {"input": 0.040, "measurement": 0.050}
+CLOSE = 0.3  # ms between an identified delay and the mean of the applied one
+SWEEP = 20.0  # s
+pytestmark = pytest.mark.timeout(240)
+
+
+@contextmanager
+def other_work() -> Iterator[None]:
+    """A process for every processor that never rests."""
+    busy = [
+        subprocess.Popen([sys.executable, "-S", "-c", "while True: pass"]) for _ in os.sched_getaffinity(0)
+    ]
+    try:
+        yield
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+
+
+def figures(summary: str) -> dict[str, dict[str, str]]:
+    """Node -> its figures, as the summary of a run prints them: the node's name stands before its first one."""
+    found: dict[str, dict[str, str]] = {}
+    node = ""
+    for line in summary.splitlines():
+        words = line.split()
+        if words and words[0] in ("plant", "command_delay", "measurement_delay", "excitation", "recorder"):
+            node, words = words[0], words[1:]
+        if node and len(words) == 2 and line.startswith(("plant", "command", "measurement", "excitation", " ")):
+            found.setdefault(node, {})[words[0]] = words[1]
+    return found
+
+
+@pytest.fixture
+def recorded(rhythmid, tmp_path) -> tuple[Path, dict[str, dict[str, str]]]:
+    """A bag of what a user of the robot sees, and what the nodes said of themselves."""
+    experiment = {
+        "model": str(MODEL),
+        "excitation": {"type": "chirp", "amplitude": 0.1, "band": [0, 7], "sweep": SWEEP},
+        "delays": DELAYS,
+        "time": {"mode": "realtime", "layout": "processes"},
+        "record": {"topics": ["excitation", "joint_states", "forcing", "run"]},
+    }
+    (tmp_path / "experiment.yaml").write_text(yaml.safe_dump(experiment))
+    with other_work():
+        done = rhythmid("run", "experiment.yaml", "--out", "bag")
+    assert done.returncode == 0, done.stderr
+    return tmp_path / "bag", figures(done.stderr)
+
+
+def test_delays_of_a_busy_machine_are_those_that_were_applied(recorded, rhythmid, tmp_path):
+    bag, told = recorded
+    done = rhythmid("identify", bag, "--json", "result.json")
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "result.json").read_text())
+    drift = {
+        "input": result["parameters"].get("input_delay_drift.rate", {"value": 0.0})["value"],
+        "measurement": result["parameters"].get("clock_skew.skew", {"value": 0.0})["value"],
+    }
+    for name, node in (("input", "command_delay"), ("measurement", "measurement_delay")):
+        applied = float(told[node]["applied_delay_mean_ms"])
+        if name == "input":
+            applied += float(told["plant"]["transport_mean_ms"])
+        assert told[node]["dropped"] == "0"
+        assert 1e3 * DELAYS[name] <= applied < 1e3 * DELAYS[name] + 20.0  # nothing is released early
+        found = 1e3 * (result["delays"][name]["value"] + 0.5 * SWEEP * drift[name])  # in the middle of the run
+        assert found == pytest.approx(applied, abs=CLOSE), (name, told)
+    assert result["parameters"]["linear_spring.stiffness"]["value"] == pytest.approx(200.0, rel=2e-3)
+    assert result["parameters"]["switched_damper.stance"]["value"] == pytest.approx(2.0, rel=2e-2)
