@@ -79,43 +79,42 @@ def rounded(value: Array, step: float) -> Array:
 
 
 def axis(friction: float = 3.0, seed: int = 0, count: int = 2, duration: float = 12.0, known: str = "effort") -> Twin:
-    """Linear axis under PD position control at 1 kHz, Coulomb friction [N] missing; encoder of 1 µm.
+    """Linear axis under PD position control, Coulomb friction [N] missing; encoder of 1 µm, records at 1 kHz.
 
-    `known` is what was recorded beside the position: the motor's `effort`, or the `reference` of the known controller.
+    `known` is what was recorded beside the position: the motor's `effort`, of a controller at 1 kHz, or the `reference` of
+    a known controller at 10 kHz.
     """
     rng = np.random.default_rng([1, seed])
     m, c, kp, kd, period = 2.0, 8.0, 2000.0, 60.0, 1e-3
-    records = []
-    for index in range(count):
+
+    def rate(v: float, u: float) -> float:
+        return (u - c * v - friction * np.tanh(v / 2e-4)) / m
+
+    def record(index: int) -> Record:
         way = moves(rng, 0.08, duration) if index % 2 == 0 else tones(rng, 0.03, 0.2, 4.0)
-        time = np.arange(0.0, duration, period)
-        reference = sampled(way, time)
-        state, effort = np.array([reference[0], 0.0]), np.zeros(len(time))
-        position, sub = np.zeros(len(time)), 10
+        time, sub = np.arange(0.0, duration, period), 10
         h = period / sub
-
-        def rate(v: float, u: float) -> float:
-            return (u - c * v - friction * np.tanh(v / 2e-4)) / m
-
-        x, v = float(state[0]), 0.0
+        position, effort = np.zeros(len(time)), np.zeros(len(time))
+        x, v, u = way(0.0), 0.0, 0.0
         for k in range(len(time)):
             position[k] = x
-            effort[k] = u = kp * (reference[k] - x) - kd * v
-            for _ in range(sub):  # Runge-Kutta of fourth order, the controller's force held
+            for j in range(sub):  # Runge-Kutta of fourth order, the controller's force held
+                if j == 0 or known == "reference":
+                    u = kp * (way(time[k] + j * h) - x) - kd * v
+                if j == 0:
+                    effort[k] = u
                 a1 = rate(v, u)
                 a2 = rate(v + 0.5 * h * a1, u)
                 a3 = rate(v + 0.5 * h * a2, u)
                 a4 = rate(v + h * a3, u)
                 x += h * v + h * h * (a1 + a2 + a3) / 6.0
                 v += h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
-        measured = rounded(noisy(rng, position, 1e-6), 1e-6)
-        given = effort if known == "effort" else reference
-        records.append(
-            Record(
-                f"axis {index}", Channel(time, measured, "m"), Channel(time, given, "N" if known == "effort" else "m"),
-                input_kind="force" if known == "effort" else "reference",
-            )
-        )  # fmt: skip
+        measured = Channel(time, rounded(noisy(rng, position, 1e-6), 1e-6), "m")
+        if known == "effort":
+            return Record(f"axis {index}", measured, Channel(time, effort, "N"))
+        reference = Channel(time, sampled(way, time), "m")
+        return Record(f"axis {index}", measured, reference, hold="linear", input_kind="reference")
+
     loop = "" if known == "effort" else (
         "command: [{position_control: {proportional: {value: 2000.0, fixed: true}, derivative: {value: 60.0, fixed: true}}}]\n"
     )
@@ -123,7 +122,7 @@ def axis(friction: float = 3.0, seed: int = 0, count: int = 2, duration: float =
         "inertia: {mass: {value: 1.7, unit: kg}}\n" + loop
         + "force: [{viscous_damper: {damping: {value: 12.0, unit: N*s/m}}}]\n"
     )
-    return Twin(records, nominal, "coulomb_friction" if friction else "", {"force": friction})
+    return Twin([record(i) for i in range(count)], nominal, "coulomb_friction" if friction else "", {"force": friction})
 
 
 def joint(friction: float = 0.4, seed: int = 0, count: int = 2, duration: float = 15.0) -> Twin:
@@ -229,7 +228,7 @@ force:
 def servo(effect: str = "actuator_saturation", seed: int = 0, count: int = 2, duration: float = 12.0) -> Twin:
     """Position servo at 100 Hz of which only command and motion (degrees) are known.
 
-    Effects: `actuator_saturation` (of its torque), `command_rate_limit` (of its set point), `actuator_deadband`
+    Effects: `actuator_saturation` (of its torque), `reference_rate_limit` (of its set point), `actuator_deadband`
     (it does not push when the error is small), `coulomb_friction`, or none ("").
     """
     rng = np.random.default_rng([5, seed])
@@ -247,7 +246,7 @@ def servo(effect: str = "actuator_saturation", seed: int = 0, count: int = 2, du
             return float(command[min(int(t / period + 1e-9), len(command) - 1)])
 
         def rates(t: float, s: Array) -> list[float]:
-            point = s[2] if effect == "command_rate_limit" else held(t)
+            point = s[2] if effect == "reference_rate_limit" else held(t)
             push = omega**2 * (point - s[0]) - 2.0 * zeta * omega * s[1]
             if effect == "actuator_saturation":
                 push = float(np.clip(push, -top, top))
@@ -269,7 +268,7 @@ command:
   - position_control: {proportional: {value: 400.0}, derivative: {value: 25.0}}
 """
     truth = {
-        "actuator_saturation": {"limit": top}, "command_rate_limit": {"rate": slew}, "actuator_deadband": {"width": dead},
+        "actuator_saturation": {"limit": top}, "reference_rate_limit": {"rate": slew}, "actuator_deadband": {"width": dead},
         "coulomb_friction": {"force": friction},
     }  # fmt: skip
     return Twin(records, nominal, effect, truth.get(effect, {}))

@@ -21,7 +21,8 @@ from rhythmid.identify.series import Series, hold_out_tail
 from rhythmid.model import Model
 
 FOLLOWS = 0.1  # error below which it follows the machine well enough for any score
-BETTER = 0.6  # share to which windows have to lower the error: one that adds up, not one that the effect makes at once
+GAIN = 0.9  # share to which every step to shorter windows has to lower the error
+BETTER = 0.6  # and all steps together: an error that adds up, not one that noise or the effect makes at once
 SHORTER = 2.0  # factor from one length of windows to the next
 INTEGRATES = "the model integrates or is unstable, so that a long free run would add up every small disturbance"
 LOSES = "in free run the nominal model loses the machine"
@@ -41,6 +42,11 @@ class Scoring:
     def free_run(self) -> bool:
         return self.words == "free run"
 
+    @property
+    def error(self) -> float:
+        """rms of the residuals that the calibrated model leaves, in the output's unit."""
+        return _error(self.calibration.fit)
+
 
 def settle(
     model: Model,
@@ -54,7 +60,7 @@ def settle(
 
     Without `separate` held-out series the last fifth of every run is held out. Raises InputError when no length works.
     """
-    best: Scoring | None = None
+    tried: list[Scoring] = []
     failure: InputError | None = None
     for length, reason in _ladder(model, series):
         words = "free run" if math.isinf(length) else _words(length, reason)
@@ -68,17 +74,17 @@ def settle(
         except InputError as error:
             failure = failure or error
             continue
-        if best is not None and _error(calibration.fit) > BETTER * _error(best.calibration.fit):
+        if tried and _error(calibration.fit) > GAIN * tried[-1].error:
             break
         if calibration.reconstructed:
             unseen = [reconstructed(one) for one in unseen]
-        best = Scoring(calibration, tuple(unseen), words)
+        tried.append(Scoring(calibration, tuple(unseen), words))
         if calibration.fit.nrmse() < FOLLOWS:
             break
-    if best is None:
+    if not tried:
         assert failure is not None
         raise failure
-    return best
+    return tried[-1] if tried[-1].error < BETTER * tried[0].error else tried[0]
 
 
 def _cut(series: Sequence[Series], length: float) -> list[Series]:

@@ -63,22 +63,33 @@ class Series:
         return self.average(self.time)
 
     def of_block(self, samples: Array) -> Array:
-        """Block averages (n,) of a smooth signal from its values at the blocks' centres.
+        """Block averages (n,) of a smooth signal from its values at the blocks' centres, by central differences.
 
-        An average over b samples exceeds the centre's value by curvature times (b² − 1)/24 sample periods squared; the
-        curvature comes from the neighbouring blocks.
+        The average over b samples is a sum D = 1 + a δ² + c δ⁴ + … of differences between neighbouring blocks, exact to the
+        fourth order in frequency; at the ends the differences are extrapolated.
         """
-        if self.block == 1 or len(samples) < 3:
+        if self.block == 1 or len(samples) < 8:
             return samples
-        bend = np.empty_like(samples)
-        bend[1:-1] = samples[2:] - 2.0 * samples[1:-1] + samples[:-2]
-        bend[0], bend[-1] = bend[1], bend[-2]
-        return samples + bend * (self.block**2 - 1) / (24.0 * self.block**2)
+        once = 1.0 / self.block**2
+        a = (1.0 - once) / 24.0
+        c = (1.0 / 120.0 - once / 36.0 + 7.0 * once**2 / 360.0) / 16.0 - a / 12.0
+        bend = np.diff(samples, 2)
+        twist = np.diff(bend, 2)
+        return samples + a * _extended(bend, 1) + c * _extended(twist, 2)
 
     @cached_property
     def averaged(self) -> Array:
         """Block averages of the measurement."""
         return self.average(self.value)
+
+
+def _extended(samples: Array, count: int) -> Array:
+    """Samples with `count` more at either end, on the cubic through the last four there."""
+    for _ in range(count):
+        first = 4.0 * samples[0] - 6.0 * samples[1] + 4.0 * samples[2] - samples[3] if len(samples) > 3 else samples[0]
+        last = 4.0 * samples[-1] - 6.0 * samples[-2] + 4.0 * samples[-3] - samples[-4] if len(samples) > 3 else samples[-1]
+        samples = np.concatenate([[first], samples, [last]])
+    return samples
 
 
 def bandwidth(value: Array, period: float, share: float = 0.9999) -> float:
