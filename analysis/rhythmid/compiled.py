@@ -21,7 +21,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numba.core.errors import NumbaError
@@ -59,7 +59,10 @@ class Layout:
 
     def vector(self, model: Model) -> NDArray[np.float64]:
         """Parameter vector of a model with this structure."""
-        return np.array([model.borrowed(name, default) for name, default in self.parameters], dtype=float)
+        known = model.parameters
+        return np.array(
+            [known[name].value if name in known else default for name, default in self.parameters], dtype=float
+        )
 
 
 @dataclass(frozen=True)
@@ -76,11 +79,16 @@ class Compiled:
     run: Callable[..., int]
 
 
+@lru_cache(maxsize=256)
+def _text_of(kernel: Callable[..., Any]) -> str:
+    return textwrap.dedent(inspect.getsource(kernel))
+
+
 def kernel_source(element: Element, name: str) -> str:
     """Source text of an element's kernel as a function called `name`. Raises InputError when it has none to read."""
     assert element.kernel is not None
     try:
-        source = textwrap.dedent(inspect.getsource(element.kernel))
+        source = _text_of(element.kernel)
     except (OSError, TypeError) as error:
         raise InputError(f"element {element.name!r}: its kernel's source text cannot be read ({error})") from None
     if not source.lstrip().startswith("def "):

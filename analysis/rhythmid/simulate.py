@@ -38,10 +38,13 @@ def physical_times(model: Model, stamps: Array) -> Array:
     A measurement cannot overtake an earlier one.
     """
     times = np.asarray(stamps, dtype=float)
+    varies = False
     for term in model.terms:
         if term.element.slot in ("sensor", "timing") and term.element.delay is not None:
-            times = times - term.element.delay(stamps, **{n: v.value for n, v in term.values.items()})
-    return np.maximum.accumulate(times)
+            delays = term.element.delay(stamps, **{n: v.value for n, v in term.values.items()})
+            varies = varies or (len(delays) > 0 and np.ptp(delays) > 0.0)
+            times = times - delays
+    return np.maximum.accumulate(times) if varies else times
 
 
 def delayed_command(model: Model, command: PPoly | None) -> PPoly | None:

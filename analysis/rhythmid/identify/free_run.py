@@ -57,15 +57,15 @@ class FreeRun:
         The start is the state at the first centre. None when the simulation diverges.
         """
         one, given = self.series[index], self.inputs[index]
-        times = np.ascontiguousarray(np.maximum.accumulate(physical_times(model, one.centres)))
+        times = np.ascontiguousarray(physical_times(model, one.centres))
         late = _delay_of(model, given.command[0][1:-1])
+        varies = late is not None and len(late) > 0 and np.ptp(late) > 0.0
         compiled, (knots, coefficients) = self.compiled, given.smooth or given.command
-        if given.smooth is not None and late is not None and np.ptp(late) > 0.0:
+        if given.smooth is not None and varies:
             compiled, (knots, coefficients) = self.stopping(), given.command
         if late is not None and len(late):
             knots = knots.copy()
-            knots[1:-1] += late if len(late) == len(knots) - 2 else late[0]
-            knots[1:-1] = np.maximum.accumulate(knots[1:-1])
+            knots[1:-1] += late if varies else late[0]
         out = np.empty((len(times), self.states + 2))
         force = NO_SIGNAL if disturbance is None else pieces(disturbance)
         done = compiled.run(
@@ -92,13 +92,22 @@ class FreeRun:
 
 
 def _delay_of(model: Model, stamps: Array) -> Array | None:
-    """Delays (n,) [s] that the command path adds to these stamps; None where it adds none."""
-    total = None
+    """Delays (n,) [s] that the command path adds to these stamps, one element after another; None where it adds none.
+
+    A command cannot overtake an earlier one.
+    """
+    now, shift, found, varies = stamps, 0.0, False, False
     for term in model.terms:
         if term.element.slot == "command" and term.element.delay is not None:
-            late = term.element.delay(stamps, **{n: v.value for n, v in term.values.items()})
-            total = late if total is None else total + late
-    return total
+            late = term.element.delay(now, **{n: v.value for n, v in term.values.items()})
+            found = True
+            if len(late) and np.ptp(late) > 0.0:
+                now, varies = np.maximum.accumulate(now + late), True
+            elif len(late):
+                now, shift = now + late[0], shift + float(late[0])
+    if not found:
+        return None
+    return now - stamps if varies else np.full(len(stamps), shift)
 
 
 def _stand_in(one: Series) -> Pieces | None:
