@@ -1,7 +1,7 @@
 """Units that are off by a thousand: millimetres for metres, kilonewtons for newtons.
 
-No parameter makes up for them, and what they do to a fit looks like anything but units. Where the nominal model misses a stretch of
-a record altogether, each channel is tried in the neighbouring unit.
+Where the mass is known no parameter makes up for them, and what they do to a fit looks like anything but units. Where the nominal
+model misses a stretch of a record altogether, each channel is tried in the neighbouring unit.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,12 @@ CHANNELS = {"output": "value", "input": "command", "forcing": "forcing"}
 
 
 def check_units(model: Model, series: Sequence[Series], pool: ThreadPoolExecutor | None = None) -> None:
-    """Raise InputError when a channel in units a thousand times larger or smaller suits the model, and as recorded does not."""
+    """Raise InputError when a channel in units a thousand times larger or smaller suits the model, and as recorded does not.
+
+    A model whose mass is free fits records in any unit, so nothing is said of one.
+    """
+    if not model.mass.fixed:
+        return
     one = _stretch(max(series, key=lambda s: float(np.std(s.averaged))))
     if _as_given(model, one) < POOR:
         return
