@@ -94,7 +94,7 @@ def record_case(case: Case, path: Path) -> None:
 def curves(found: Identification) -> tuple[dict[int, list[Curve]], dict[int, list[Curve]]]:
     """Curves of Figures 2 and 3: theory, estimate, parametric fit; the estimate compensated by the delays found."""
     paper = found.paper[0]
-    htf = found.harmonics
+    htf = paper.estimate.htf
     theory = theoretical_htf(paper_hopper(), paper.pumping, htf.harmonics, htf.frequency, delays=False)
     fit = paper.fit.linearised.htf(htf.harmonics, htf.frequency)
     undone = htf
@@ -103,7 +103,7 @@ def curves(found: Identification) -> tuple[dict[int, list[Curve]], dict[int, lis
     magnitude, phase = {}, {}
     for m in (0, -1, 1):
         row = htf.row(m)
-        seen = found.reached[row] & (htf.frequency <= HIGHEST)
+        seen = paper.estimate.reached[row] & (htf.frequency <= HIGHEST)
         at = htf.frequency[seen]
         estimate = Curve("estimate", at, htf.value[row, seen])
         fitted = Curve("parametric fit", at, fit[row, seen])

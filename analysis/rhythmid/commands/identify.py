@@ -25,6 +25,11 @@ def identify(
     method: Annotated[
         str, typer.Option("--method", help="joint (maximum likelihood) or paper (magnitudes, then phases).")
     ] = "joint",
+    htf: Annotated[
+        str,
+        typer.Option("--htf", help="How transfer functions are found: auto (as the excitation allows), separated_lines, "
+                     "local_rational or regularised_least_squares (the paper's)."),
+    ] = "auto",
     forcing: Annotated[
         str | None,
         typer.Option("--forcing", help="How the forcing reaches the machine: on_robot, delayed (like the command) or "
@@ -45,12 +50,15 @@ def identify(
     from rhythmid.identify.identify import Method
     from rhythmid.identify.identify import identify as find
     from rhythmid.identify.latency import save_latency
+    from rhythmid.ltp.nonparametric import HtfMethod
     from rhythmid.model import Model
     from rhythmid.record.read import load_records
 
     require_new(json, report, save_model, save)
     if method not in get_args(Method):
         raise InputError(f"--method {method}: one of {', '.join(get_args(Method))} is expected")
+    if htf not in get_args(HtfMethod):
+        raise InputError(f"--htf {htf}: one of {', '.join(get_args(HtfMethod))} is expected")
     if forcing is not None and forcing not in get_args(Forcing):
         raise InputError(f"--forcing {forcing}: one of {', '.join(get_args(Forcing))} is expected")
     offset = offset_of(clock_offset, clock_offset_std)
@@ -61,7 +69,7 @@ def identify(
         records = load_records(bags, signals)
         status.update("identifying")
         path = "clock_unknown" if offset is not None else cast(Forcing | None, forcing)
-        found = find(records, known, method=cast(Method, method), forcing=path, offset=offset)
+        found = find(records, known, method=cast(Method, method), forcing=path, offset=offset, htf=cast(HtfMethod, htf))
     result = found.to_dict()
     show(result)
     if json is not None:
@@ -107,6 +115,8 @@ def show(result: dict[str, Any]) -> None:
     for name, estimates in result["methods"]["paper"].items():
         told = ", ".join(f"{which} {1e3 * value:.2f} ms" for which, value in estimates.items())
         console.print(f"paper's method, {name}: {told}")
+    about, highest = result["transfer_functions"], max(one["m"] for one in result["harmonics"])
+    console.print(f"transfer functions up to ±{highest}, by {about['method'].replace('_', ' ')}")
     quality = result["quality"]
     console.print(f"{quality['rate']:.6g} Hz, {quality['gaps']} gaps, free-run NRMSE {quality['nrmse']:.5f}")
     for note in result["notes"]:

@@ -3,7 +3,7 @@
 `Identification.to_dict` is the contract of `rhythmid identify --json`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rhythmid.identify.joint import JointFit
 from rhythmid.identify.paper import PaperResult
-from rhythmid.ltp.htf import HarmonicTransferFunctions
+from rhythmid.ltp.harmonic_estimate import HarmonicEstimate, HarmonicEstimates
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 
@@ -92,7 +92,7 @@ class Identification:
     model : the model with all estimates in it, delays included.
     parameters : estimates by "element.parameter".
     delays : of the command and measurement paths.
-    harmonics : Ĥ_m found in the first record, with standard deviations; `reached` bool[h, n] where they mean something.
+    harmonics : Ĥ_m found in the first record without a model, with what is known of their errors.
     paper : the paper's method, record by record.
     quality : rate [Hz], gaps, jitter_std [s], nrmse and what else tells how far to trust the rest.
     joint : the joint fit; None where another method was asked for.
@@ -103,8 +103,7 @@ class Identification:
     records: tuple[Record, ...]
     parameters: Mapping[str, Estimate]
     delays: Delays
-    harmonics: HarmonicTransferFunctions
-    reached: NDArray[np.bool_]
+    harmonics: HarmonicEstimates
     paper: tuple[PaperResult, ...]
     quality: Mapping[str, Any]
     notes: tuple[str, ...] = field(default_factory=tuple)
@@ -115,29 +114,34 @@ class Identification:
         return {
             "parameters": {name: estimate.to_dict() for name, estimate in self.parameters.items()},
             "delays": self.delays.to_dict(),
-            "harmonics": list(self._harmonics()),
+            "harmonics": [_harmonic(one) for one in self.harmonics.functions],
+            "transfer_functions": {
+                "method": self.harmonics.method,
+                "false_alarm": self.harmonics.false_alarm,
+                "tested": [{"m": t.m, "p_value": t.p_value, "visible": t.visible} for t in self.harmonics.tested],
+            },
             "methods": {"paper": {harmonic_name(m): d.to_dict() for m, d in self.paper[0].delays.items()}},
             "quality": dict(self.quality),
             "notes": list(self.notes),
         }
 
-    def _harmonics(self) -> Sequence[dict[str, Any]]:
-        found = []
-        for row, m in enumerate(self.harmonics.harmonics):
-            inside = np.flatnonzero(self.reached[row])
-            inside = inside[:: max(1, -(-len(inside) // POINTS))]
-            value = self.harmonics.value[row, inside]
-            std = np.full(len(inside), np.nan) if self.harmonics.std is None else self.harmonics.std[row, inside]
-            found.append(
-                {
-                    "m": int(m),
-                    "frequency": self.harmonics.frequency[inside].tolist(),
-                    "magnitude": np.abs(value).tolist(),
-                    "phase": np.angle(value).tolist(),
-                    "std": std.tolist(),
-                }
-            )
-        return found
+
+def _harmonic(one: HarmonicEstimate) -> dict[str, Any]:
+    """One transfer function as lists, thinned to what a figure needs."""
+    thin = slice(None, None, max(1, -(-len(one.value) // POINTS)))
+    value = one.value[thin]
+    return {
+        "m": one.m,
+        "frequency": one.frequency[thin].tolist(),
+        "magnitude": np.abs(value).tolist(),
+        "phase": np.angle(value).tolist(),
+        "std": one.std[thin].tolist(),
+        "radius": one.radius[thin].tolist(),
+        "noise": one.noise[thin].tolist(),
+        "even_distortion": one.even[thin].tolist(),
+        "odd_distortion": one.odd[thin].tolist(),
+        "aliasing": one.aliasing[thin].tolist(),
+    }
 
 
 def harmonic_name(m: int) -> str:

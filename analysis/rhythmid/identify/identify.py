@@ -17,6 +17,8 @@ from rhythmid.identify.identification import Delays, Estimate, Identification
 from rhythmid.identify.joint import joint_likelihood
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
 from rhythmid.identify.timing import compensated, measurement_jitter
+from rhythmid.ltp.harmonic_estimate import HarmonicEstimates
+from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, smoothed
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
 from rhythmid.record.record import Record
@@ -144,6 +146,7 @@ def identify(
     method: Method = "joint",
     forcing: Forcing | None = None,
     offset: Offset | None = None,
+    htf: HtfMethod = "auto",
 ) -> Identification:
     """Identify a model's free parameters and its delays from records.
 
@@ -151,9 +154,11 @@ def identify(
     ----------
     records : one or more recordings of the same machine.
     model : what is known of it; the paper's hopper where None.
-    harmonics : M, sidebands on either side that are estimated.
+    harmonics : M, sidebands on either side that the paper's method estimates.
     method : `joint` maximum likelihood, or the `paper`'s two steps.
     forcing, offset : how the forcing reaches the machine, and what is known of its clock; see `delays_of`.
+    htf : how the harmonic transfer functions of the first record are found; see `harmonic_transfer_functions`. The paper's
+        method brings its own, equation (5), where this is `auto`.
 
     Raises InputError when the joint search did not arrive (never is a stuck fit returned), and when a record has no
     input, is shorter than a period, or the model has no limit cycle.
@@ -170,7 +175,7 @@ def identify(
         pumpings.append(pumping)
     if method == "joint":
         try:
-            return _joint(given, nominal, results, pumpings[0].source, forcing, offset)
+            return _joint(given, nominal, results, pumpings[0].source, forcing, offset, htf)
         except InputError:
             if any(pumping.active for pumping in pumpings):
                 raise
@@ -189,8 +194,8 @@ def identify(
     else:  # what a simulation needs is the sum, wherever it stands
         fitted = with_delays(fitted, delays.sum.value or 0.0, 0.0)
     return Identification(
-        fitted, given, parameters, delays, first.estimate.htf, first.estimate.reached, tuple(results),
-        _quality(_nrmse(fitted, given, results), given, results), tuple(note for r, one in zip(given, results) for note in _notes(r, one)),
+        fitted, given, parameters, delays, _harmonics(first, htf if method == "joint" or htf != "auto" else "regularised_least_squares"),
+        tuple(results), _quality(_nrmse(fitted, given, results), given, results), tuple(note for r, one in zip(given, results) for note in _notes(r, one)),
     )  # fmt: skip
 
 
@@ -201,8 +206,9 @@ def _joint(
     source: str,
     forcing: Forcing | None,
     offset: Offset | None,
+    htf: HtfMethod,
 ) -> Identification:
-    """Parameters and delays by joint maximum likelihood; HTFs as the paper's method found them."""
+    """Parameters and delays by joint maximum likelihood; HTFs without a model."""
     joint, notes = compensated(joint_likelihood(records, nominal))
     fit = joint.fit
     own = [name for name in fit.names if name not in DELAYS]
@@ -228,9 +234,16 @@ def _joint(
         )
     notes += tuple(note for result, one in zip(results, records) for note in _notes(one, result))
     return Identification(
-        fit.model, records, parameters, delays, first.estimate.htf, first.estimate.reached, tuple(results), quality,
+        fit.model, records, parameters, delays, _harmonics(first, htf), tuple(results), quality,
         notes, joint,
     )  # fmt: skip
+
+
+def _harmonics(result: PaperResult, method: HtfMethod) -> HarmonicEstimates:
+    """Transfer functions of a record, whose spectra the paper's method has at hand."""
+    if method == "regularised_least_squares":
+        return smoothed(result.estimate)
+    return harmonic_transfer_functions(result.spectra, result.fit.linearised.cycle.ring_down, method)
 
 
 def _notes(record: Record, result: PaperResult) -> Iterator[str]:

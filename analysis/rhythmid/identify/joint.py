@@ -28,6 +28,7 @@ LONGEST = 0.5  # [s] delays that are looked for on either side, if not told othe
 STUCK = 0.5  # unexplained share (rms) of the response to the command, beyond which a fit is no answer
 POOR = 0.3  # the same of the whole motion
 CYCLE_HARMONICS = 24  # that are projected out where the limit cycle is not to be used
+STEP, FINE_STEP = 0.2, 0.05  # of a block, integrated in one step; the latter where the limit cycle is not to be used
 NO_PUMPING = Pumping(1.0, np.zeros(2, dtype=complex), 0.0, "none")
 
 
@@ -274,9 +275,13 @@ def fit_from(
 
 
 def step_of(series: Sequence[Series]) -> float:
-    """Integration step [s]: small enough that its error moves no estimate by more than a twentieth of its standard
-    deviation at a noise of a thousandth of the motion."""
-    return 0.2 * min(one.period * one.block for one in series)
+    """Integration step [s]: small enough that its error moves no estimate by more than a tenth of its standard deviation at
+    a noise of a thousandth of the motion.
+
+    Without the limit cycle only sidebands, a thousandth of the motion, tell the two delays apart; that asks for finer steps.
+    """
+    share = FINE_STEP if any(one.ignored is not None for one in series) else STEP
+    return share * min(one.period * one.block for one in series)
 
 
 def _series(

@@ -2,7 +2,10 @@
 
 import numpy as np
 
+from rhythmid.errors import InputError
 from rhythmid.identify.identification import Identification
+from rhythmid.identify.joint import without_forcing
+from rhythmid.ltp.htf import delay_phase, linearised
 from rhythmid.report.identification import identification_page
 from rhythmid.report.page import Page
 from rhythmid.report.record_quality import quality_of
@@ -25,29 +28,25 @@ def present(found: Identification, command: str = "", name: str = "a model") -> 
 
 
 def _transfer(found: Identification) -> list[TransferFunction]:
-    """The estimated functions where they mean something, with what the fitted model would show there.
+    """The estimated functions, with what the identified model would show there.
 
-    The model's function, smoothed as the estimate is, turns by the identified delays, equation (7) of the paper.
+    The model's function turns by the identified delays, equation (7) of the paper.
     """
-    made = []
-    estimate, first = found.harmonics, found.paper[0]
-    delays = found.delays
+    pumping, delays = found.paper[0].pumping, found.delays
     both = delays.separable and delays.input.value is not None and delays.measurement.value is not None
-    split = (
-        (delays.input.value or 0.0, delays.measurement.value or 0.0)
-        if both
-        else (delays.sum.value or 0.0, 0.0)
+    input_delay, measurement_delay = (
+        (delays.input.value or 0.0, delays.measurement.value or 0.0) if both else (delays.sum.value or 0.0, 0.0)
     )
-    for row, m in enumerate(estimate.harmonics):
-        inside = found.reached[row]
-        frequency = estimate.frequency[inside]
-        turn = 2 * np.pi * ((frequency - m * first.pumping.frequency) * split[0] + frequency * split[1])
-        model = first.fit.expected[first.estimate.htf.row(int(m))][inside] * np.exp(-1j * turn)
-        made.append(
-            TransferFunction(
-                int(m), frequency, estimate.value[row, inside],
-                None if estimate.std is None else estimate.std[row, inside],
-                model if both or m == 0 else None,
-            )
-        )  # fmt: skip
+    try:
+        machine = linearised(without_forcing(found.model), pumping)
+    except InputError:  # a motion without forcing has no cycle to linearise around
+        machine = None
+    made = []
+    for one in found.harmonics.functions:
+        model = None
+        if machine is not None and (both or one.m == 0):
+            m = np.array([one.m])
+            turn = delay_phase(m, one.frequency, input_delay, measurement_delay, pumping.frequency)
+            model = (machine.htf(m, one.frequency) * np.exp(-1j * turn))[0]
+        made.append(TransferFunction(one.m, one.frequency, one.value, one.radius, model))
     return made

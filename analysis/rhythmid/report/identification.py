@@ -1,6 +1,6 @@
 """The report of an identification: parameters, delays, transfer functions, and how well they explain the records."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from rhythmid.report.sections import (
     reproduce_section,
     told,
 )
-from rhythmid.report.transfer_figures import TransferFunction, transfer_grid
+from rhythmid.report.transfer_figures import TransferFunction, harmonic_name, scaled_ratio, transfer_grid
 
 SHOWN = 1  # |m| up to which transfer functions are shown at once; others are folded away
 OBSERVABLES = {
@@ -26,6 +26,14 @@ OBSERVABLES = {
     "C": "the offset of the sidebands",
 }
 METHODS = ("G0", "G-1", "G+1")
+LEVELS = ("std", "noise", "even_distortion", "odd_distortion", "aliasing")
+FOUND_BY = {
+    "separated_lines": "Each function was read off the frequencies that its harmonic reaches alone; frequencies that none "
+    "reaches show the errors.",
+    "local_rational": "The functions were fitted locally, with transients, around each frequency; what the fit leaves shows the errors.",
+    "regularised_least_squares": "The functions were smoothed along frequency by regularised least squares, the paper's equation (5), "
+    "for the excitation allows no other way.",
+}
 
 
 def identification_page(
@@ -56,7 +64,7 @@ def identification_page(
         sections=(
             Section("Parameters", (parameters_table(result["parameters"]),)),
             _delays(result),
-            transfer_section(functions, unit),
+            transfer_section(functions, unit, *_errors(result, unit)),
             *_paper(result),
             _remarks(result),
             quality_section(records),
@@ -72,7 +80,7 @@ def functions_of(result: Mapping[str, Any]) -> list[TransferFunction]:
             int(one["m"]),
             np.asarray(one["frequency"], dtype=float),
             np.asarray(one["magnitude"], dtype=float) * np.exp(1j * np.asarray(one["phase"], dtype=float)),
-            np.asarray(one["std"], dtype=float) if one.get("std") else None,
+            np.asarray(one["radius"], dtype=float) if one.get("radius") else None,
         )
         for one in result.get("harmonics") or ()
     ]
@@ -136,8 +144,8 @@ def _delays(result: Mapping[str, Any]) -> Section:
     return Section(section.title, (*section.blocks, *more))
 
 
-def transfer_section(functions: Sequence[TransferFunction], unit: str = "m/N") -> Section:
-    """Magnitude and phase of harmonic transfer functions, the principal ones at once."""
+def transfer_section(functions: Sequence[TransferFunction], unit: str = "m/N", *more: Block) -> Section:
+    """Magnitude and phase of harmonic transfer functions, the principal ones at once, and what `more` there is to say."""
     drawn = sorted((f for f in functions if len(f.frequency) > 1), key=lambda f: (abs(f.m), f.m))
     if not drawn:
         return Section("Transfer functions", (Paragraph("None could be estimated from these records."),))
@@ -152,7 +160,49 @@ def transfer_section(functions: Sequence[TransferFunction], unit: str = "m/N") -
     further = [f for f in drawn if abs(f.m) > SHOWN]
     if further:
         blocks.append(Fold("Further harmonics", (transfer_grid(further, unit),)))
-    return Section("Transfer functions", tuple(blocks))
+    return Section("Transfer functions", (*blocks, *more))
+
+
+def _errors(result: Mapping[str, Any], unit: str) -> tuple[Block, ...]:
+    """How the transfer functions were found, and how large each kind of error is in each of them."""
+    about = result.get("transfer_functions") or {}
+    method = FOUND_BY.get(about.get("method") or "")
+    functions = [one for one in result.get("harmonics") or () if one.get("noise") is not None and one["frequency"]]
+    if method is None or not functions:
+        return ()
+    p_values = {test["m"]: test["p_value"] for test in about.get("tested") or ()}
+    rows = []
+    for one in sorted(functions, key=lambda one: (abs(one["m"]), one["m"])):
+        p_value = p_values.get(abs(one["m"]))
+        rows.append(
+            (
+                harmonic_name(one["m"]), _size(one["magnitude"], max, unit),
+                *(_size(one[key], _rms, unit) for key in LEVELS), NONE if p_value is None else f"{p_value:.1g}",
+            )
+        )  # fmt: skip
+    words = method
+    if p_values:
+        words += (
+            f" As many harmonics are shown as stand out of the errors, at a rate of false alarms of {percent(about['false_alarm'])}."
+        )
+    caption = (
+        "Errors by their cause, as rms over frequency: distortion of even and odd order, and what harmonics beyond those shown "
+        "may add. A dash: this excitation cannot tell. The last column is the probability that noise alone would show as much."
+    )
+    heads = ("function", "peak", "all errors", "noise", "even", "odd", "aliasing", "chance")
+    return (Paragraph(words), Table(caption, heads, tuple(rows)))
+
+
+def _rms(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def _size(values: Sequence[float | None], of: Callable[[Sequence[float]], float], unit: str) -> str:
+    known = [value for value in values if value is not None and np.isfinite(value)]
+    if not known:
+        return NONE
+    factor, label = scaled_ratio(of(known), unit)
+    return with_unit(number(factor * of(known), 2), label)
 
 
 def _paper(result: Mapping[str, Any]) -> tuple[Section, ...]:

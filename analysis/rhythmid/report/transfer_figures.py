@@ -19,13 +19,13 @@ STYLES = ("measured", "after", "before", "third")  # of |m| = 0, 1, 2, 3
 
 @dataclass(frozen=True, eq=False)
 class TransferFunction:
-    """One harmonic transfer function: index `m`, frequency [Hz] and complex value (n,), standard deviation (n,) of the
-    value where known, and a model's value (n,) to compare with where there is one."""
+    """One harmonic transfer function: index `m`, frequency [Hz] and complex value (n,), `radius` (n,) of the disk about the
+    value that holds the truth with 95 %, where known, and a model's value (n,) to compare with where there is one."""
 
     m: int
     frequency: Array
     value: Complex
-    std: Array | None = None
+    radius: Array | None = None
     model: Complex | None = None
 
 
@@ -45,8 +45,8 @@ def transfer_grid(functions: Sequence[TransferFunction], unit: str) -> Columns:
     for one in functions:
         name = harmonic_name(one.m)
         magnitude = np.abs(one.value)
-        factor, label = _scaled(float(magnitude.max(initial=0.0)), unit)
-        band = None if one.std is None else 1.96 * one.std
+        factor, label = scaled_ratio(float(magnitude.max(initial=0.0)), unit)
+        band = one.radius
         low = None if band is None else factor * np.maximum(magnitude - band, 0.0)
         high = None if band is None else factor * (magnitude + band)
         curves = [Curve(one.frequency, factor * magnitude, "measured", "after", low=low, high=high)]
@@ -118,7 +118,7 @@ def change_figures(
     """
     top = np.abs(after)
     largest = float(top[list(indices).index(0)].max())
-    factor, label = _scaled(largest, unit)
+    factor, label = scaled_ratio(largest, unit)
     magnitudes = [
         Curve(frequency, factor * top[row], f"|{harmonic_name(m)}|", style_of(m), m < 0)
         for row, m in enumerate(indices)
@@ -156,7 +156,7 @@ def change_figures(
     return Columns((magnitude, changed))
 
 
-def _scaled(largest: float, unit: str) -> tuple[float, str]:
+def scaled_ratio(largest: float, unit: str) -> tuple[float, str]:
     """Factor and printed unit for values of this size in `unit`, a ratio such as m/N."""
     above, _, below = unit.partition("/")
     factor, shown = scaled(largest, above)
