@@ -8,7 +8,7 @@ import pytest
 from machines import CATALOGUE, hopper, record
 from rhythmid.elements.random_delay import uniform_delay
 from rhythmid.identify.joint import JointFit, joint_likelihood
-from rhythmid.identify.timing import command_jitter, compensated, measurement_jitter
+from rhythmid.identify.timing import command_hold, command_jitter, compensated, measurement_jitter
 from rhythmid.record.record import Channel, Record
 
 U, Y = "input_delay.delay", "measurement_delay.delay"
@@ -49,12 +49,20 @@ def test_a_drifting_input_delay_is_found_and_taken_out():
     assert near(found, U, DELAYS[0], 5e-5) and near(found, Y, DELAYS[1])
 
 
-def test_a_command_held_at_a_slower_rate_is_found_and_its_half_period_taken_out():
-    joint = fitted(concealing("command_hold", period=0.02))
-    assert joint.fit.model.value(U) == pytest.approx(DELAYS[0] + 0.0095, abs=1e-3)  # half a period, unless modelled
-    found, notes = compensated(joint)
-    assert "every 20 ms" in notes[0]
-    assert near(found, U, DELAYS[0])
+@pytest.mark.parametrize("period", [0.0137, 0.0333])
+def test_a_command_held_at_any_slower_rate_is_found(period):
+    joint = fitted(concealing("command_hold", period=period))
+    assert joint.fit.model.value(U) == pytest.approx(DELAYS[0] + 0.5 * period, abs=1e-3)  # unless modelled
+    found, told = command_hold(joint)
+    assert told.value == pytest.approx(period, abs=3.0 * told.std) and told.std < 0.1 * period
+    assert found.fit.model.value(U) == pytest.approx(DELAYS[0], abs=min(3.0 * found.fit.std[U], 1.5e-3))
+    assert near(found, Y, DELAYS[1], 4e-5)
+
+
+def test_a_held_command_is_told_and_half_its_period_taken_out_of_the_delay():
+    found, (note,) = compensated(fitted(concealing("command_hold", period=0.02)))
+    assert "as if the drive took a new one every" in note
+    assert near(found, U, DELAYS[0]) and found.fit.std[U] < 1e-3
 
 
 def test_good_timing_is_left_alone():

@@ -6,7 +6,7 @@ this: simulation and measurement are compared at the stamps that there are.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -16,12 +16,13 @@ from scipy.interpolate import CubicSpline, PPoly
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
-from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.free_run import FreeRun, prepare_run
 from rhythmid.identify.identification import Estimate
 from rhythmid.identify.joint import JointFit
 from rhythmid.identify.output_error import Fit, estimate, minimise
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.series import Series, scales
+from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 DRIFTS = ("clock_skew", "input_delay_drift")
@@ -29,8 +30,12 @@ DRIFT_PARAMETER = {"clock_skew": "skew", "input_delay_drift": "rate"}
 ALIKE = {"clock_skew": ("delay_drift",)}  # the same to first order
 CERTAIN = 5.0  # standard deviations from which a timing effect becomes part of the model
 SMEARS = 3  # widths of command jitter that are tried
-UNEXPLAINED = 1.5  # times the noise floor, beyond which a hold is looked for
+UNEXPLAINED = 1.1  # times the noise floor, beyond which a hold is looked for
 GAIN = 25.0  # in chi2 that a hold must bring
+LONGEST_HOLD = 0.25  # seconds between two commands that the drive takes
+REACH = 0.05  # share of a rough period around it in which the true one is looked for, at least
+FINEST = 400  # periods that are tried in there, at most
+REFITTED = 5  # of them, the best
 
 
 def drift_score(fit: Fit, element: str) -> tuple[float, float]:
@@ -99,8 +104,11 @@ def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tupl
     found = replace(joint, fit=fit)
     if joint.search.over_noise > UNEXPLAINED and fit is joint.fit and fit.model.term("input_delay") is not None:
         found, period = command_hold(found, pool)
-        if period > 0.0:
-            notes.append(f"the drive takes a new command every {1e3 * period:.3g} ms only; part of the model")
+        if period.value is not None and period.std is not None:
+            notes.append(
+                f"the command acts as if the drive took a new one every {1e3 * period.value:.4g} ± {1e3 * period.std:.2g} "
+                "ms only; half of that is not in the input delay"
+            )
     return found, tuple(notes)
 
 
@@ -170,14 +178,14 @@ def smeared(command: PPoly, width: float, period: float) -> PPoly:
     return PPoly(fitted.c, fitted.x, extrapolate=True)
 
 
-def command_jitter(fit: Fit, largest: float = 0.05, pool: ThreadPoolExecutor | None = None) -> Estimate:
-    """Standard deviation σ [s] of the delay of single commands, from the roll-off of the response.
+def _smear(fit: Fit, largest: float, pool: ThreadPoolExecutor | None) -> tuple[float, float] | None:
+    """Variance [s²] of a delay that is uniform over an interval and smears the command; and its standard deviation.
 
-    On average over the jitter the machine receives the command smeared over √12 σ. The profile likelihood over σ² is a
-    parabola, which gives estimate and standard deviation; the mean of the jitter is part of the input delay.
+    The profile likelihood over the variance is a parabola. None where the response does not roll off at all.
     """
     step = fit.run.series[0].period
     at = np.linspace(0.0, largest, SMEARS + 1) ** 2
+    best = spread = 0.0
     for _ in range(3):
         chi2 = []
         for variance in at:
@@ -191,39 +199,94 @@ def command_jitter(fit: Fit, largest: float = 0.05, pool: ThreadPoolExecutor | N
             chi2.append(_refitted(moved, series, pool).chi2)
         curve = np.polyfit(at / at[-1], chi2, 2)
         if curve[0] <= 0.0:
-            return Estimate(None, None, "s")
+            return None
         best = float(np.clip(-0.5 * curve[1] / curve[0], 0.0, 1.0)) * at[-1]
         spread = at[-1] / math.sqrt(curve[0])
         reach = max(2.0 * best, 6.0 * spread)
         if reach > 0.5 * at[-1]:
             break
         at = np.linspace(0.0, reach, SMEARS + 1)
-    std = math.sqrt(best)
-    return Estimate(std, spread / (2.0 * max(std, math.sqrt(spread))), "s")
+    return best, spread
 
 
-def command_hold(
-    joint: JointFit, pool: ThreadPoolExecutor | None = None, tell: Callable[[str], None] = lambda _: None
-) -> tuple[JointFit, float]:
-    """Look for a drive that takes commands at a slower rate of its own; the fit with it and its period [s], or 0.
+def command_jitter(fit: Fit, largest: float = 0.05, pool: ThreadPoolExecutor | None = None) -> Estimate:
+    """Standard deviation σ [s] of the delay of single commands, from the roll-off of the response.
 
-    Ticks of the usual rates are tried, each with the delays refitted; the best must lower chi2 by more than 25.
+    On average over the jitter the machine receives the command smeared over √12 σ; the mean of the jitter is part of the
+    input delay.
     """
-    fit = joint.fit
-    element = load_catalogue()["command_hold"]
-    best, period = fit, 0.0
-    if element.starts is None or fit.model.term("command_hold") is not None:
-        return joint, period
-    for values in element.starts(scales(fit.run.series, fit.model)):
-        model = fit.model.with_element(element, values, fixed=True)
-        half = 0.5 * values["period"]
-        model = model.with_values({"input_delay.delay": max(model.value("input_delay.delay") - half, 0.0)})
-        tell(f"a command held for {1e3 * values['period']:.3g} ms?")
-        run = prepare_run(model, fit.run.series, fit.run.max_step)
+    found = _smear(fit, largest, pool)
+    if found is None:
+        return Estimate(None, None, "s")
+    std = math.sqrt(found[0])
+    return Estimate(std, found[1] / (2.0 * max(std, math.sqrt(found[1]))), "s")
+
+
+def _widened(fit: Fit, name: str, std: float) -> Fit:
+    """The fit with a further independent error of `name` in its covariance."""
+    index = fit.names.index(name)
+    covariance = fit.covariance.copy()
+    if not math.isfinite(covariance[index, index]):
+        covariance[index], covariance[:, index] = 0.0, 0.0
+    covariance[index, index] += std**2
+    return replace(fit, covariance=covariance)
+
+
+def command_hold(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tuple[JointFit, Estimate]:
+    """Look for a drive that takes commands at a slower rate of its own: the fit with it, and its period P [s] or None.
+
+    On average over its ticks a held command is smeared over P: the roll-off tells P, and half of it belongs to the hold
+    and not to the delay. Where the machine feels single ticks, only a period that stays in step over the whole record fits
+    (the element `command_hold`); such periods are tried as finely as that takes, the usual rates among them. Each step must
+    lower chi2 by more than 25.
+    """
+    fit, name = joint.fit, "input_delay.delay"
+    element, none = load_catalogue()["command_hold"], Estimate(None, None, "s")
+    smear = None
+    if fit.model.term("command_hold") is None and name in fit.names:
+        smear = _smear(fit, LONGEST_HOLD / math.sqrt(12.0), pool)
+    if element.starts is None or smear is None or smear[0] <= 0.0:
+        return joint, none
+    rough = math.sqrt(12.0 * smear[0])
+    spread = 6.0 * smear[1] / rough
+    step = fit.run.series[0].period
+    series = [
+        one if one.command is None else replace(one, command=smeared(one.command, rough, step))
+        for one in fit.run.series
+    ]
+    start = fit.model.with_values({name: fit.model.value(name) - 0.5 * rough})
+    best, period = _refitted(replace(fit, model=start), series, pool), Estimate(rough, spread, "s")
+    if best.chi2 > fit.chi2 - GAIN:
+        return joint, none
+    own = step / math.sqrt(12.0)  # a tick cannot tell the age of a command that is itself held
+    best = _widened(best, name, math.hypot(0.5 * spread, own))
+
+    share = min(max(REACH, 3.0 * spread / rough), 0.5)
+    usual = [values["period"] for values in element.starts(scales(fit.run.series, fit.model))]
+    longest = max(float(np.ptp(one.time)) for one in fit.run.series)
+    count = int(np.clip(4.0 * share * longest / rough, 8, FINEST))
+    tried = {*rough * np.linspace(1.0 - share, 1.0 + share, count + 1)}
+    tried |= {p for p in usual if abs(p - rough) < 2.0 * share * rough}
+
+    def held(ticks: float) -> tuple[Model, FreeRun]:
+        model = fit.model.with_element(element, {"period": ticks}, fixed=True)
+        model = model.with_values({name: max(model.value(name) - 0.5 * ticks, 0.0)})
+        return model, prepare_run(model, fit.run.series, fit.run.max_step)
+
+    def unrefined(ticks: float) -> float:
+        model, run = held(ticks)
+        problem = Problem(run, fit.names, fit.noise, None)
+        problem.learn_hidden(model, fit.starts)
+        return problem.cost(model, problem.residuals(model, fit.starts), fit.starts)
+
+    gain = GAIN
+    for ticks in sorted(tried, key=unrefined)[:REFITTED]:
+        model, run = held(ticks)
         try:
             trial = minimise(model, run, fit.names, fit.noise, fit.starts, 8, pool)
         except InputError:
             continue
-        if trial.chi2 < best.chi2 - (GAIN if best is fit else 0.0):
-            best, period = trial, values["period"]
+        if trial.chi2 < best.chi2 - gain:
+            best, gain = _widened(trial, name, own), 0.0
+            period = Estimate(ticks, ticks**2 / longest, "s")
     return replace(joint, fit=best), period
