@@ -1,6 +1,7 @@
 """`rhythmid design`: a folder that can be played, the same numbers in terminal and JSON, refusals that leave nothing."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,21 @@ def test_every_free_parameter_and_both_delays_have_a_predicted_standard_deviatio
         assert f"{estimate['std']:.2g}" in said, name
     assert result["amplitude"]["crest_factor"] < 1.8
     assert result["distortion"]["even"] > result["distortion"]["odd"] > 0.0
+
+
+def test_the_example_in_the_documents_gives_what_they_show(rhythmid, tmp_path):
+    text = (Path(__file__).parents[2] / "docs" / "design.md").read_text(encoding="utf-8")
+    shown = re.search(r"    rhythmid (design .*?)\n\n((?:    [┃│][^\n]*\n)+)", text, re.DOTALL)
+    assert shown is not None
+    (tmp_path / "paper_hopper.yaml").write_bytes(PAPER.read_bytes())
+    done = rhythmid(*shown[1].replace("\\\n", " ").split())
+    assert done.returncode == 0, done.stderr
+    for line in shown[2].splitlines():
+        assert line.strip() in done.stdout
+    result = json.loads((tmp_path / "plan" / "design.json").read_text())
+    assert f"crest factor small: {result['amplitude']['crest_factor']:.2f} in the example" in text
+    assert f"{result['distortion']['even']:.2%}".replace("%", " %") in text
+    assert f"{result['distortion']['odd']:.2%}".replace("%", " %") in text
 
 
 def test_what_is_played_is_the_file_sample_by_sample(made):

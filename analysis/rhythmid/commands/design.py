@@ -13,23 +13,23 @@ from rhythmid.output import require_new, write_json
 
 def design(
     model: Annotated[Path, typer.Argument(help="Model file; its values are taken for the truth.")],
-    duration: Annotated[float, typer.Option("--duration", help="Length of the run [s].")],
+    duration: Annotated[float, typer.Option("--duration", help="Length of the run in s.")],
     band: Annotated[
-        tuple[float, float], typer.Option("--band", help="Lowest and highest frequency of the command [Hz].")
+        tuple[float, float], typer.Option("--band", help="Lowest and highest frequency of the command in Hz.")
     ],
     max_effort: Annotated[
-        float, typer.Option("--max-effort", help="Largest effort of the command [N, or the model's unit].")
+        float, typer.Option("--max-effort", help="Largest effort of the command in N (or the model's unit).")
     ],
     envelope: Annotated[
         tuple[float, float],
         typer.Option(
-            "--envelope", help="Lowest and highest position that may be measured [m, or the model's unit]."
+            "--envelope", help="Lowest and highest position that may be measured, in m (or the model's unit)."
         ),
     ],
     noise_std: Annotated[
         float,
         typer.Option(
-            "--noise-std", help="Standard deviation of a measured sample's noise [m, or the model's unit]."
+            "--noise-std", help="Standard deviation of a measured sample's noise in m (or the model's unit)."
         ),
     ],
     output: Annotated[
@@ -42,9 +42,7 @@ def design(
             "--kind", help="multisine (interleaved, least crest factor) or comb (time-shifted chirps)."
         ),
     ] = "multisine",
-    rate: Annotated[
-        int, typer.Option("--rate", help="Samples of command and measurement in a second [Hz].")
-    ] = 1000,
+    rate: Annotated[int, typer.Option("--rate", help="Rate of command and measurement in Hz.")] = 1000,
     harmonics: Annotated[
         int,
         typer.Option(
@@ -55,17 +53,19 @@ def design(
         tuple[float, float] | None,
         typer.Option(
             "--forcing",
-            help="Amplitude [N] and frequency [Hz] of the forcing on the robot; the model's, or 1 1.",
+            help="Amplitude in N and frequency in Hz of the forcing on the robot; the model's, or 1 1.",
         ),
     ] = None,
     delays: Annotated[
         tuple[float, float] | None,
-        typer.Option("--delays", help="Input and measurement delay as expected [s]; the model's by default."),
+        typer.Option(
+            "--delays", help="Input and measurement delay as expected, in s; the model's by default."
+        ),
     ] = None,
     longest_delay: Annotated[
         float,
         typer.Option(
-            "--longest-delay", help="Longest that either delay may be [s]; shifts beyond it must not alias."
+            "--longest-delay", help="Longest that either delay may be, in s; longer ones may alias."
         ),
     ] = 0.3,
     max_distortion: Annotated[
@@ -82,13 +82,13 @@ def design(
     ] = None,
     period: Annotated[
         float | None,
-        typer.Option("--period", help="multisine: its period [s]; the longest that fits twice by default."),
+        typer.Option("--period", help="multisine: its period in s; the longest that fits twice by default."),
     ] = None,
     spacing: Annotated[
         float | None,
         typer.Option(
             "--spacing",
-            help="multisine: distance of its lines [Hz]; the closest that does not alias by default.",
+            help="multisine: distance of its lines in Hz; the closest that does not alias by default.",
         ),
     ] = None,
     seed: Annotated[

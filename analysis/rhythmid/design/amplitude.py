@@ -4,8 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from rhythmid.design.distortion import distortion
 from rhythmid.design.rehearsal import Rehearsal
 from rhythmid.design.requirements import Requirements
@@ -80,5 +78,4 @@ def largest_amplitude(
             f"next to no command keeps the position within its limits: --{limited.replace('_', '-')} allows less than "
             f"{SMALLEST * largest:.2g} of the peak effort; widen it"
         )
-    inside = float(np.float64(f"{inside:.4g}")) if float(f"{inside:.4g}") <= inside else inside
     return Amplitude(inside, limited, *reach(inside))

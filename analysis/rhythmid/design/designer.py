@@ -69,15 +69,15 @@ class Design:
         worst = max(self.bias, key=lambda name: abs(self.bias[name]), default=None)
         if worst is not None and abs(self.bias[worst]) > BIASED:
             found.append(
-                f"a fit to transfer functions would be biased, {worst} by {abs(self.bias[worst]):.2g} standard deviations; the "
+                f"a fit to transfer functions would be biased, {worst} by {abs(self.bias[worst]):.3g} standard deviations; the "
                 "joint fit of `rhythmid identify` simulates the nonlinear machine and is not"
             )
         apart = self.requirements.harmonics + self.plan.facts.get("empty_classes", 0)
         beyond = [m for m in self.visible if m > apart]
         if beyond:
             found.append(
-                f"harmonic ±{beyond[0]} of the response stands out of the noise too and falls on others; --harmonics "
-                f"{beyond[-1]} would keep it apart"
+                f"harmonics up to ±{beyond[-1]} of the response stand out of the noise, and those beyond ±{apart} fall on others; "
+                f"--harmonics {beyond[-1]} would keep them apart"
             )
         return tuple(found)
 
