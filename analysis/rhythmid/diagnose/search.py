@@ -38,7 +38,7 @@ from rhythmid.diagnose.screen import (
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.identify.free_run import accurate
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
-from rhythmid.identify.output_error import INTEGRATION, Fit, noise_of
+from rhythmid.identify.output_error import Fit, noise_of
 from rhythmid.identify.series import Series, scales
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
@@ -58,6 +58,9 @@ NEAR = (
 )
 MOST = 4  # effects at once
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
+MISFIT = 0.1  # error, as a share of the motion, and
+PREDICTED = 25.0  # power of the residual over what its own past leaves of it, beyond both of which it is no noise
+ROUGH = 0.1  # of the noise: integration error of an element with corners beyond which all steps are made finer
 RIVALS = 4  # elements that scored best at first, tried again in the place of each of several effects
 
 
@@ -124,7 +127,10 @@ def _one_round(
     sizes = replace(scales(fit.run.series, fit.model), residual_frequency=residual_line(fit))
     changes = changes_of(trajectories(fit), guesses(catalogue, fit.model, sizes), pool)
     if colour:
-        fit = under(fit, noise_without(fit, changes), pool)
+        noise = noise_without(fit, changes)
+        if fit.nrmse() > MISFIT and noise.variance > PREDICTED * noise.std**2:
+            noise = NoiseModel(np.empty(0), noise.variance**0.5)  # motion that is missed, not noise: do not whiten it away
+        fit = under(fit, noise, pool)
     scores = score(fit, changes)
     return Round(tuple(scores), p_value(scores)), fit
 
@@ -197,7 +203,7 @@ def search(
         near = [t for t in found if t.bic() - found[0].bic() < NEAR]
         top = _most_likely(near, series, noise, step, floor)
         fit = whole_fit(top, series, noise, step, pool=pool)
-        finer = accurate(fit.run, fit.model, fit.starts, INTEGRATION * fit.noise.variance**0.5, 3)
+        finer = accurate(fit.run, fit.model, fit.starts, ROUGH * fit.noise.variance**0.5, 2)
         if finer.max_step < 0.45 * fine_enough(top.model, step):
             step = finer.max_step
             fit = whole_fit(replace(top, converged=False), series, noise, step, pool=pool)
