@@ -34,13 +34,19 @@ def twins_of(best: Trial, rivals: Sequence[Trial]) -> list[tuple[str, ...]]:
     """Families within which the records cannot tell: elements that replace one another in equally good models."""
     groups: list[tuple[str, ...]] = []
     for label in best.added:
-        others = []
+        term = best.model.term(label)
+        assert term is not None
+        others = [
+            other
+            for beside, other in term.element.same_beside.items()
+            if any(t.element.name == beside and not all(v.fixed for v in t.values.values()) for t in best.model.terms)
+        ]
         for rival in rivals:
             gone = set(best.added) - set(rival.added)
             come = set(rival.added) - set(best.added)
             if gone == {label} and len(come) == 1:
                 other = element_of(rival, come.pop())
-                if not _contains(best, label, other):
+                if other not in others and not _contains(best, label, other):
                     others.append(other)
         if others:
             groups.append((element_of(best, label), *others))

@@ -25,6 +25,7 @@ ELEMENT = Element(
     also_known_as=("rebound damping", "asymmetric damping"),
     family="damping",
     special_case_of=("viscoelastic_relaxation",),  # for τ_m → 0, with the stance damping taking up the rest
+    same_beside={"switched_damper": "viscous_damper"},
     confusable={
         "viscous_damper": "the same model where the stance damping is free",
         "viscoelastic_relaxation": "short relaxation times: excite high frequencies, or a bias force",
