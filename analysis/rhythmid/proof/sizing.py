@@ -20,7 +20,7 @@ from rhythmid.record.record import Channel, Record
 
 Array = NDArray[np.float64]
 BLOCK = 5  # samples averaged
-STEP = 2.5e-3  # [s] of the fit's integrator
+STEP = 6.25e-4  # [s] of the fit's integrator: its error must not pass for a mismatch
 CLOSE = 1.25  # factor within which a mismatch is the one asked for
 TRIES = 7
 
