@@ -12,7 +12,7 @@ METADATA := $(wildcard $(foreach package,$(PACKAGES),$(addprefix $(package)/,*.p
 help: ## Show this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
-install: $(VENV)/.packages ## Create .venv with the locked requirements and all packages (PYTHON=python3.12 to choose)
+install: $(VENV)/.warm ## Create .venv with the locked requirements and all packages (PYTHON=python3.12 to choose)
 
 $(VENV)/.requirements: requirements.lock
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' 2>/dev/null || \
@@ -30,10 +30,15 @@ $(VENV)/.packages: $(VENV)/.requirements $(METADATA)
 	done
 	@touch $@
 
+$(VENV)/.warm: $(VENV)/.packages
+	@# a convenience: what cannot be compiled ahead is compiled when it is needed
+	@$(BIN)/python -m rhythmid.warm_up || true
+	@touch $@
+
 test: lint ## Run the linters and all tests, fast ones first
 	$(BIN)/python -m pytest
 
-lint: install ## Run ruff and pyright
+lint: $(VENV)/.packages ## Run ruff and pyright
 	$(BIN)/ruff check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
