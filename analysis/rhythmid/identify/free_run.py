@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
 from rhythmid.compiled import Compiled, InputKind, OutputKind, compile_model
+from rhythmid.elements.element import STEP
 from rhythmid.errors import InputError
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
@@ -120,6 +121,13 @@ def _stand_in(one: Series) -> Pieces | None:
     return _contiguous(pieces(impulse_preserving(command)))
 
 
+def _sees_steps(model: Model) -> bool:
+    """Whether an element of the command's path takes a held command otherwise than its smooth stand-in: one with memory
+    of extremes, or with a limit of rate."""
+    path = [term.element for term in model.terms if term.element.slot in ("command", "actuator")]
+    return any(source == STEP for element in path for source, _ in element.borrows.values())
+
+
 def _inputs(one: Series) -> Inputs:
     return Inputs(_contiguous(pieces(one.command)), _stand_in(one), _contiguous(pieces(one.forcing)))
 
@@ -142,7 +150,7 @@ def prepare_run(
         raise InputError(f"records that measure different things ({', '.join(sorted(sensors))}) cannot be fitted together")
     measured: OutputKind = sensors.pop() if sensors else "position"
     inputs = tuple(_inputs(one) for one in series)
-    smooth = all(i.smooth is not None or len(i.command[0]) <= 2 for i in inputs)
+    smooth = not _sees_steps(model) and all(i.smooth is not None or len(i.command[0]) <= 2 for i in inputs)
     if not smooth:
         inputs = tuple(replace(i, smooth=None) for i in inputs)
     return FreeRun(
