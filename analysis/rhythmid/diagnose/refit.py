@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.diagnose.tick_scan import HOLD, scanned
 from rhythmid.elements.element import STEP, Element
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import FreeRun, prepare_run
@@ -114,7 +115,11 @@ def _fit_proposal(
     names = tuple(proposal.model.free)
     best: Descent | None = None
     failure: InputError | None = None
-    for guess in proposal.guesses:
+    ticks: list[dict[str, float]] = []
+    if proposal.added[-1:] == (HOLD,):
+        begin = [_extended(start, proposal.model, run, known) for start in starts]
+        ticks = scanned(proposal.model, series, begin, noise, run.max_step)
+    for guess in (*ticks, *proposal.guesses):
         model = proposal.model.with_values(guess)
         try:
             begin = [_extended(start, model, run, known) for start in starts]
