@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rhythmid.errors import InputError
-from rhythmid.ltp.pumping import Pumping, pumping_of_channel
-from rhythmid.record.record import Channel
+from rhythmid.ltp.pumping import Pumping, active_pumping, pumping_of_channel
+from rhythmid.record.record import Channel, Record
 
 TIME = np.arange(12_000) * 1e-3
 
@@ -72,3 +72,11 @@ def test_a_forcing_that_is_not_periodic_is_refused() -> None:
 def test_less_than_two_periods_of_forcing_are_refused() -> None:
     with pytest.raises(InputError, match="at least 2"):
         pumping_of_channel(channel(np.cos(2 * np.pi * 0.1 * TIME)))
+
+
+def test_a_record_without_a_periodic_forcing_has_no_active_pumping() -> None:
+    still, noise = np.full(len(TIME), 2.0), np.random.default_rng(0).standard_normal(len(TIME))
+    output = channel(np.cos(TIME))
+    for forcing in (None, channel(still), channel(noise)):
+        assert active_pumping(Record("r", output, forcing=forcing)) is None
+    assert active_pumping(Record("r", output, forcing=channel(np.cos(2 * np.pi * TIME)))) is not None

@@ -15,8 +15,7 @@ from scipy.fft import next_fast_len
 from scipy.interpolate import CubicSpline
 from scipy.optimize import fminbound
 
-from rhythmid.errors import InputError
-from rhythmid.ltp.pumping import Pumping, pumping_of
+from rhythmid.ltp.pumping import active_pumping
 from rhythmid.record.record import Channel, Record
 
 Array = NDArray[np.float64]
@@ -49,15 +48,6 @@ class Alignment:
 def smooth(channel: Channel) -> CubicSpline:
     """Cubic spline through the samples of a channel (at least two of them apart)."""
     return CubicSpline(channel.time, channel.value)
-
-
-def pumping(record: Record) -> Pumping | None:
-    """The record's forcing, None where there is none or it is not periodic."""
-    try:
-        found = pumping_of(record)
-    except InputError:
-        return None
-    return found if found is not None and found.active else None
 
 
 def active(channel: Channel | None) -> bool:
@@ -154,7 +144,7 @@ def _refined(recording: Channel, simulation: Channel, offset: float, step: float
 
 def _forcings(simulation: Record, recording: Record, offset: float) -> tuple[float, str]:
     """By how much the simulation's forcing precedes the recording's at this offset [s], and how else they differ."""
-    a, b = pumping(simulation), pumping(recording)
+    a, b = active_pumping(simulation), active_pumping(recording)
     if a is None or b is None:
         return 0.0, ""
     if abs(a.frequency - b.frequency) * recording.duration > 0.05:
@@ -199,7 +189,7 @@ def _agreement(simulation: Record, recording: Record, offset: float) -> tuple[fl
 
 def _by_forcing(simulation: Record, recording: Record) -> Alignment | None:
     """Offset that lines up the forcings; of those a period apart, the one at which the motions agree best."""
-    a, b = pumping(simulation), pumping(recording)
+    a, b = active_pumping(simulation), active_pumping(recording)
     if a is None or b is None:
         return None
     turn = b.origin - a.origin

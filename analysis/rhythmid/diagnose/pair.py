@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.diagnose.align import Alignment, active, pumping, smooth, white_level
+from rhythmid.diagnose.align import Alignment, active, smooth, white_level
 from rhythmid.diagnose.oscillator import Oscillator, oscillator_of, ringing
 from rhythmid.errors import InputError
 from rhythmid.identify.series import bandwidth, block_length
+from rhythmid.ltp.pumping import active_pumping
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
@@ -98,7 +99,7 @@ def pair_of(simulation: Record, recording: Record, alignment: Alignment) -> tupl
     efforts = [one for one in (command, forcing) if one is not None and np.ptp(one) > 0.0]
     effort = np.sum(efforts, axis=0) if efforts else None
     highest = min(bandwidth(value, grid.period), 0.5 / step)
-    pumped = pumping(recording)
+    pumped = active_pumping(recording)
     noise = math.hypot(white_level(recording.output.value), white_level(simulation.output.value)) / math.sqrt(block)
     oscillator = None if effort is None else oscillator_of(effort, simulated, step, frequency, highest)
     if oscillator is None:

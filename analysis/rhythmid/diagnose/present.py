@@ -18,7 +18,7 @@ from rhythmid.identify.output_error import Fit, noise_of
 from rhythmid.identify.repeats import noise_from_repeats
 from rhythmid.identify.series import Series, bandwidth
 from rhythmid.ltp.htf import theoretical_htf
-from rhythmid.ltp.pumping import Pumping, pumping_of
+from rhythmid.ltp.pumping import Pumping, active_pumping
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.report.comparison import comparison_page, comparison_section
@@ -72,7 +72,7 @@ def findings(
 ) -> Findings:
     """What the report shows, as plain data; arguments as for `present`."""
     evidence, found = answer.evidence, answer.evidence.search
-    pumpings = {id(record): _pumping(record) for record in (*records, *holdout)}
+    pumpings = {id(record): active_pumping(record) for record in (*records, *holdout)}
     runs = _runs(found.nominal, found.fit, [pumpings[id(r)] for r in records], bool(found.best.added))
     if evidence.unseen_nominal is not None:
         after = evidence.unseen_augmented or evidence.unseen_nominal
@@ -122,15 +122,6 @@ def _listed(names: Sequence[str], most: int = 4) -> str:
     if len(names) > most:
         return f"{', '.join(names[: most - 1])} and {len(names) - most + 1} more records"
     return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
-
-
-def _pumping(record: Record) -> Pumping | None:
-    """The record's forcing, None where there is none or it is not periodic."""
-    try:
-        found = pumping_of(record)
-    except InputError:
-        return None
-    return found if found is not None and found.active else None
 
 
 def _runs(

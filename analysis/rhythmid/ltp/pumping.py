@@ -168,3 +168,12 @@ def pumping_of(record: Record) -> Pumping | None:
     if record.forcing is None or len(record.forcing) < 8:
         return None
     return pumping_of_channel(record.forcing)
+
+
+def active_pumping(record: Record) -> Pumping | None:
+    """The record's forcing, None where there is none or it is not periodic."""
+    try:
+        found = pumping_of(record)
+    except InputError:
+        return None
+    return found if found is not None and found.active else None
