@@ -151,6 +151,14 @@ def test_a_concealed_effect_is_put_into_its_slot(simulation, element, values, sl
     assert found.explanations[0].explained > 0.85
 
 
+def test_a_force_is_found_beside_both_delays(simulation):
+    friction = hidden("coulomb_friction", force=0.03, transition=0.002)
+    found = compare(simulation, [record(friction, CHIRP, delays=(0.02, 0.015))])
+    assert {"input_delay", "velocity", "measurement_delay"} == set(names(found))
+    sizes = [one.values["delay"][0] for one in found.explanations if one.values]
+    assert sum(sizes) == pytest.approx(0.035, abs=2e-3)
+
+
 def test_frequency_time_and_growth_of_a_drift_are_told(simulation):
     place = compare(simulation, [record(hidden("sensor_drift", rate=1e-4), CHIRP, delays=NONE)]).place
     assert place.growth > 3.0

@@ -20,11 +20,14 @@ from rhythmid.diagnose.ways import ALIKE, WAYS, Way, predicted
 Array = NDArray[np.float64]
 FOLDS, DEALT = 5, 20  # folds of a cross-validation, stretches in each
 LEAST = 0.02  # share of what is left that an explanation has to take away to be one
-FAINT = 0.01  # share of the whole difference that it has to take away where the oscillator limits what can be explained
+FAINT = 0.004  # share of the whole difference that it has to take away where the oscillator limits what can be explained
 SLIGHT = 0.001  # the same among ways in and out, which are applied exactly
 ROUGH = 0.05  # the same where limit cycle and response had to be shifted each for itself
 SIMPLER = 0.03  # share by which a simpler explanation may fall behind
 MOST = 4  # explanations
+TWINS = {
+    "command_lag": "input_delay", "input_delay": "command_lag", "sensor_lag": "measurement_delay", "measurement_delay": "sensor_lag",
+}  # fmt: skip
 UNITS = {"time": "s", "lag": "s", "gain": "", "skew": ""}
 
 
@@ -211,6 +214,7 @@ def explain(pair: Pair, unit: str, blind: bool = False, rough: bool = False) -> 
     found = _pruned(known, found, whole)
     if known.force is not None and known.values:
         found = _force_anew(known, found)
+    found = _swapped(known, found)
     return [_valued(one, known.values, unit) for one in found], known.whole()
 
 
@@ -238,6 +242,21 @@ def _force_anew(known: Difference, found: list[Explanation]) -> list[Explanation
         square, values = known.fitted(list(known.values))
         known.take(Trial(square, 0, again, values=values))
     return [replace(again, explained=max(again.explained, 0.0)) if one is before else one for one in found]
+
+
+def _swapped(known: Difference, found: list[Explanation]) -> list[Explanation]:
+    """The explanations with a lag in the place of a delay, or the reverse, where that does better beside all the others."""
+    for one in list(found):
+        other = TWINS.get(one.name)
+        if other is None or one.name not in known.values or other in known.values:
+            continue
+        way = next(w for w in WAYS if w.name == other)
+        square, values = known.fitted([*(name for name in known.values if name != one.name), other], way)
+        if square < known.square:
+            known.take(Trial(square, 0, one, values=values))
+            named = replace(one, name=other, slot=way.slot, also=ALIKE.get(other, ()))
+            found = [named if old is one else old for old in found]
+    return found
 
 
 def _valued(one: Explanation, values: Mapping[str, float], unit: str) -> Explanation:
