@@ -27,6 +27,7 @@ SERIES = 2  # looked at, those with the strongest command at first
 FASTEST = 100.0  # [Hz] beyond which a hold is little but a delay, and its ticks do not matter
 FOLLOWED = 8  # rates that are followed
 FOUND = 2  # guesses returned
+FINEST = 0.02  # spacing of the rates at the end, over the inverse length of the record
 
 
 def scanned(
@@ -53,20 +54,20 @@ def scanned(
 
     length = STRETCH
     longest = max(one.time[-1] - one.time[0] for _, one, _ in chosen)
-    rates = np.arange(slowest, fastest, 0.25 / length)
+    spacing = 0.25 / length
+    rates = np.arange(slowest, fastest, spacing)
     begin = [start for _, _, start in chosen]
     middle = model.with_values(guess(float(rates[len(rates) // 2])))
     while True:
         stretches = [split(one, length)[0] for _, one, _ in chosen]
         costs = _costs(prepare_run(model, stretches, step), middle, [guess(r) for r in rates], begin, noise)
-        order = np.argsort(costs)
-        if length >= longest:
-            return [guess(float(rates[i])) for i in order[:FOUND] if np.isfinite(costs[i])]
-        best = rates[order[:FOLLOWED]]
+        best = rates[np.argsort(costs)[:FOLLOWED]]
+        if spacing < FINEST / longest:
+            return [guess(float(rate)) for rate in best[:FOUND]] if np.isfinite(costs).any() else []
         middle = model.with_values(guess(float(best[0])))
-        length *= 2.0
-        around = 0.25 / length * np.arange(-2, 3)
-        rates = np.unique(np.round((best[:, None] + around).ravel(), 9))
+        length = min(2.0 * length, 1.01 * longest)
+        spacing *= 0.5
+        rates = np.unique(np.round((best[:, None] + spacing * np.arange(-2, 3)).ravel(), 9))
 
 
 def _strength(series: Series) -> float:
