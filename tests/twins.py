@@ -129,21 +129,28 @@ def joint(friction: float = 0.4, seed: int = 0, count: int = 2, duration: float 
     """Robot joint driven by a current [A] (500 Hz), of which only the velocity is measured; Coulomb friction missing."""
     rng = np.random.default_rng([2, seed])
     inertia, c, constant, period = 0.05, 0.08, 0.6, 2e-3
-    records = []
-    for index in range(count):
-        current = tones(rng, 1.2 if index else 2.5, 0.15, 5.0)
+
+    def record(index: int) -> Record:
+        current = tones(rng, 1.2 if index else 2.5, 0.4, 5.0)
         time = np.arange(0.0, duration, period)
         held = sampled(current, time)
-        states = np.zeros((len(time), 2))
-        for k in range(len(time) - 1):
-            states[k + 1] = integrate(
-                lambda t, s: [s[1], (constant * held[k] - c * s[1] - friction * sign(s[1], 5e-3)) / inertia],
-                list(states[k]), time[k : k + 2], period,
-            )[-1]  # fmt: skip
-        velocity = noisy(rng, states[:, 1], 0.02)
-        records.append(
-            Record(f"joint {index}", Channel(time, velocity, "rad/s"), Channel(time, held, "A"), output_kind="velocity")
-        )
+        states, h = np.zeros((len(time), 2)), period / 10
+        v = 0.0
+
+        def rate(v: float, i: float) -> float:
+            return (constant * i - c * v - friction * sign(v, 5e-3)) / inertia
+
+        for k in range(len(time)):
+            states[k, 1] = v
+            for _ in range(10):
+                a1 = rate(v, held[k])
+                a2 = rate(v + 0.5 * h * a1, held[k])
+                a3 = rate(v + 0.5 * h * a2, held[k])
+                v += h * (a1 + 2.0 * a2 + 2.0 * a3 + rate(v + h * a3, held[k])) / 6.0
+        velocity = Channel(time, noisy(rng, states[:, 1], 0.02), "rad/s")
+        return Record(f"joint {index}", velocity, Channel(time, held, "A"), output_kind="velocity")
+
+    records = [record(index) for index in range(count)]
     nominal = """
 units: {force: A, position: rad}
 inertia: {mass: {value: 0.07}}

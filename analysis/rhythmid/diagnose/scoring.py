@@ -21,8 +21,9 @@ from rhythmid.identify.series import Series, hold_out_tail
 from rhythmid.model import Model
 
 FOLLOWS = 0.1  # error below which it follows the machine well enough for any score
-GAIN = 0.9  # share to which every step to shorter windows has to lower the error
-BETTER = 0.6  # and all steps together: an error that adds up, not one that noise or the effect makes at once
+GAIN = 0.9  # share to which a step to shorter windows has to lower the error
+PATIENCE = 2  # steps without such a gain before no more are tried
+BETTER = 0.6  # share to which all steps together have to: an error that adds up, not one made at once by noise or effect
 SHORTER = 2.0  # factor from one length of windows to the next
 INTEGRATES = "the model integrates or is unstable, so that a long free run would add up every small disturbance"
 LOSES = "in free run the nominal model loses the machine"
@@ -61,6 +62,7 @@ def settle(
     Without `separate` held-out series the last fifth of every run is held out. Raises InputError when no length works.
     """
     tried: list[Scoring] = []
+    idle = 0
     failure: InputError | None = None
     for length, reason in _ladder(model, series):
         words = "free run" if math.isinf(length) else _words(length, reason)
@@ -75,7 +77,10 @@ def settle(
             failure = failure or error
             continue
         if tried and _error(calibration.fit) > GAIN * tried[-1].error:
-            break
+            idle += 1
+            if idle == PATIENCE:
+                break
+            continue
         if calibration.reconstructed:
             unseen = [reconstructed(one) for one in unseen]
         tried.append(Scoring(calibration, tuple(unseen), words))

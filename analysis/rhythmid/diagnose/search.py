@@ -36,6 +36,7 @@ from rhythmid.diagnose.screen import (
     under,
 )
 from rhythmid.elements.catalogue import Catalogue
+from rhythmid.identify.drive import controlled
 from rhythmid.identify.free_run import accurate
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.output_error import Fit, noise_of
@@ -124,8 +125,11 @@ def _one_round(
     fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None, colour: bool
 ) -> tuple[Round, Fit]:
     """Score the catalogue at a fit; with `colour` the noise model is settled first, and the fit returned under it."""
+    known = trajectories(fit)
     sizes = replace(scales(fit.run.series, fit.model), residual_frequency=residual_line(fit))
-    changes = changes_of(trajectories(fit), guesses(catalogue, fit.model, sizes), pool)
+    if controlled(fit.model):  # the actuator's force is the controller's, which only the simulation knows
+        sizes = replace(sizes, effort=max(float(np.std(path.effort)) for path in known.paths) or sizes.effort)
+    changes = changes_of(known, guesses(catalogue, fit.model, sizes), pool)
     if colour:
         noise = noise_without(fit, changes)
         if fit.nrmse() > MISFIT and noise.variance > PREDICTED * noise.std**2:
