@@ -7,7 +7,7 @@ PACKAGES := analysis $(patsubst %/setup.py,%,$(wildcard ros_ws/src/*/setup.py))
 METADATA := $(wildcard $(foreach package,$(PACKAGES),$(addprefix $(package)/,*.py *.cfg *.toml *.xml launch/* config/* layouts/*)))
 
 .DEFAULT_GOAL := help
-.PHONY: help install test lint format demo picture benchmark docker lock clean
+.PHONY: help install test lint format demo picture benchmark naming docker lock clean
 
 help: ## Show this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -53,6 +53,10 @@ demo: install ## Run the real graph, identify it from its bag; then conceal an e
 benchmark: install ## Compare the simulator with scipy and MuJoCo
 	$(BIN)/python -m pip install --quiet --constraint requirements.lock mujoco
 	$(BIN)/python benchmarks/simulator.py
+
+naming: install ## Compare the naming of missing physics with PySINDy and a Gaussian process
+	$(BIN)/python -m pip install --quiet --constraint requirements.lock pysindy scikit-learn
+	$(BIN)/python benchmarks/naming.py
 
 picture: install ## Draw the picture of the README
 	$(BIN)/python docs/signal_path.py
