@@ -164,8 +164,8 @@ def pendulum(large: bool = True, seed: int = 0, count: int = 2, duration: float 
     """Pendulum at 200 Hz with large swings (or a linear torsional spring), a linear nominal model."""
     rng = np.random.default_rng([3, seed])
     inertia, c, moment, period = 0.02, 0.02, 0.9, 5e-3
-    records = []
-    for index in range(count):
+
+    def record(index: int) -> Record:
         torque = tones(rng, 0.15 if driven else 0.0, 0.3, 2.0)
         time = np.arange(0.0, duration, period)
         start = [1.8, 0.0] if index == 0 else [-0.5, 2.0]
@@ -174,12 +174,14 @@ def pendulum(large: bool = True, seed: int = 0, count: int = 2, duration: float 
             start, time, 0.02,
         )  # fmt: skip
         angle = rounded(noisy(rng, states[:, 0], 5e-4), 2.0 * np.pi / 8192)
-        records.append(
+        return (
             Record(
                 f"pendulum {index}", Channel(time, angle, "rad"),
                 Channel(time, sampled(torque, time), "N*m") if driven else None, hold="band_limited",
             )
         )  # fmt: skip
+
+    records = [record(index) for index in range(count)]
     nominal = """
 inertia: {mass: {value: 0.02, unit: kg*m^2, fixed: true}}
 force:
@@ -196,8 +198,8 @@ def rig(cubic: float = 4e7, seed: int = 0, count: int = 2, duration: float = 12.
     """
     rng = np.random.default_rng([4, seed])
     m, c, k, period = 0.5, 1.5, 1800.0, 2e-3
-    records = []
-    for index in range(count):
+
+    def record(index: int) -> Record:
         frequency = np.geomspace(2.0, 20.0, 15) * rng.uniform(0.95, 1.05, 15)
         phase = rng.uniform(0.0, 2.0 * np.pi, 15)
         size = (0.6e-3 if index else 0.3e-3) * (6.0 / frequency)
@@ -217,12 +219,14 @@ def rig(cubic: float = 4e7, seed: int = 0, count: int = 2, duration: float = 12.
             output, given, unit = states[:, 0], noisy(rng, displacement, 1e-7), "m"
         else:
             output, given, unit = states[:, 0] - displacement, noisy(rng, np.array([base(t, 2) for t in time]), 2e-3), "m/s^2"
-        records.append(
+        return (
             Record(
                 f"rig {index}", Channel(time, noisy(rng, output, 3e-6), "m"), Channel(time, given, unit),
                 hold="band_limited", input_kind=kind,
             )
         )  # fmt: skip
+
+    records = [record(index) for index in range(count)]
     nominal = """
 inertia: {mass: {value: 0.5, unit: kg, fixed: true}}
 force:
@@ -241,8 +245,8 @@ def servo(effect: str = "actuator_saturation", seed: int = 0, count: int = 2, du
     rng = np.random.default_rng([5, seed])
     omega, zeta, period = 25.0, 0.7, 1e-2
     top, slew, dead, friction = 4000.0, 120.0, 300.0, 400.0  # deg/s^2, deg/s, deg/s^2, deg/s^2
-    records = []
-    for index in range(count):
+
+    def record(index: int) -> Record:
         way = moves(rng, 40.0, duration, 0.4) if index % 2 == 0 else tones(rng, 15.0, 0.2, 3.0)
         time = np.arange(0.0, duration, period)
         command = sampled(way, time)
@@ -265,9 +269,11 @@ def servo(effect: str = "actuator_saturation", seed: int = 0, count: int = 2, du
 
         states = integrate(rates, [command[0], 0.0, command[0]], time, 2e-3)
         angle = noisy(rng, states[:, 0], 0.05)
-        records.append(
+        return (
             Record(f"servo {index}", Channel(time, angle, "deg"), Channel(time, command, "deg"), input_kind="reference")
         )
+
+    records = [record(index) for index in range(count)]
     nominal = """
 units: {force: deg/s^2, position: deg}
 inertia: {mass: {value: 1.0, fixed: true}}
@@ -285,8 +291,8 @@ def decay(effect: str = "quadratic_drag", seed: int = 0, count: int = 3, duratio
     """Free decays at 250 Hz after being let go; no input at all. Effects: `quadratic_drag`, `coulomb_friction`, ""."""
     rng = np.random.default_rng([6, seed])
     m, c, k, drag, friction, period = 1.2, 0.5, 180.0, 0.8, 0.15, 4e-3
-    records = []
-    for index in range(count):
+
+    def record(index: int) -> Record:
         time = np.arange(0.0, duration, period)
 
         def rates(t: float, s: Array) -> list[float]:
@@ -298,7 +304,9 @@ def decay(effect: str = "quadratic_drag", seed: int = 0, count: int = 3, duratio
             return [s[1], force / m]
 
         states = integrate(rates, [0.02 + (0.1, -0.06, 0.03)[index % 3], 0.0], time, 4e-3)
-        records.append(Record(f"decay {index}", Channel(time, noisy(rng, states[:, 0], 5e-5), "m")))
+        return (Record(f"decay {index}", Channel(time, noisy(rng, states[:, 0], 5e-5), "m")))
+
+    records = [record(index) for index in range(count)]
     nominal = """
 inertia: {mass: {value: 1.2, unit: kg, fixed: true}}
 force:
@@ -313,15 +321,17 @@ def camera(effect: str = "coulomb_friction", seed: int = 0, count: int = 3, dura
     """A swing filmed at 30 Hz, position in pixels, no input; Coulomb friction missing (or nothing, "")."""
     rng = np.random.default_rng([7, seed])
     omega, zeta, friction, period = 2.0 * np.pi * 1.1, 0.01, 130.0, 1.0 / 30.0
-    records = []
-    for index in range(count):
+
+    def record(index: int) -> Record:
         time = np.arange(0.0, duration, period)
         rub = friction if effect else 0.0
         states = integrate(
             lambda t, s: [s[1], -(omega**2) * (s[0] - 640.0) - 2.0 * zeta * omega * s[1] - rub * sign(s[1], 1.0)],
             [640.0 + (400.0, -250.0, 120.0)[index % 3], 0.0], time, 0.01,
         )  # fmt: skip
-        records.append(Record(f"film {index}", Channel(time, noisy(rng, states[:, 0], 0.5), "px")))
+        return (Record(f"film {index}", Channel(time, noisy(rng, states[:, 0], 0.5), "px")))
+
+    records = [record(index) for index in range(count)]
     nominal = """
 units: {force: px/s^2, position: px}
 inertia: {mass: {value: 1.0, fixed: true}}
@@ -336,20 +346,22 @@ def circuit(cubic: float = 0.8, seed: int = 0, count: int = 2, duration: float =
     """An electronic oscillator (300 Hz) sampled at 10 kHz, volts in and out; the cubic is missing."""
     rng = np.random.default_rng([8, seed])
     omega, zeta, period = 2.0 * np.pi * 300.0, 0.04, 1e-4
-    records = []
-    for index in range(count):
+
+    def record(index: int) -> Record:
         drive = tones(rng, 0.1 if index else 0.2, 20.0, 900.0, 30)
         time = np.arange(0.0, duration, period)
         states = integrate(
             lambda t, s: [s[1], omega**2 * (drive(t) - s[0] - cubic * s[0] ** 3) - 2.0 * zeta * omega * s[1]],
             [0.0, 0.0], time, 2e-4,
         )  # fmt: skip
-        records.append(
+        return (
             Record(
                 f"circuit {index}", Channel(time, noisy(rng, states[:, 0], 5e-4), "V"),
                 Channel(time, sampled(drive, time), "V"), hold="band_limited",
             )
         )  # fmt: skip
+
+    records = [record(index) for index in range(count)]
     nominal = """
 units: {force: V, position: V}
 inertia: {mass: {value: 2.5e-7}}

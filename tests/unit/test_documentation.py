@@ -8,6 +8,7 @@ import pytest
 
 import rhythmid
 from rhythmid.experiment import Experiment
+from rhythmid.identify.drive import controlled
 from rhythmid.model import Model
 from rhythmid.record.signals import Signals
 
@@ -39,7 +40,19 @@ def test_the_signals_file_that_is_shown(tmp_path):
     assert Signals.load(tmp_path / "signals.yaml").use == (10.0, 90.0)
 
 
-@pytest.mark.parametrize("document", ["README.md", "docs/files.md"])
+@pytest.mark.parametrize("machine", ["joint", "axis", "servo", "pendulum", "rig", "film"])
+def test_the_files_of_other_machines_are_read_and_fit_together(machine, tmp_path):
+    text = (ROOT / "docs" / "machines.md").read_text(encoding="utf-8")
+    shown = {name: found[1] for name in ("signals", "model")
+             if (found := re.search(rf"```yaml\n(# {name}.yaml: {machine}\n.*?)```", text, re.DOTALL))}  # fmt: skip
+    signals = Signals.from_text(shown["signals"], tmp_path / "signals.yaml")
+    model = Model.from_text(shown["model"])
+    assert model.free and signals.channels["output"].file is not None
+    assert (signals.input_kind == "reference") == controlled(model)
+    assert model.units.position == signals.channels["output"].unit.removesuffix("/s")
+
+
+@pytest.mark.parametrize("document", ["README.md", "docs/files.md", "docs/machines.md"])
 def test_links_lead_to_files_that_exist(document):
     text = (ROOT / document).read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)#]+)\)", text):
