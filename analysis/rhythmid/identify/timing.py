@@ -30,11 +30,12 @@ DRIFT_PARAMETER = {"clock_skew": "skew", "input_delay_drift": "rate"}
 ALIKE = {"clock_skew": ("delay_drift",)}  # the same to first order
 CERTAIN = 5.0  # standard deviations from which a timing effect becomes part of the model
 SMEARS = 3  # widths of command jitter that are tried
-UNEXPLAINED = 1.1  # times the noise floor, beyond which a hold is looked for
+UNEXPLAINED = 1.5  # times the noise floor, beyond which a hold is looked for
 GAIN = 25.0  # in chi2 that a hold must bring
+SLOWER = 3.0  # sample periods from which a hold can be told from the commands' own
 LONGEST_HOLD = 0.25  # seconds between two commands that the drive takes
 REACH = 0.05  # share of a rough period around it in which the true one is looked for, at least
-FINEST = 400  # periods that are tried in there, at most
+FINEST = 200  # periods that are tried in there, at most
 REFITTED = 5  # of them, the best
 
 
@@ -245,11 +246,13 @@ def command_hold(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tup
     smear = None
     if fit.model.term("command_hold") is None and name in fit.names:
         smear = _smear(fit, LONGEST_HOLD / math.sqrt(12.0), pool)
-    if element.starts is None or smear is None or smear[0] <= 0.0:
+    step = fit.run.series[0].period
+    if element.starts is None or smear is None or smear[0] < CERTAIN * smear[1]:
         return joint, none
     rough = math.sqrt(12.0 * smear[0])
+    if rough < SLOWER * step:
+        return joint, none
     spread = 6.0 * smear[1] / rough
-    step = fit.run.series[0].period
     series = [
         one if one.command is None else replace(one, command=smeared(one.command, rough, step))
         for one in fit.run.series
