@@ -1,4 +1,3 @@
-# pyright: reportArgumentType=false
 """A controller that uses an identified latency: it predicts the machine's state over both delays before it acts.
 
     rhythmid identify bag --save latency.yaml
@@ -47,7 +46,7 @@ class DelayCompensator:
         """Command [N] from the newest measurement, which was taken at time `taken` [s]."""
         if self.ahead > 0.0:
             times = taken + np.linspace(0.0, self.ahead, 2)
-            stamps = taken + PERIOD * np.arange(len(self.underway))
+            stamps = taken + PERIOD * np.arange(float(len(self.underway)))
             knots = np.arange(taken - 0.01, taken + self.ahead + 0.01, 1e-3)
             reached = simulate(
                 self.model, times, zero_order_hold(stamps, np.array(self.underway)), spline(knots, forcing(knots)),

@@ -1,4 +1,3 @@
-# pyright: reportArgumentType=false, reportAttributeAccessIssue=false
 """Cramér-Rao bound: the smallest standard deviations that any unbiased estimator can reach, before or after the data.
 
 The inverse of the Fisher information of the sampled output under Gaussian noise, with the initial states as nuisances
@@ -20,6 +19,7 @@ from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, minimise, start_only
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
+from rhythmid.record.messages import Messages
 from rhythmid.record.record import Channel, Record
 
 Array = NDArray[np.float64]
@@ -47,11 +47,16 @@ def planned_record(experiment: Experiment) -> Record:
         raise InputError("the experiment gives no motion")
     return Record(
         "planned",
-        Channel(output.stamp_ns * 1e-9, output.position, "m"),
-        Channel(command.stamp_ns * 1e-9, command.effort, "N"),
-        Channel(forcing.stamp_ns * 1e-9, forcing.effort, "N"),
+        Channel(_seconds(output), output.position, "m"),
+        Channel(_seconds(command), command.effort, "N"),
+        Channel(_seconds(forcing), forcing.effort, "N"),
         run=experiment.description(),
     )
+
+
+def _seconds(messages: Messages) -> Array:
+    """Stamps [s] (n,)."""
+    return messages.stamp_ns.astype(np.float64) * 1e-9
 
 
 def cramer_rao(

@@ -1,4 +1,3 @@
-# pyright: reportArgumentType=false, reportAttributeAccessIssue=false
 """Maximum likelihood in the frequency domain: harmonic transfer functions and limit cycle, parameters and delays together.
 
 Minimises Σ_l |Y_l − Σ_m G_m(θ) e^{−j[(ω_l − mω_p) τ_u + ω_l τ_y]} U_{l−mP}|² / σ_l² + Σ_n |X̂_n − X_n(θ) e^{−jnω_p τ_y}|² / σ_n²
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from rhythmid.compiled import InputKind
 from rhythmid.errors import InputError
 from rhythmid.ltp.htf import LinearisedModel, linearised
 from rhythmid.ltp.pumping import Pumping
@@ -61,7 +61,8 @@ class _Comparison:
     def __init__(
         self, record: Record, model: Model, pumping: Pumping, sidebands: int, cycle: bool, ring_down: float
     ) -> None:
-        self.model, self.pumping, self.kind = model, pumping, record.input_kind
+        self.model, self.pumping = model, pumping
+        self.kind: InputKind = record.input_kind
         self.cycle = cycle and pumping.active
         self.names = [n for n in model.free if n not in DELAYS]
         self.m = np.arange(-sidebands, sidebands + 1) if pumping.active else np.zeros(1, dtype=np.int64)
@@ -102,7 +103,7 @@ class _Comparison:
 
     def sidebands(self, model: LinearisedModel) -> Complex:
         """G_m U at the bins without delays, (h, n)."""
-        frequency = self.bins * self.spectra.resolution
+        frequency: Array = self.bins.astype(np.float64) * self.spectra.resolution
         return model.htf(self.m, frequency) * self.spectra.shifted_input(self.m, self.bins)
 
     def expected(self, parts: Complex, input_delay: float, measurement_delay: float) -> Complex:
@@ -123,10 +124,10 @@ class _Comparison:
         if self.cycle:
             n = np.arange(CYCLE + 1)
             shown = model.cycle.harmonics(CYCLE) * np.exp(-1j * self.pumping.omega * n * measurement_delay)
-            gap = np.zeros(CYCLE + 1, dtype=complex)
+            gap: Complex = np.zeros(CYCLE + 1, dtype=np.complex128)
             seen = min(CYCLE + 1, len(self.spectra.cycle))
             gap[:seen] = (shown[:seen] - self.spectra.cycle[:seen]) / np.sqrt(self.cycle_variance[:seen])
-            parts += [gap.real[:1], np.sqrt(2.0) * gap.real[1:], np.sqrt(2.0) * gap.imag[1:]]
+            parts += [np.real(gap)[:1], np.sqrt(2.0) * np.real(gap)[1:], np.sqrt(2.0) * np.imag(gap)[1:]]
         return np.concatenate(parts)
 
     def best_delays(self, model: LinearisedModel, longest: float) -> tuple[float, float, float]:
@@ -287,7 +288,8 @@ def visible_sidebands(
     found = spectra(record, pumping, 2.0, max(harmonics) + 1)
     bins = np.arange(1, len(found.output))
     m = np.array([sign * h for h in harmonics for sign in (-1, 1)])
-    parts = linearised(model, pumping, excited=record.input_kind).htf(m, bins * found.resolution)
+    frequency: Array = bins.astype(np.float64) * found.resolution
+    parts = linearised(model, pumping, excited=record.input_kind).htf(m, frequency)
     power = np.sum(np.abs(parts * found.shifted_input(m, bins)) ** 2, axis=1)
     floor = noise_density * found.window.periods * pumping.period
     return [h for h in harmonics if power[np.abs(m) == h].sum() > 25.0 * floor]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
+from rhythmid.identify.faint_directions import faint, with_faint_directions
 from rhythmid.identify.free_run import FreeRun, accurate, prepare_run
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.sensitivity import Linearisation, Problem, state_update
@@ -25,6 +26,7 @@ Array = NDArray[np.float64]
 WHITE = NoiseModel(np.empty(0), 1.0)
 STAY = 0.1  # share of its distance from a lower bound that one step leaves a parameter: a width of zero is hard to leave
 BRINK = 1e-3  # share of its first distance within which it may reach the bound
+PART = 1e-5  # of an undetermined direction's largest component, below which a parameter takes no part in it
 LOST = 0.3  # error, as a share of the motion, above which a model has lost the machine
 Progress = Callable[[str], None]
 INTEGRATION = 0.02  # of the residual, below which an error of integration has to stay: it must not count among models
@@ -90,7 +92,7 @@ def first_guess(model: Model, run: FreeRun) -> list[Array]:
     found: list[Array] = []
     for one in run.series:
         span = 0.05 / max(dominant_frequency(one), 1e-9)
-        n = int(np.clip(round(span / one.period), 3, len(one.time) // 4))
+        n = int(np.clip(round(span / one.period), 3, max(len(one.time) // 4, 3)))
         slope, level = np.polyfit(one.time[:n] - one.time[0], one.value[:n], 1)
         begin = {"position": (level, slope), "velocity": (0.0, level), "acceleration": (0.0, 0.0)}[one.measured]
         if one.kind == "base_displacement" and one.command is not None and one.measured != "position":
@@ -164,10 +166,12 @@ def minimise(
     """The fit that `descend` leads to, with its sensitivities and covariance."""
     end = descend(model, run, names, noise, starts, iterations, pool, tolerance, differences)
     linearisation = end.linearisation
-    if linearisation is None:
+    if linearisation is None or faint(linearisation.jacobian):
         problem = Problem(run, names, noise, pool)
         problem.learn_hidden(end.model, end.starts)
-        linearisation, *_ = problem.linearise(end.model, end.starts, end.residuals, *end.differences)
+        if linearisation is None:
+            linearisation, *_ = problem.linearise(end.model, end.starts, end.residuals, *end.differences)
+        linearisation = with_faint_directions(linearisation, problem, end.model, end.starts)
     return Fit(
         model=end.model,
         names=tuple(names),
@@ -313,9 +317,10 @@ def _covariance(jacobian: Array, priors: Sequence) -> Array:
         if prior is not None:
             information[i, i] += 1.0 / (prior.std * norms[i]) ** 2
     eigenvalues, vectors = np.linalg.eigh(information)
-    inverse = np.where(
-        eigenvalues > 1e-11 * max(eigenvalues[-1], 1e-300), 1.0 / np.maximum(eigenvalues, 1e-300), 1e24
-    )
+    known = eigenvalues > 1e-11 * max(eigenvalues[-1], 1e-300)
+    inverse = np.where(known, 1.0 / np.maximum(eigenvalues, 1e-300), 1e24)
+    # rounding gives every parameter a trace of an undetermined direction; only those that take part are undetermined
+    vectors = np.where(~known & (np.abs(vectors) < PART * np.abs(vectors).max(axis=0)), 0.0, vectors)
     with np.errstate(over="ignore"):
         return (vectors * inverse) @ vectors.T / np.outer(norms, norms)
 
