@@ -65,13 +65,15 @@ def print_scatter(seeds: range, record: Record, noise: float, cycle: bool, worke
     def one(seed: int) -> Drawn:
         return Drawn.of(fit_from(off, noisy(record, noise, seed), cycle=cycle), NAMES)
 
-    drawn, lost = [], 0
+    drawn, lost = [], []
     for _, found in fork_map(one, seeds, workers):
         if isinstance(found, Exception):
-            lost += 1
+            lost.append(found)
         else:
             drawn.append(found)
-    print(f"\nnoise {1e6 * noise:g} µm, {'with' if cycle else 'without'} the limit cycle: {len(seeds)} runs, {lost} without an answer")
+    print(f"\nnoise {1e6 * noise:g} µm, {'with' if cycle else 'without'} the limit cycle: {len(seeds)} runs, {len(lost)} without an answer")
+    if lost:
+        print(f"the first of them: {lost[0]}")
     print(f"{'parameter':28}{'bound':>11}{'std':>11}{'std/bound':>11}{'bias/std':>10}{'95 % covers':>13}")
     for name in NAMES:
         found = scatter(drawn, name, machine.value(name))
