@@ -207,6 +207,11 @@ def test_a_simulation_that_stands_still_is_refused(simulation):
         compare(still, [record(hopper(), CHIRP)])
 
 
+def test_a_position_is_not_compared_with_a_velocity(simulation):
+    with pytest.raises(InputError, match="holds a position, record 0 a velocity"):
+        compare(simulation, [replace(record(hopper(), CHIRP), output_kind="velocity")])
+
+
 def test_a_recording_in_millimetres_is_remarked(simulation):
     seen = record(hopper(), CHIRP)
     wrong = replace(seen, output=replace(seen.output, value=1000.0 * seen.output.value))

@@ -18,6 +18,7 @@ from rhythmid.diagnose.align import Alignment, align
 from rhythmid.diagnose.explain import Explanation, explain
 from rhythmid.diagnose.pair import Pair, harmonic_columns, pair_of
 from rhythmid.diagnose.wording import SENTENCES
+from rhythmid.errors import InputError
 from rhythmid.identify.output_error import estimate, start_only
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
@@ -212,6 +213,11 @@ def compare(
 
     Raises InputError when there is too little in common.
     """
+    for one in recordings:
+        if one.output_kind != simulation.output_kind:
+            raise InputError(
+                f"{simulation.name} holds a {simulation.output_kind}, {one.name} a {one.output_kind}; name the same quantity under 'output:'"
+            )
     tell("aligning simulation and recording")
     aligned = [(align(simulation, one), one) for one in recordings]
     alignment, recording = min(aligned, key=lambda pair: (bool(pair[0].mismatch), pair[0].difference or 0.0))
