@@ -140,6 +140,8 @@ def show(result: dict) -> None:
         console.print(table)
     for group in result["indistinguishable"]:
         console.print(f"indistinguishable here: {', '.join(group)}")
+    if result["scoring"] != "free run":
+        console.print(f"scored in {result['scoring']}")
     for name, fit in result["fit"].items():
         held = "—" if fit["heldout_nrmse"] is None else f"{fit['heldout_nrmse']:.5f}"
         console.print(f"{name.replace('_', ' ')}: NRMSE {fit['train_nrmse']:.5f} seen, {held} held out")

@@ -14,6 +14,7 @@ from rhythmid.diagnose.locate import Dependence
 from rhythmid.diagnose.search import LEVEL, WORTH, Search
 from rhythmid.elements.element import SLOTS
 from rhythmid.errors import InputError
+from rhythmid.identify.multiple_shooting import record_of
 from rhythmid.identify.output_error import Fit, noise_of
 from rhythmid.identify.repeats import noise_from_repeats
 from rhythmid.identify.series import Series, bandwidth
@@ -73,12 +74,12 @@ def findings(
     """What the report shows, as plain data; arguments as for `present`."""
     evidence, found = answer.evidence, answer.evidence.search
     pumpings = {id(record): active_pumping(record) for record in (*records, *holdout)}
-    runs = _runs(found.nominal, found.fit, [pumpings[id(r)] for r in records], bool(found.best.added))
+    runs = _runs(found.nominal, found.fit, {r.name: pumpings[id(r)] for r in records}, bool(found.best.added))
     if evidence.unseen_nominal is not None:
         after = evidence.unseen_augmented or evidence.unseen_nominal
         repaired = bool(found.best.added) and evidence.unseen_augmented is not None
         runs += _runs(
-            evidence.unseen_nominal, after, [pumpings[id(r)] for r in holdout], repaired, heldout=True
+            evidence.unseen_nominal, after, {r.name: pumpings[id(r)] for r in holdout}, repaired, heldout=True
         )
     models = {"Nominal model": nominal.to_yaml(), "Nominal model, refitted": found.nominal.model.to_yaml()}
     if found.best.added:
@@ -125,11 +126,15 @@ def _listed(names: Sequence[str], most: int = 4) -> str:
 
 
 def _runs(
-    before: Fit, after: Fit, pumpings: Sequence[Pumping | None], repaired: bool, heldout: bool = False
+    before: Fit, after: Fit, pumpings: Mapping[str, Pumping | None], repaired: bool, heldout: bool = False
 ) -> list[Run]:
-    """Every series of the fits beside its simulations; they were fitted to the same series."""
+    """Every series of the fits beside its simulations; they were fitted to the same series.
+
+    `pumpings` are those of the records, by name, whole or cut into windows.
+    """
     found: list[Run] = []
-    for index, (one, pumping) in enumerate(zip(before.run.series, pumpings)):
+    for index, one in enumerate(before.run.series):
+        pumping = pumpings.get(one.name, pumpings.get(record_of(one)))
         rows = after.run.rows(after.model, index, after.starts[index])
         if rows is None:
             continue

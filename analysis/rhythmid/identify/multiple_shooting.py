@@ -51,6 +51,11 @@ def split(series: Series, length: float) -> list[Series]:
     return parts
 
 
+def record_of(series: Series) -> str:
+    """Name of the record that a window was cut from."""
+    return series.name.rpartition("@")[0] or series.name
+
+
 def periods_long(series: Series) -> float:
     """Length [s] of windows that hold a few periods of the motion."""
     step = series.period * series.block

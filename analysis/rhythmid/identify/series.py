@@ -21,6 +21,7 @@ from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.signal import continuous, spline
 
+FAINT = 1e-4  # of the inertia's own stiffness m ω², below which a spring sets no scale
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -207,9 +208,9 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     motions = [_motion(one) for one in series]
     position = max(max(float(np.std(x)) for x, _ in motions), 1e-12)
     velocity = max(float(np.std(v)) for _, v in motions)
-    stiffness = (
-        model.borrowed("linear_spring.stiffness", None) or model.mass.value * (2 * np.pi * frequency) ** 2
-    )
+    inertial = model.mass.value * (2 * np.pi * frequency) ** 2
+    spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
+    stiffness = spring if spring > FAINT * inertial else inertial
     effort, pumping, reference = 0.0, 0.0, 0.0
     for one in series:
         total = np.zeros(len(one.time))
