@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rhythmid.diagnose.contradiction import contradiction
 from rhythmid.diagnose.result import Diagnosis, MissingEffect
+from rhythmid.diagnose.scoring import LOSES
 from rhythmid.diagnose.search import Search
 from rhythmid.errors import InputError
 from rhythmid.identify.series import Series, dominant_frequency, scales
@@ -129,6 +130,12 @@ def tempered(
         shortfall = Shortfall(
             f"the records are too quiet: noise makes {100.0 * min(left, 1.0):.0f} % of what was measured",
             f"excite at least {max(2, math.ceil(left / QUIET))} times as strongly (the efforts were {size:.3g} rms)", False,
+        )  # fmt: skip
+    if shortfall is None and diagnosis.verdict == "consistent" and LOSES in diagnosis.scoring:
+        shortfall = Shortfall(
+            "in free run the nominal model loses the machine, and windows short enough to follow it show nothing missing: either something "
+            "drives it that is not recorded, or an effect is too slow for such windows",
+            "record everything that drives the machine, and once the cycle alone or a free decay", False,
         )  # fmt: skip
     unknown = diagnosis.verdict == "unknown_physics"
     if unknown and (shortfall is None or not shortfall.fatal):
