@@ -58,8 +58,9 @@ naming: install ## Compare the naming of missing physics with PySINDy and a Gaus
 	$(BIN)/python -m pip install --quiet --constraint requirements.lock pysindy scikit-learn
 	$(BIN)/python benchmarks/naming.py
 
-picture: install ## Draw the picture of the README
+picture: install ## Draw the pictures of the README
 	$(BIN)/python docs/signal_path.py
+	$(BIN)/python docs/delay_noise.py
 
 docker: install ## Build the image and run the graph in containers, with buildah and without any engine
 	$(BIN)/python docker/without_engine.py
