@@ -26,6 +26,7 @@ from rhythmid.simulate import start_states
 Array = NDArray[np.float64]
 SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
 PROMISING = 0.3  # share of the spread of chi2 within which a model is carried to convergence
+FAINTER = (0.1, 0.01)  # shares of a guess that led nowhere, tried in its place
 TOLERANCE = 0.05  # of chi2, at which a trial has converged: far below what an element has to earn
 
 
@@ -74,21 +75,42 @@ def _trial(added: tuple[str, ...], model: Model, done: _Outcome, noise: NoiseMod
 
 @dataclass(frozen=True)
 class Proposal:
-    """A structure to try: the model with the elements in it, and several first guesses (values by parameter name)."""
+    """A structure to try: the model with the elements in it, and several first guesses (values by parameter name).
+
+    `ceiling` is the chi2 of a model that it contains, as far as that is known; `faint` are guesses close to that one.
+    """
 
     added: tuple[str, ...]
     model: Model
     guesses: tuple[dict[str, float], ...]
+    ceiling: float = math.inf
+    faint: tuple[dict[str, float], ...] = ()
 
 
 def propose(
-    base: Model, element: Element, guesses: Sequence[dict[str, float]], added: tuple[str, ...]
+    base: Model,
+    element: Element,
+    guesses: Sequence[dict[str, float]],
+    added: tuple[str, ...],
+    ceiling: float = math.inf,
 ) -> Proposal:
-    """The base model with one more element; `guesses` are values of the element's own parameters."""
+    """The base model, whose chi2 is `ceiling`, with one more element; `guesses` are values of the element's parameters."""
     extended = base.with_element(element, guesses[0])
     label = extended.terms[-1].label
-    named = tuple({f"{label}.{name}": value for name, value in guess.items()} for guess in guesses)
-    return Proposal((*added, label), extended, named)
+
+    def named(guess: dict[str, float]) -> dict[str, float]:
+        return {f"{label}.{name}": value for name, value in guess.items()}
+
+    faint = [_fainter(element, guesses[0], share) for share in FAINTER] if element.size else []
+    return Proposal((*added, label), extended, tuple(map(named, guesses)), ceiling, tuple(map(named, faint)))
+
+
+def _fainter(element: Element, guess: dict[str, float], share: float) -> dict[str, float]:
+    """The guess with its effect reduced to a share."""
+    value = guess[element.size]
+    if math.isinf(element.absent):
+        return guess | {element.size: value / share}
+    return guess | {element.size: element.absent + share * (value - element.absent)}
 
 
 def fine_enough(model: Model, step: float) -> float:
@@ -119,7 +141,9 @@ def _fit_proposal(
     if proposal.added[-1:] == (HOLD,):
         begin = [_extended(start, proposal.model, run, known) for start in starts]
         ticks = scanned(proposal.model, series, begin, noise, run.max_step)
-    for guess in (*ticks, *proposal.guesses):
+    for guess in (*ticks, *proposal.guesses, *proposal.faint):
+        if guess in proposal.faint and best is not None and best.chi2 < proposal.ceiling:
+            break
         model = proposal.model.with_values(guess)
         try:
             begin = [_extended(start, model, run, known) for start in starts]

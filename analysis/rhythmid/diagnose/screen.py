@@ -300,12 +300,21 @@ def under(fit: Fit, noise: NoiseModel, pool: ThreadPoolExecutor | None = None) -
 
 
 def residual_line(fit: Fit) -> float:
-    """Frequency [Hz] of the strongest line in the residuals of the longest series."""
-    index = max(range(len(fit.run.series)), key=lambda i: fit.run.series[i].blocks)
-    one, residual = fit.run.series[index], fit.residuals[index][fit.run.series[index].used]
-    power = np.abs(np.fft.rfft((residual - residual.mean()) * np.hanning(len(residual)))) ** 2
-    power[:2] = 0.0
-    return float(np.argmax(power) / (len(residual) * one.period * one.block))
+    """Frequency [Hz] of the strongest line in the residuals: of the sum of all series' spectra, between their bins."""
+    period = fit.run.series[0].period * fit.run.series[0].block
+    length = 8 * max(one.blocks for one in fit.run.series)
+    power = np.zeros(length // 2 + 1)
+    for one, residual in zip(fit.run.series, fit.residuals):
+        part = residual[one.used]
+        if len(part) > 8 and one.period * one.block == period:
+            power += np.abs(np.fft.rfft((part - part.mean()) * np.hanning(len(part)), length)) ** 2
+    power[:16] = 0.0
+    place = int(np.argmax(power))
+    if not 0 < place < len(power) - 1 or power[place] == 0.0:
+        return 0.0
+    below, top, above = np.log(np.maximum(power[place - 1 : place + 2], 1e-300))
+    bend = below - 2.0 * top + above
+    return float((place + (0.5 * (below - above) / bend if bend < 0.0 else 0.0)) / (length * period))
 
 
 def p_value(scores: Sequence[Score], inflation: float = 1.0) -> float:

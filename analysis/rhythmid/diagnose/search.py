@@ -159,7 +159,7 @@ def _proposals(
         starts = [one.start for one in group[: 3 if len(group) > MANY else 2]]
         if not 0.2 < abs(best.size) < 5.0:  # far from the guess that was scored, the size is an extrapolation
             starts.insert(1, dict(best.values))
-        made.append(propose(base, best.element, starts[:3], added))
+        made.append(propose(base, best.element, starts[:3], added, chi2))
         enough.append(chi2 - 0.8 * best.statistic)
     return made, enough
 

@@ -16,6 +16,7 @@ from rhythmid.identify.series import Series, dominant_frequency
 TWINS = 2  # a family of this many is an answer; a larger one is undecided
 REMAINDER_LEVEL = 1e-6  # p-value of a structured remainder
 LINE_SHARE = 0.05  # of the residual's power, from which a line in it is a matter
+LINE_WORTH = 0.02  # of the power that the named effects explain, below which a line is their imperfection
 PERIODS = 4  # of the dominant motion, below which a record says nothing
 
 
@@ -75,7 +76,9 @@ def verdict_of(
         colour = max(repeats.long_run_variance / repeats.variance, 1.0)
         too_big = ratio > 1.1 + 6.0 * math.sqrt(2.0 * colour / len(residual))
     line = strongest_line(fit)
-    if line is not None and line.p_value < REMAINDER_LEVEL and line.share > LINE_SHARE:
+    explained = found.nominal.nrmse() ** 2 - fit.nrmse() ** 2
+    matters = line is not None and line.share * fit.nrmse() ** 2 > LINE_WORTH * explained
+    if line is not None and line.p_value < REMAINDER_LEVEL and line.share > LINE_SHARE and matters:
         return (
             "unknown_physics",
             f"a line at {line.frequency:.3g} Hz remains that nothing in the catalogue explains",
