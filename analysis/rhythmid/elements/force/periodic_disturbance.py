@@ -20,7 +20,7 @@ def starts(scales):
     return [
         {"amplitude": 0.01 * scales.force, "frequency": f, "phase": phase}
         for f in frequencies
-        for phase in (0.0, 0.5 * math.pi)
+        for phase in (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)  # the amplitude has no sign
     ]
 
 

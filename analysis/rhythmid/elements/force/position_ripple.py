@@ -18,7 +18,7 @@ def starts(scales):
     return [
         {"amplitude": 0.01 * scales.force, "wavelength": 4.0 * scales.position / 1.25**k, "phase": phase}
         for k in range(12)  # from one period in the usual travel to a dozen
-        for phase in (0.0, 0.5 * math.pi)
+        for phase in (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)  # the amplitude has no sign
     ]
 
 
