@@ -27,7 +27,7 @@ SERIES = 2  # looked at, those with the strongest command at first
 FASTEST = 100.0  # [Hz] beyond which a hold is little but a delay, and its ticks do not matter
 FOLLOWED = 8  # rates that are followed
 FOUND = 2  # guesses returned
-FINEST = 0.02  # spacing of the rates at the end, over the inverse length of the record
+FINEST = 0.002  # spacing of the rates at the end, over the inverse length of the record
 
 
 def scanned(

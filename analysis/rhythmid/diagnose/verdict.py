@@ -16,7 +16,7 @@ from rhythmid.identify.series import Series, dominant_frequency
 TWINS = 2  # a family of this many is an answer; a larger one is undecided
 REMAINDER_LEVEL = 1e-6  # p-value of a structured remainder
 LINE_SHARE = 0.05  # of the residual's power, from which a line in it is a matter
-LINE_WORTH = 0.02  # of the power that the named effects explain, below which a line is their imperfection
+LINE_WORTH = 0.1  # of the power that the named effects explain, below which a line is their imperfection
 PERIODS = 4  # of the dominant motion, below which a record says nothing
 
 
