@@ -20,7 +20,7 @@ from rhythmid.identify.output_error import Fit
 from rhythmid.identify.series import Series, hold_out_tail
 from rhythmid.model import Model
 
-FOLLOWS = 0.1  # error below which it follows the machine well enough for any score
+FOLLOWS = 0.3  # error below which it follows the machine well enough for a free run
 GAIN = 0.9  # share to which a step to shorter windows has to lower the error
 PATIENCE = 2  # steps without such a gain before no more are tried
 BETTER = 0.6  # share to which all steps together have to: an error that adds up, not one made at once by noise or effect
