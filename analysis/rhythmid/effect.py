@@ -11,9 +11,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.compiled import kernel_source, load_module
+from rhythmid.compiled import kernel_source
 from rhythmid.elements.element import STEP, Element
 from rhythmid.errors import InputError
+from rhythmid.machine_code import load_module
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]

@@ -3,7 +3,7 @@
     python -m rhythmid.warm_up
 
 A short run of each goes through the code that a user will call, so that nothing has to be listed here. The machine code is
-kept (see `rhythmid.compiled.cache_folder`); a second warm-up takes some seconds.
+kept (see `rhythmid.machine_code.cache_folder`); a second warm-up takes some seconds.
 """
 
 import sys
@@ -13,9 +13,9 @@ from importlib.resources import files
 
 import numpy as np
 
-from rhythmid.compiled import cache_folder
 from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment, perform
+from rhythmid.machine_code import cache_folder
 from rhythmid.parallel import fork_map
 from rhythmid.record.record import Channel, Record
 
