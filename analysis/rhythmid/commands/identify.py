@@ -37,10 +37,10 @@ def identify(
     ] = None,
     clock_offset: Annotated[
         tuple[float, float] | None,
-        typer.Option("--clock-offset", help="Bounds [s] of that clock's offset, where it is unknown."),
+        typer.Option("--clock-offset", help="Bounds, in s, of that clock's offset, where it is unknown."),
     ] = None,
     clock_offset_std: Annotated[
-        float | None, typer.Option("--clock-offset-std", help="Or its standard deviation [s] about zero.", min=0.0)
+        float | None, typer.Option("--clock-offset-std", help="Or its standard deviation, in s, about zero.", min=0.0)
     ] = None,
 ) -> None:
     """Find a model's parameters, the command and measurement delays, and the harmonic transfer functions."""

@@ -22,9 +22,7 @@ def probabilities(found: Search) -> dict[str, float]:
     best = found.best
     answer: dict[str, float] = {}
     for label in best.added:
-        term = best.model.term(label)
-        assert term is not None
-        richer = set(term.element.special_case_of)  # contain this element: never better, and no rivals
+        richer = set(best.element(label).special_case_of)  # contain this element: never better, and no rivals
         rivals = [
             t for t in found.trials if label not in t.added and not richer & set(t.added) and t.added != ()
         ]

@@ -24,19 +24,19 @@ def delays_of(fit: Fit) -> dict[str, Any]:
         else:
             found[key] = {}
     if found["input"] and found["measurement"]:
-        pick = np.zeros(len(fit.names))
-        for place in places.values():
-            pick[place] = 1.0
-        variance = float(pick @ fit.covariance @ pick) if len(pick) else 0.0
+        chosen = list(places.values())
+        with np.errstate(invalid="ignore"):  # infinite less infinite: undetermined
+            variance = float(fit.covariance[np.ix_(chosen, chosen)].sum())
         total = found["input"]["value"] + found["measurement"]["value"]
-        found["sum"] = {"value": total, "std": math.sqrt(max(variance, 0.0)), "unit": "s"}
+        scatter = math.sqrt(max(variance, 0.0)) if math.isfinite(variance) else None
+        found["sum"] = {"value": total, "std": scatter, "unit": "s"}
     else:
         found["sum"] = dict(found["input"] or found["measurement"])
     separable = True
     if len(places) == 2:
         each = [found[key]["std"] for key in places]
-        scatter = found["sum"]["std"] or 0.0
-        separable = all(std is not None and std < max(20.0 * scatter, 2e-3) for std in each)
+        limit = max(20.0 * (found["sum"]["std"] or 0.0), 2e-3)
+        separable = all(std is not None and std < limit for std in each)
     elif len(places) < 2 and not (found["input"] and found["measurement"]):
         separable = False
     found["separable"] = separable

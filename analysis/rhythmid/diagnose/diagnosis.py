@@ -35,7 +35,7 @@ from rhythmid.diagnose.screen import trajectories
 from rhythmid.diagnose.search import WORTH, Search, search
 from rhythmid.diagnose.sufficiency import check_driven, tempered, without_clipped
 from rhythmid.diagnose.units import check_units
-from rhythmid.diagnose.verdict import element_of, significant, twins_of, verdict_of
+from rhythmid.diagnose.verdict import significant, twins_of, verdict_of
 from rhythmid.diagnose.wording import location_of, recalibrated, summary_of
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
@@ -208,7 +208,7 @@ def _conclude(
     shown = [t for t in found.trials if set(t.added) != set(best.added)][:SHOWN]
     alternatives = tuple(
         Alternative(
-            tuple(element_of(t, label) for label in t.added),
+            tuple(t.element(label).name for label in t.added),
             t.bic() - best.bic(),
             judge.nrmse(t.model) if judge.fit(t.model) is not None else tail_error(found, t),
         )

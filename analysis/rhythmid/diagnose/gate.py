@@ -58,11 +58,11 @@ def admitted(
 
 def _faint(found: Search, label: str) -> bool:
     """Whether the size of an effect of the chosen model cannot be told from its absence."""
-    term = found.fit.model.term(label)
-    if term is None or not term.element.size or math.isinf(term.element.absent):
+    element = found.best.element(label)
+    if not element.size or math.isinf(element.absent):
         return False
-    name = f"{label}.{term.element.size}"
-    distance = abs(found.fit.model.value(name) - term.element.absent)
+    name = f"{label}.{element.size}"
+    distance = abs(found.fit.model.value(name) - element.absent)
     return name in found.fit.std and distance < FAINT * found.fit.std[name]
 
 

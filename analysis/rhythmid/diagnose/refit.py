@@ -48,6 +48,13 @@ class Trial:
         """Bayesian information criterion (G. Schwarz, Ann. Stat. 6 (1978) 461); `inflation` >= 1 deflates chi2."""
         return self.chi2 / inflation + self.free * math.log(max(self.samples, 2))
 
+    def element(self, label: str) -> Element:
+        """The element that the model has under a label; KeyError if there is none."""
+        term = self.model.term(label)
+        if term is None:
+            raise KeyError(label)
+        return term.element
+
 
 @dataclass(frozen=True)
 class _Outcome:

@@ -311,14 +311,14 @@ def _defend(
         best = min(kept, key=lambda t: t.bic())
     swaps: list[Proposal] = []
     for label in best.added:
-        element = best.model.term(label).element  # type: ignore[union-attr]
+        element = best.element(label)
         family = {e.name for e in catalogue.values() if element.name in e.special_case_of and e.candidate}
         names = set(family)
         if len(best.added) > 1:
             names |= {score.element.name for score, _ in _distinct(rounds[0].scores, RIVALS)}
         rest = _rest(best, label)
         slim = best.model.without(label)
-        for name in sorted(names - {best.model.term(x).element.name for x in best.added}):  # type: ignore[union-attr]
+        for name in sorted(names - {best.element(other).name for other in best.added}):
             starts = _starts_for(catalogue, name, series, slim, rounds, 8 if name in family else 1)
             if starts and tuple(sorted((*rest, name))) not in trials:
                 swaps.append(propose(slim, catalogue[name], starts, rest))
@@ -348,9 +348,9 @@ def _stands_for(trial: Trial, best: Trial) -> bool:
         return False
     if set(trial.added) < set(best.added):
         return True
-    extra = [trial.model.term(label) for label in trial.added if label not in best.added]
-    gone = [best.model.term(label) for label in best.added if label not in trial.added]
-    return len(extra) == len(gone) == 1 and gone[0].element.name in extra[0].element.special_case_of  # type: ignore[union-attr]
+    extra = [trial.element(label) for label in trial.added if label not in best.added]
+    gone = [best.element(label) for label in best.added if label not in trial.added]
+    return len(extra) == len(gone) == 1 and gone[0].name in extra[0].special_case_of
 
 
 def _states(trial: Trial) -> tuple[str, ...]:

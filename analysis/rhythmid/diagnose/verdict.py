@@ -24,40 +24,26 @@ def significant(dependence: Dependence) -> bool:
     return dependence.p_value < REMAINDER_LEVEL and dependence.explained > 0.05
 
 
-def element_of(trial: Trial, label: str) -> str:
-    """Name of the element that a trial has under a label."""
-    term = trial.model.term(label)
-    assert term is not None
-    return term.element.name
-
-
 def twins_of(best: Trial, rivals: Sequence[Trial]) -> list[tuple[str, ...]]:
     """Families within which the records cannot tell: elements that replace one another in equally good models."""
     groups: list[tuple[str, ...]] = []
     for label in best.added:
-        term = best.model.term(label)
-        assert term is not None
+        element = best.element(label)
         others = [
             other
-            for beside, other in term.element.same_beside.items()
+            for beside, other in element.same_beside.items()
             if any(t.element.name == beside and not all(v.fixed for v in t.values.values()) for t in best.model.terms)
         ]
         for rival in rivals:
             gone = set(best.added) - set(rival.added)
             come = set(rival.added) - set(best.added)
             if gone == {label} and len(come) == 1:
-                other = element_of(rival, come.pop())
-                if other not in others and not _contains(best, label, other):
+                other = rival.element(come.pop()).name
+                if other not in others and other not in element.special_case_of:  # which contains it: no rival
                     others.append(other)
         if others:
-            groups.append((element_of(best, label), *others))
+            groups.append((element.name, *others))
     return groups
-
-
-def _contains(best: Trial, label: str, other: str) -> bool:
-    """Whether `other` is a richer element that has the chosen one as a special case: never to be told from it, and no rival."""
-    term = best.model.term(label)
-    return term is not None and other in term.element.special_case_of
 
 
 def verdict_of(

@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 Method = Literal["joint", "paper"]
 UNKNOWN = 1e3  # times its value: a standard deviation beyond which a parameter is not determined at all
 CLOSED = 5.0  # standard deviations of the closure that call for a note
+FRACTION = 0.01  # of a sample period, below which a closure is numerical, whatever its standard deviation
 SOURCES = {
     "forcing channel": "the recorded forcing",
     "stated formula": "the forcing stated by its formula",
@@ -227,7 +228,7 @@ def _joint(
         "measurement_jitter": jitter.to_dict(),
     }
     delays = delays_of(joint, forcing, offset, SOURCES.get(source, "the forcing"))
-    if delays.closure is not None and abs(delays.closure) > CLOSED:
+    if _open(delays, records[0].output.period):
         notes += (
             f"limit cycle and response to the command disagree about the delays by {delays.closure:+.1f} standard "
             "deviations: the model lacks physics, or the forcing's phase is not the acting one; run `rhythmid diagnose`",
@@ -237,6 +238,15 @@ def _joint(
         fit.model, records, parameters, delays, _harmonics(first, htf), tuple(results), quality,
         notes, joint,
     )  # fmt: skip
+
+
+def _open(delays: Delays, period: float) -> bool:
+    """Whether limit cycle and response to the command disagree about the delays; `period` [s] between samples."""
+    seen = delays.observables
+    if seen is None or delays.closure is None or abs(delays.closure) <= CLOSED:
+        return False
+    gap = (seen.phase.value or 0.0) + (seen.offset.value or 0.0) - (seen.slope.value or 0.0)
+    return abs(gap) > FRACTION * period
 
 
 def _harmonics(result: PaperResult, method: HtfMethod) -> HarmonicEstimates:
