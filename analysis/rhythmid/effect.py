@@ -136,7 +136,8 @@ def effect_along(element: Element, values: Mapping[str, float], model: Model, pa
     if element.states and element.initial is not None:
         first = path.signal[0] if element.slot == "sensor" else path.position[0]
         given = {p.name: v for p, v in zip(element.parameters, parameters, strict=True)} | borrowed
-        states[:] = element.initial(float(first), float(path.velocity[0]), **given)
+        signal = path.effort[0] if element.slot == "force" else path.signal[0]
+        states[:] = element.initial(float(first), float(path.velocity[0]), float(signal), **given)
     rows = np.ascontiguousarray(
         np.vstack([path.position, path.velocity, path.effort, path.leg, path.signal]), dtype=float
     )

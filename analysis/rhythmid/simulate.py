@@ -72,8 +72,16 @@ def delay_of_command(model: Model, stamps: Array) -> Array:
     return late
 
 
-def start_states(model: Model, compiled: Compiled, position: float, velocity: float) -> Array:
-    """State vector at the start: position [m], velocity [m/s], and the elements' own states at rest there."""
+def start_states(
+    model: Model,
+    compiled: Compiled,
+    position: float,
+    velocity: float,
+    command: float = 0.0,
+    forcing: float = 0.0,
+) -> Array:
+    """State vector at the start: position [m], velocity [m/s], and the elements' own states as they would be there after
+    a while with this command and forcing [N]."""
     start = np.zeros(len(compiled.layout.states))
     start[:2] = position, velocity
     index = {name: i for i, name in enumerate(compiled.layout.states)}
@@ -82,7 +90,8 @@ def start_states(model: Model, compiled: Compiled, position: float, velocity: fl
             arguments = {n: v.value for n, v in term.values.items()}
             for name, (source, default) in term.element.borrows.items():
                 arguments[name] = model.borrowed(source, default)  # type: ignore[assignment]
-            for state, value in zip(term.element.states, term.element.initial(position, velocity, **arguments)):
+            signal = command if term.element.slot == "command" else command + forcing
+            for state, value in zip(term.element.states, term.element.initial(position, velocity, signal, **arguments)):
                 start[index[f"{term.label}.{state}"]] = value
     return start
 

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.tick_scan import HOLD, scanned
 from rhythmid.elements.element import STEP, Element
 from rhythmid.errors import InputError
-from rhythmid.identify.free_run import FreeRun, prepare_run
+from rhythmid.identify.free_run import FreeRun, prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Descent, Fit, descend, minimise
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
-from rhythmid.simulate import start_states
 
 Array = NDArray[np.float64]
 SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
@@ -146,14 +145,14 @@ def _fit_proposal(
     failure: InputError | None = None
     ticks: list[dict[str, float]] = []
     if proposal.added[-1:] == (HOLD,):
-        begin = [_extended(start, proposal.model, run, known) for start in starts]
+        begin = [_extended(proposal.model, run, i, start, known) for i, start in enumerate(starts)]
         ticks = scanned(proposal.model, series, begin, noise, run.max_step)
     for guess in (*ticks, *proposal.guesses, *proposal.faint):
         if guess in proposal.faint and best is not None and best.chi2 < proposal.ceiling:
             break
         model = proposal.model.with_values(guess)
         try:
-            begin = [_extended(start, model, run, known) for start in starts]
+            begin = [_extended(model, run, i, start, known) for i, start in enumerate(starts)]
             end = descend(model, run, names, noise, begin, SKETCH, tolerance=TOLERANCE)
         except InputError as error:
             failure = error
@@ -171,12 +170,12 @@ def _fit_proposal(
     return _outcome(best)
 
 
-def _extended(start: Array, model: Model, run: FreeRun, known: Sequence[str]) -> Array:
-    """A start for a structure with other states: those it shares are kept, new ones begin at rest."""
-    fresh = start_states(model, run.compiled, float(start[0]), float(start[1]))
-    for index, name in enumerate(run.compiled.layout.states):
+def _extended(model: Model, run: FreeRun, index: int, start: Array, known: Sequence[str]) -> Array:
+    """A start of series `index` for a structure with other states: those it shares are kept, new ones begin at rest."""
+    fresh = start_of(model, run, index, float(start[0]), float(start[1]))
+    for place, name in enumerate(run.compiled.layout.states):
         if name in known:
-            fresh[index] = start[list(known).index(name)]
+            fresh[place] = start[list(known).index(name)]
     return fresh
 
 

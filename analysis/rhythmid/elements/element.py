@@ -109,7 +109,7 @@ class Element:
     sampler: Callable[..., Sampler] | None = None
     acts: Acts = "leg"
     states: tuple[str, ...] = ()
-    initial: Callable[..., tuple[float, ...]] | None = None  # (x, v, **parameters) -> states at the start; default 0
+    initial: Callable[..., tuple[float, ...]] | None = None  # (x, v, f, **parameters) -> states at the start; default 0
     borrows: Mapping[str, tuple[str, float | None]] = field(default_factory=dict)
     also_known_as: tuple[str, ...] = ()
     family: str = ""

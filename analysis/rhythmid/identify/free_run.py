@@ -14,7 +14,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.signal import impulse_preserving, pieces
-from rhythmid.simulate import physical_times
+from rhythmid.simulate import physical_times, start_states
 
 Array = NDArray[np.float64]
 NO_SIGNAL = pieces(None)
@@ -160,6 +160,21 @@ def prepare_run(
         inputs,
         max_step or min(one.period * one.block for one in series),
     )
+
+
+def start_of(model: Model, run: FreeRun, index: int, position: float, velocity: float) -> Array:
+    """State of series `index` at its first block with this position and velocity; the elements' own as in the middle of
+    the motion, at the command and forcing that act there."""
+    one = run.series[index]
+    begin = physical_times(model, one.centres[:1])
+    late = _delay_of(model, begin)
+    command = _value(one.command, begin[0] - (0.0 if late is None else late[0]))
+    return start_states(model, run.compiled, position, velocity, command, _value(one.forcing, begin[0]))
+
+
+def _value(signal: PPoly | None, time: float) -> float:
+    """A signal [its unit] at a time [s]; zero before it begins."""
+    return 0.0 if signal is None or time < signal.x[0] else float(signal(time))
 
 
 def with_series(run: FreeRun, index: int, series: Series) -> FreeRun:

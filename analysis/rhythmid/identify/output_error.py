@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.identify.faint_directions import faint, with_faint_directions
-from rhythmid.identify.free_run import FreeRun, accurate, prepare_run
+from rhythmid.identify.free_run import FreeRun, accurate, prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.sensitivity import Linearisation, Problem, state_update
 from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import Model
-from rhythmid.simulate import start_states
 
 Array = NDArray[np.float64]
 WHITE = NoiseModel(np.empty(0), 1.0)
@@ -90,14 +89,14 @@ def normalised_error(residuals: Sequence[Array], series: Sequence[Series], unuse
 def first_guess(model: Model, run: FreeRun) -> list[Array]:
     """State at the first block of each series: position and slope of a straight line through its first samples."""
     found: list[Array] = []
-    for one in run.series:
+    for index, one in enumerate(run.series):
         span = 0.05 / max(dominant_frequency(one), 1e-9)
         n = int(np.clip(round(span / one.period), 3, max(len(one.time) // 4, 3)))
         slope, level = np.polyfit(one.time[:n] - one.time[0], one.value[:n], 1)
         begin = {"position": (level, slope), "velocity": (0.0, level), "acceleration": (0.0, 0.0)}[one.measured]
         if one.kind == "base_displacement" and one.command is not None and one.measured != "position":
             begin = float(one.command(one.centres[0])) + begin[0], begin[1]
-        found.append(start_states(model, run.compiled, float(begin[0]), float(begin[1])))
+        found.append(start_of(model, run, index, float(begin[0]), float(begin[1])))
     return found
 
 

@@ -2,7 +2,7 @@
 
 A memory follows the force, at most at the rate R, with the integration step h as time constant; the output leads the
 memory by what one step allows, R h. Where the limit is not reached the output is the input, exactly; a jump of the
-input passes up to R h at once. The actuator starts at zero force.
+input passes up to R h at once. The actuator starts at the force that is asked for.
 """
 
 from math import inf, tau
@@ -24,6 +24,7 @@ ELEMENT = Element(
     borrows={"step": (STEP, 1e-3)},
     kernel=kernel,
     states=("memory",),
+    initial=lambda x, v, f, **_: (f,),
     size="rate",
     absent=inf,
     starts=lambda s: [

@@ -2,7 +2,7 @@
 
 The play is the projection of its own memory w onto [f - b/2, f + b/2]. The kernel returns this projection exactly and
 lets the memory follow it as fast as the integration step h allows, with h / 1.5 as time constant: the output errs only
-after a reversal, by about h^2 d2f/dt2 / 4. The play starts in the middle.
+after a reversal, by about h^2 d2f/dt2 / 4. The play starts in the middle, at the force that is asked for.
 """
 
 from math import inf
@@ -24,6 +24,7 @@ ELEMENT = Element(
     borrows={"step": (STEP, 1e-3)},
     kernel=kernel,
     states=("memory",),
+    initial=lambda x, v, f, **_: (f,),
     size="width",
     starts=lambda s: [{"width": w * s.effort} for w in (0.05, 0.2) if s.effort > 0.0],
     also_known_as=("play", "actuator hysteresis", "lost motion"),

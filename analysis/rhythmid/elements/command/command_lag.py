@@ -2,7 +2,7 @@
 
 A lag shorter than one integration step h is computed with the time constant h and a direct share 1 - tau / h, whose
 transfer function agrees to first order in frequency: the effect vanishes exactly at tau = 0, grows smoothly from
-there, and stays stable. It starts at zero, as before the first command.
+there, and stays stable. It starts at the command.
 """
 
 from math import inf
@@ -24,6 +24,7 @@ ELEMENT = Element(
     borrows={"step": (STEP, 1e-3)},
     kernel=kernel,
     states=("lagged",),
+    initial=lambda x, v, f, **_: (f,),
     size="time_constant",
     starts=lambda s: [{"time_constant": w / s.natural_frequency} for w in (0.01, 0.05)],
     also_known_as=("drive lag", "command filter", "set-point smoothing"),

@@ -38,7 +38,7 @@ ELEMENT = Element(
     kernel=kernel,
     acts="body",
     states=("position", "velocity"),
-    initial=lambda x, v, mass, frequency, damping_ratio, step: (x, v),
+    initial=lambda x, v, f, mass, frequency, damping_ratio, step: (x, v),
     size="mass",
     starts=starts,
     # slower than the motion it is a mass at rest, and its damper a viscous one

@@ -28,7 +28,7 @@ ELEMENT = Element(
     borrows={"step": (STEP, 1e-3)},
     kernel=kernel,
     states=("relaxed",),
-    initial=lambda x, v, stiffness, time_constant, step: (x,),
+    initial=lambda x, v, f, stiffness, time_constant, step: (x,),
     size="stiffness",
     starts=lambda s: [
         {"stiffness": 0.02 * s.stiffness * max(1.0, 0.3 / w), "time_constant": w / (tau * s.natural_frequency)}
