@@ -1,7 +1,6 @@
 """Model of a machine: an inertia and a list of elements along the signal path, written in a YAML file."""
 
 import math
-import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -14,6 +13,7 @@ from rhythmid.document import Node, parse, read
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.elements.element import SLOTS, Element, Parameter
 from rhythmid.errors import InputError
+from rhythmid.output import write_text
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
 INERTIA = "inertia.mass"
@@ -179,13 +179,7 @@ class Model:
 
     def save(self, path: str | Path) -> None:
         """Write the model; nothing is left half-written. Raises InputError when the place is not writable."""
-        target = Path(path)
-        partial = target.with_name(f".{target.name}.partial")
-        try:
-            partial.write_text(self.to_yaml(), encoding="utf-8")
-            os.replace(partial, target)
-        except OSError as error:
-            raise InputError(f"{path}: the model cannot be written: {error.strerror}") from None
+        write_text(Path(path), self.to_yaml())
 
 
 def _labels(name: str) -> Iterator[str]:

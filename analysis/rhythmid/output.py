@@ -18,14 +18,12 @@ def require_new(*paths: Path | None) -> None:
             raise InputError(f"{path}: exists already; name another file or remove it")
         if path.absolute() in [other.absolute() for other in given[:number]]:
             raise InputError(f"{path}: is named for two results; give each a file of its own")
-        folder = path.absolute().parent
-        if not folder.is_dir():
-            raise InputError(f"{path}: the folder {folder} does not exist")
-        require_writable(folder, path)
+        require_writable(path)
 
 
-def require_writable(folder: Path, path: Path) -> None:
-    """Refuse a `folder` in which the result `path` cannot be made."""
+def require_writable(path: Path) -> None:
+    """Refuse a result that cannot be made; folders that are missing above it will be."""
+    folder = next(parent for parent in path.absolute().parents if os.path.lexists(parent))
     try:  # permissions alone do not tell: file systems may be read-only, full, or no place for files
         probe, name = tempfile.mkstemp(prefix=".rhythmid.", dir=folder)
         os.close(probe)
@@ -35,9 +33,10 @@ def require_writable(folder: Path, path: Path) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a result file whole or not at all."""
+    """Write a result file whole or not at all, and the folders above it that are missing."""
     partial = path.with_name(f".{path.name}.partial")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         partial.write_text(text, encoding="utf-8")
         os.replace(partial, path)
     except OSError as error:

@@ -135,9 +135,9 @@ def test_lockstep_equals_the_run_without_ros(rhythmid, tmp_path, offline, layout
 def test_lockstep_follows_a_delay_profile_as_the_run_without_ros_does(rhythmid, tmp_path):
     (tmp_path / "profile.csv").write_text("0,0.04\n1.5,0.06\n1.51,0.0\n3,0.2\n")
     path = experiment_file(tmp_path, delays={"input": {"profile": "profile.csv"}}, time={"window": 1})
-    done = rhythmid("run", path)
+    done = rhythmid("run", path, "--out", tmp_path / "out" / "bag")
     assert done.returncode == 0, done.stderr
-    rows, _ = content(tmp_path / "experiment_bag")
+    rows, _ = content(tmp_path / "out" / "bag")
     expected = perform(Experiment.load(path))
     for topic in ("command", "joint_states"):
         assert [row.stamp_ns for row in rows[topic]] == expected[topic].stamp_ns.tolist()

@@ -24,10 +24,10 @@ def folder(tmp_path_factory) -> Path:
 def made(folder, rhythmid):
     """A design made once by the command, and what it printed."""
     if not (folder / "said").exists():
-        done = rhythmid("design", PAPER, *ARGUMENTS, "--output", "plan", "--json", "plan.json", cwd=folder, timeout=280.0)
+        done = rhythmid("design", PAPER, *ARGUMENTS, "--output", "out/plan", "--json", "out/plan.json", cwd=folder, timeout=280.0)
         assert (done.returncode, done.stderr) == (0, ""), done.stderr
         (folder / "said").write_text(done.stdout, encoding="utf-8")
-    return folder / "plan", (folder / "said").read_text(encoding="utf-8")
+    return folder / "out" / "plan", (folder / "said").read_text(encoding="utf-8")
 
 
 def played(plan: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -44,7 +44,7 @@ def test_the_folder_holds_all_of_the_experiment(made):
     assert (plan / "model.yaml").read_bytes() == PAPER.read_bytes()
     assert (plan / "design.png").read_bytes().startswith(b"\x89PNG")
     assert json.loads((plan / "design.json").read_text()) == json.loads((plan.parent / "plan.json").read_text())
-    assert "predicted standard deviations" in said and "rhythmid run plan/experiment.yaml" in said
+    assert "predicted standard deviations" in said and "rhythmid run out/plan/experiment.yaml" in said
 
 
 def test_every_free_parameter_and_both_delays_have_a_predicted_standard_deviation(made):
@@ -110,7 +110,8 @@ def test_simulating_and_identifying_the_design_gives_the_predicted_uncertainty(m
         (("--duration", 5), "too short"),
         (("--kind", "sweep"), "one of comb, multisine"),
         (("--noise-std", "much"), "--noise-std"),
-        (("--json", "no/where.json"), "does not exist"),
+        (("--json", "/proc/where.json"), "cannot be written to"),
+        (("--json", "plan"), "is named for two results"),
     ],
 )
 def test_a_refusal_is_one_line_and_leaves_nothing(arguments, words, rhythmid, tmp_path):

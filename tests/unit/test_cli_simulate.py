@@ -64,6 +64,14 @@ def test_the_truth_is_recorded_only_on_request(folder, rhythmid):
     assert {"/hopper/command", "/hopper/plant/joint_states"} <= set(recorded(folder / "bag"))
 
 
+def test_folders_above_a_result_are_made(folder, rhythmid):
+    done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "out/of/bags/bag")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert recorded(folder / "out" / "of" / "bags" / "bag")
+    rhythmid("check", "out/of/bags/bag", "--json", "out/of/checks/bag.json")
+    assert [path.name for path in (folder / "out" / "of" / "checks").iterdir()] == ["bag.json"]
+
+
 def test_a_result_is_never_written_over(folder, rhythmid):
     (folder / "bag").mkdir()
     (folder / "bag" / "precious").write_text("data", encoding="utf-8")
@@ -95,7 +103,6 @@ def test_a_refused_run_leaves_nothing_behind(folder, rhythmid):
             ["simulate", "hopper.yaml", "--experiment", "missing.yaml", "--out", "bag"],
             "missing.yaml: cannot be read",
         ),
-        (["simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "no/bag"], "does not exist"),
         (["simulate", "hopper.yaml", "--experiment", "run.yaml"], "Missing option"),
         (
             ["simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag", "--elements", "no"],

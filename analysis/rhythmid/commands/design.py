@@ -107,8 +107,7 @@ def design(
     from rhythmid.model import Model
     from rhythmid.settings import Forcing
 
-    for path in (output, json):
-        require_new(path)
+    require_new(output, json)
     catalogue = load_catalogue(elements or ())
     known = Model.load(model, catalogue)
     input_delay, measurement_delay = delays or transport_delays(known)

@@ -62,12 +62,12 @@ def experiment_document(design: Design, elements: Sequence[Path] = ()) -> dict[s
 def save_design(design: Design, model: Path | str, folder: Path, elements: Sequence[Path] = ()) -> None:
     """Write the design into a new folder, whole or not at all; `model` is the file it was made from, or its text.
 
-    Raises InputError when the folder cannot be written.
+    Folders above it that are missing are made. Raises InputError when the folder cannot be written.
     """
     partial = folder.with_name(f".{folder.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)
     try:
-        partial.mkdir()
+        partial.mkdir(parents=True)
         if isinstance(model, Path):
             shutil.copyfile(model, partial / MODEL)
         else:

@@ -30,7 +30,7 @@ def load(path: Path, out: Path | None) -> Experiment:
     bag = (out or experiment.record.path).absolute()
     if os.path.lexists(bag):
         raise InputError(f"{bag}: exists already and is not overwritten; choose another path or remove it")
-    require_writable(next(parent for parent in bag.parents if parent.exists()), bag)
+    require_writable(bag)
     return experiment.with_record(path=bag)
 
 
