@@ -59,42 +59,27 @@ def _seconds(messages: Messages) -> Array:
     return messages.stamp_ns.astype(np.float64) * 1e-9
 
 
-def cramer_rao(
-    model: Model,
-    records: Record | Sequence[Record],
-    std: float,
-    correlation: float = 0.0,
-    cycle: bool = True,
-    block: int | None = None,
-) -> Bound:
+def cramer_rao(model: Model, records: Record | Sequence[Record], std: float, cycle: bool = True) -> Bound:
     """Bound at the model's own values for records with these inputs and stamps; arguments as for `expected_fit`."""
-    fit = expected_fit(model, records, std, correlation, cycle, block)
+    fit = expected_fit(model, records, std, cycle)
     return Bound(fit.names, fit.covariance)
 
 
-def expected_fit(
-    model: Model,
-    records: Record | Sequence[Record],
-    std: float,
-    correlation: float = 0.0,
-    cycle: bool = True,
-    block: int | None = None,
-) -> Fit:
+def expected_fit(model: Model, records: Record | Sequence[Record], std: float, cycle: bool = True) -> Fit:
     """The fit at the model's own values whose covariance is the bound, for records with these inputs and stamps.
 
-    `std` [output unit] is that of a single sample's noise, `correlation` that from sample to sample (its slow part is
-    what counts). Of the records' outputs only the start is taken, so planned and real ones serve alike. With `cycle`
-    False nothing is learnt from the limit cycle. Raises InputError when `std` is not positive.
+    `std` [output unit] is that of a single sample's noise, which is white. Of the records' outputs only the start is
+    taken, so planned and real ones serve alike. With `cycle` False nothing is learnt from the limit cycle. Raises
+    InputError when `std` is not positive.
     """
     if not std > 0.0:
         raise InputError(f"noise of {std:g} bounds nothing; give its standard deviation, greater than 0")
     given = (records,) if isinstance(records, Record) else tuple(records)
     ready, pumping = prepared_model(model, given)
-    series = prepare(given, block)
+    series = prepare(given)
     if not cycle and pumping is not None:
         series = [replace(one, ignored=cycle_columns(one, pumping)) for one in series]
-    slow = math.sqrt((1.0 + correlation) / (1.0 - correlation))
-    noise = NoiseModel(np.empty(0), std * slow / math.sqrt(series[0].block))
+    noise = NoiseModel(np.empty(0), std / math.sqrt(series[0].block))
     plain = [replace(one, ignored=None) for one in series]
     begun = start_only(ready, plain, noise, FINE * series[0].period * series[0].block)
     run = replace(begun.run, series=tuple(series))
