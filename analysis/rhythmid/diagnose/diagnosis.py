@@ -30,7 +30,7 @@ from rhythmid.diagnose.result import (
     MissingEffect,
     Remainder,
 )
-from rhythmid.diagnose.scoring import settle
+from rhythmid.diagnose.scoring import settle, whole_of
 from rhythmid.diagnose.screen import trajectories
 from rhythmid.diagnose.search import WORTH, Search, search
 from rhythmid.diagnose.sufficiency import check_driven, tempered, without_clipped
@@ -52,6 +52,7 @@ from rhythmid.record.record import Record
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
 SHOWN = 8  # alternatives listed
+TIED_SENSOR = "Scored by force: effects in the sensor are not among the candidates, the measurement is taken for the motion."
 
 
 @dataclass(frozen=True)
@@ -109,8 +110,11 @@ def diagnose(
         if holdout:
             heldout = f"held out: {', '.join(record.name for record in holdout)}"
         else:
-            heldout = f"held out: the last fifth of every {'record' if scoring.free_run else 'window'}"
+            heldout = f"held out: the last fifth of every {'record' if scoring.whole else 'window'}"
         known = known.within(scales(seen, calibration.fit.model))
+        if seen[0].observer is not None:  # which takes the measurement for the motion
+            known = known.without(*(name for name, element in known.elements.items() if element.slot == "sensor"))
+            notes[TIED_SENSOR] = None
         found = search(seen, calibration.fit, known, pool, tell)
         tell("judging on held-out records")
         found, harmful = admitted(found, unseen if holdout else None, pool)
@@ -160,9 +164,9 @@ def check_comparable(series: Sequence[Series]) -> None:
 
 def _floor(series: Sequence[Series], noises: Sequence[NoiseModel]) -> float:
     """Error that noise alone leaves. Repeats that still ring down overstate it, and a fit that is good enough shows less."""
-    joined = np.concatenate([one.averaged[one.used] - one.averaged.mean() for one in series])
     variance = min(noise.variance for noise in noises)
-    return math.sqrt(variance) / max(float(np.sqrt(np.mean(joined**2))), 1e-300)
+    power = sum(one.power(one.used) for one in series) / max(sum(int(one.used.sum()) for one in series), 1)
+    return math.sqrt(variance / max(power, 1e-300))
 
 
 def _conclude(
@@ -232,7 +236,7 @@ def _conclude(
     )
     return Diagnosis(
         verdict=verdict,
-        summary=summary_of(verdict, reason, missing, plain, augmented, twins),
+        summary=summary_of(verdict, reason, missing, plain, augmented, twins, whole_of(series)),
         detection=detection,
         location=location,
         missing=tuple(missing),

@@ -16,6 +16,7 @@ from rhythmid.diagnose.search import Search
 from rhythmid.identify.series import Series
 
 FAINT = 3.0  # standard deviations from its absence, nearer than which an effect's size is no size
+NEEDED = 100.0  # chi2 that an effect is worth, from which its size is only badly parted from its other parameters
 HARM = 0.01  # share by which the held-out error falls without an effect that does harm
 USE = 0.003  # share by which the error on seen and held-out records together has to rise without an effect of use
 
@@ -31,7 +32,7 @@ def admitted(
     while found.best.added:
         faint = next((label for label in found.best.added if _faint(found, label)), None)
         slim = _without(found, faint, pool) if faint is not None else None
-        if slim is not None:
+        if slim is not None and slim.fit.chi2 - found.fit.chi2 < NEEDED:
             found = slim
             dropped.append(f"{faint}: its size is within {FAINT:g} standard deviations of its absence")
             continue

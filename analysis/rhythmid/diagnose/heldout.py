@@ -52,7 +52,6 @@ def tail_error(found: Search, trial: Trial) -> float | None:
         return None
     error, spread = 0.0, 0.0
     for output, one in zip(outputs, run.series):
-        measured = one.averaged
-        error += float(np.sum((output - measured)[~one.used] ** 2))
-        spread += float(np.sum((measured[~one.used] - measured.mean()) ** 2))
+        error += float(np.sum((output - one.averaged)[~one.used] ** 2))
+        spread += one.power(~one.used)
     return math.sqrt(error / spread) if spread > 0 else None

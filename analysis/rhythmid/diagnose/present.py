@@ -156,6 +156,7 @@ def _runs(
                 hidden=np.zeros_like(one.used) if heldout else _hidden(one),
                 heldout=heldout,
                 quiet=_quiet(one),
+                size=None if one.observer is None else one.observer.size,
             )
         )
     return found

@@ -167,7 +167,20 @@ def _fit_proposal(
     if not best.converged:
         more = BRIEF - SKETCH
         best = descend(best.model, run, names, noise, best.starts, more, None, TOLERANCE, best.differences)
+    flat = _flat(best, proposal)
+    if flat:
+        back = best.model.with_values({name: proposal.guesses[0][name] for name in flat})
+        again = descend(back, run, names, noise, best.starts, BRIEF, None, TOLERANCE)
+        best = min(best, again, key=lambda end: end.chi2)
     return _outcome(best)
+
+
+def _flat(end: Descent, proposal: Proposal) -> list[str]:
+    """Parameters of the added element that have wandered to where they change nothing: a step large enough to be felt is
+    larger than their value. What they did before, when the others were still wrong, says nothing against them now."""
+    steps = dict(zip(end.model.free, end.differences[0]))
+    guessed = proposal.guesses[0] if proposal.guesses else {}
+    return [name for name in guessed if name in steps and abs(steps[name]) > abs(end.model.value(name))]
 
 
 def _extended(model: Model, run: FreeRun, index: int, start: Array, known: Sequence[str]) -> Array:

@@ -1,14 +1,15 @@
-"""How records are scored: in free run where that means something, else in windows with starts of their own.
+"""How records are scored: in free run where that means something, else tied to the record or in windows.
 
 A free run means nothing where the machine integrates, or where the nominal model loses it altogether: a score along a
-trajectory that the machine never took says nothing of what the model lacks. Windows are made shorter until the model
-follows the machine through them.
+trajectory that the machine never took says nothing of what the model lacks. Where the position of an integrating machine
+and the force on it are known, an observer shows the force that the model lacks; else windows with starts of their own are
+made shorter until the model follows the machine through them.
 """
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -16,8 +17,9 @@ from rhythmid.diagnose.calibrate import Calibration, calibrate, reconstructed
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import LEAST, forgets, periods_long, windows
+from rhythmid.identify.observer import observed
 from rhythmid.identify.output_error import Fit
-from rhythmid.identify.series import Series, hold_out_tail
+from rhythmid.identify.series import Series, bandwidth, hold_out_tail
 from rhythmid.model import Model
 
 FOLLOWS = 0.3  # error below which it follows the machine well enough for a free run
@@ -25,7 +27,10 @@ GAIN = 0.9  # share to which a step to shorter windows has to lower the error
 PATIENCE = 2  # steps without such a gain before no more are tried
 BETTER = 0.6  # share to which all steps together have to: an error that adds up, not one made at once by noise or effect
 SHORTER = 2.0  # factor from one length of windows to the next
+FINE = 0.08  # of a sample rate that an observer's frequency may be
 INTEGRATES = "the model integrates or is unstable, so that a long free run would add up every small disturbance"
+FREE_RUN = "free run"
+TIED = "force, the model tied to the recorded motion by an observer of {0:.2g} Hz: "
 LOSES = "in free run the nominal model loses the machine"
 Tell = Callable[[str], None]
 
@@ -40,13 +45,19 @@ class Scoring:
     words: str
 
     @property
-    def free_run(self) -> bool:
-        return self.words == "free run"
+    def whole(self) -> bool:
+        """Whether records are run through from one start, not window by window."""
+        return not self.words.startswith("windows")
 
     @property
     def error(self) -> float:
         """rms of the residuals that the calibrated model leaves, in the output's unit."""
         return _error(self.calibration.fit)
+
+
+def whole_of(series: Sequence[Series]) -> str:
+    """What errors over these series are a share of, in words."""
+    return "motion" if series[0].observer is None else "driving force"
 
 
 def settle(
@@ -57,18 +68,17 @@ def settle(
     pool: ThreadPoolExecutor | None = None,
     tell: Tell = lambda _: None,
 ) -> Scoring:
-    """Calibrate the nominal model in the longest runs through which it follows the machine.
+    """Calibrate the nominal model in the longest runs through which it follows the machine, or tied to the record.
 
     Without `separate` held-out series the last fifth of every run is held out. Raises InputError when no length works.
     """
     tried: list[Scoring] = []
     idle = 0
     failure: InputError | None = None
-    for length, reason in _ladder(model, series):
-        words = "free run" if math.isinf(length) else _words(length, reason)
-        if not math.isinf(length):
-            tell(f"scoring in {words}")
-        cut, unseen = _cut(series, length), _cut(separate, length)
+    for how in _ladder(model, series):
+        if how.words != FREE_RUN:
+            tell(f"scoring in {how.words}")
+        cut, unseen = how.of(series), how.of(separate)
         if not separate:
             cut, unseen = hold_out_tail(cut)
         try:
@@ -83,7 +93,7 @@ def settle(
             continue
         if calibration.reconstructed:
             unseen = [reconstructed(one) for one in unseen]
-        tried.append(Scoring(calibration, tuple(unseen), words))
+        tried.append(Scoring(calibration, tuple(unseen), how.words))
         if calibration.fit.nrmse() < FOLLOWS:
             break
     if not tried:
@@ -92,22 +102,30 @@ def settle(
     return tried[-1] if tried[-1].error < BETTER * tried[0].error else tried[0]
 
 
-def _cut(series: Sequence[Series], length: float) -> list[Series]:
-    return list(series) if math.isinf(length) else windows(series, length)
+@dataclass(frozen=True)
+class _Way:
+    """A way to score, in `words`, and what it makes `of` series."""
+
+    words: str
+    of: Callable[[Sequence[Series]], list[Series]]
 
 
-def _ladder(model: Model, series: Sequence[Series]) -> Iterator[tuple[float, str]]:
-    """Lengths of windows [s] to try, the longest first, infinite for a free run; with the reason for windows."""
+def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
+    """Ways to try: the longest runs first."""
     try:
         free = forgets(model, series)
     except InputError:
         free = False
     if free:
-        yield math.inf, ""
+        yield _Way(FREE_RUN, list)
+    elif all(one.measured == "position" and one.kind == "force" and one.command is not None for one in series):
+        step = max(one.period * one.block for one in series)
+        frequency = min(max(bandwidth(one.value, one.period) for one in series), FINE / step)
+        yield _Way(TIED.format(frequency) + INTEGRATES, lambda given: observed(given, model, frequency))
     length = float(np.median([periods_long(one) for one in series]))
     shortest = LEAST * max(one.period * one.block for one in series)
     while length >= shortest:
-        yield length, LOSES if free else INTEGRATES
+        yield _Way(_words(length, LOSES if free else INTEGRATES), partial(windows, length=length))
         length /= SHORTER
 
 

@@ -36,6 +36,7 @@ from rhythmid.diagnose.screen import (
     under,
 )
 from rhythmid.elements.catalogue import Catalogue
+from rhythmid.elements.element import Element
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.free_run import accurate
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
@@ -320,8 +321,11 @@ def _defend(
         slim = best.model.without(label)
         for name in sorted(names - {best.element(other).name for other in best.added}):
             starts = _starts_for(catalogue, name, series, slim, rounds, 8 if name in family else 1)
-            if starts and tuple(sorted((*rest, name))) not in trials:
-                swaps.append(propose(slim, catalogue[name], starts, rest))
+            if starts and name in family:  # a special case of the best is at its best close to it
+                starts.insert(0, starts[0] | _shared(best, label, catalogue[name]))
+            elif not starts or tuple(sorted((*rest, name))) in trials:
+                continue
+            swaps.append(propose(slim, catalogue[name], starts, rest))
     found = run(swaps)
     earlier = [t for t in trials.values() if t.added and _stands_for(t, best)]
     simpler = [t for t in [*found, *under_noise(earlier, series, noise, step)] if _simpler(t, best)]
@@ -331,6 +335,12 @@ def _defend(
     elif simpler:
         best = min(simpler, key=lambda t: (t.free, t.bic()))
     return best, tried
+
+
+def _shared(trial: Trial, label: str, element: Element) -> dict[str, float]:
+    """Values of the parameters that another element has by the same names as the one under the label."""
+    own = {parameter.name for parameter in element.parameters}
+    return {p.name: trial.model.value(f"{label}.{p.name}") for p in trial.element(label).parameters if p.name in own}
 
 
 def _rest(trial: Trial, label: str) -> tuple[str, ...]:

@@ -53,7 +53,9 @@ def summary_of(
     plain: FitQuality,
     augmented: FitQuality,
     twins: Sequence[tuple[str, ...]],
+    whole: str,
 ) -> str:
+    """The verdict in a sentence or two; `whole` is what errors are a share of."""
     if verdict == "consistent":
         return "Nothing is missing: with its parameters refitted, the nominal model explains the records down to the noise."
     names = " and ".join(effect.element.replace("_", " ") for effect in missing)
@@ -63,7 +65,7 @@ def summary_of(
             said = f"The model lacks {names} (or, indistinguishable here, {', '.join(' / '.join(g[1:]) for g in twins)})."
         before, after = plain.heldout_nrmse, augmented.heldout_nrmse
         if before is not None and after is not None:
-            said += f" With it, the error on held-out data falls from {100 * before:.2f} % to {100 * after:.2f} % of the motion."
+            said += f" With it, the error on held-out data falls from {100 * before:.2f} % to {100 * after:.2f} % of the {whole}."
         return said
     if verdict == "undecided":
         return f"Undecided: {reason}." + (f" Best so far: {names}." if names else "")

@@ -11,6 +11,7 @@ from scipy.interpolate import PPoly
 from rhythmid.compiled import Compiled, InputKind, OutputKind, compile_model
 from rhythmid.elements.element import STEP
 from rhythmid.errors import InputError
+from rhythmid.identify.observer import tied, with_observer
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.signal import impulse_preserving, pieces
@@ -68,6 +69,8 @@ class FreeRun:
             knots = knots.copy()
             knots[1:-1] += late if varies else late[0]
         out = np.empty((len(times), self.states + 2))
+        if one.observer is not None:
+            disturbance = one.observer.disturbance(float(np.mean(one.centres - times)), disturbance)
         force = NO_SIGNAL if disturbance is None else pieces(disturbance)
         done = compiled.run(
             times, knots, coefficients, *given.forcing, *force,
@@ -153,9 +156,11 @@ def prepare_run(
     smooth = not _sees_steps(model) and all(i.smooth is not None or len(i.command[0]) <= 2 for i in inputs)
     if not smooth:
         inputs = tuple(replace(i, smooth=None) for i in inputs)
+    observer = next((one.observer for one in series), None)
+    whole, disturbed = with_observer(model, observer), disturbed or observer is not None
     return FreeRun(
-        compile_model(model, disturbed, excited, smooth, measured),
-        lambda: compile_model(model, disturbed, excited, measured=measured),
+        tied(compile_model(whole, disturbed, excited, smooth, measured), observer),
+        lambda: tied(compile_model(whole, disturbed, excited, measured=measured), observer),
         tuple(series),
         inputs,
         max_step or min(one.period * one.block for one in series),

@@ -6,11 +6,13 @@ taken for white makes every test shout; whitening makes least squares the maximu
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+TINY = 1e-12  # of a variance that a predictor leaves, at least
 
 
 @dataclass(frozen=True)
@@ -37,13 +39,33 @@ class NoiseModel:
         """Spectral density at zero frequency: what slow averages of the noise scatter with."""
         return float(self.std**2 / (1.0 - self.coefficients.sum()) ** 2)
 
+    @cached_property
+    def _beginnings(self) -> tuple[tuple[Array, float], ...]:
+        """Predictors of the orders 0 … p − 1 and the standard deviations that they leave, by the recursion run backwards."""
+        found: list[tuple[Array, float]] = []
+        a, std = self.coefficients, self.std
+        while len(a):
+            reflection = float(a[-1])
+            rest = max(1.0 - reflection**2, TINY)
+            a, std = (a[:-1] + reflection * a[-2::-1]) / rest, std / rest**0.5
+            found.append((a, std))
+        return tuple(reversed(found))
+
     def whiten(self, samples: Array) -> Array:
-        """Innovations in units of their standard deviation; (n,) or (n, q) -> (n − p, …)."""
-        p = self.order
-        white = samples[p:].copy()
+        """Innovations in units of their standard deviations; (n,) or (n, q) of the same shape.
+
+        The first p samples are predicted from as many as there are before them, which makes the sum of squares that of
+        the exact likelihood: no part of a stretch is free.
+        """
+        p, n = self.order, len(samples)
+        white = np.empty_like(samples, dtype=float)
+        for k, (predictor, std) in enumerate(self._beginnings[:n]):
+            white[k] = (samples[k] - predictor @ samples[:k][::-1]) / std
+        after = samples[p:].astype(float)
         for lag, coefficient in enumerate(self.coefficients, start=1):
-            white -= coefficient * samples[p - lag : len(samples) - lag]
-        return white / self.std
+            after -= coefficient * samples[p - lag : n - lag]
+        white[p:] = after / self.std
+        return white
 
 
 def runs(used: NDArray[np.bool_]) -> list[slice]:

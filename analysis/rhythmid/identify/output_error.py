@@ -80,9 +80,8 @@ def normalised_error(residuals: Sequence[Array], series: Sequence[Series], unuse
         mask = ~one.used if unused else one.used
         if not mask.any():
             continue
-        measured = one.averaged
         error += float(np.sum(residual[mask] ** 2))
-        spread += float(np.sum((measured[mask] - measured.mean()) ** 2))
+        spread += one.power(mask)
     return math.sqrt(error / spread) if spread > 0 else math.nan
 
 
@@ -202,7 +201,8 @@ def descend(
 ) -> Descent:
     """Levenberg-Marquardt from the model's own values.
 
-    Stops when a further step lowers chi2, or promises to lower it, by less than `tolerance` (or 1e-7 of itself). `differences`
+    Stops when a further step lowers chi2, or promises to lower it, by less than `tolerance` (less where the noise model turns
+    out to be too wide) or 1e-7 of itself. `differences`
     are steps known from another descent of the same structure; without them they are sought. Raises InputError when
     the model diverges at its initial values.
     """
@@ -230,6 +230,7 @@ def descend(
     priors = [model.parameters[name].prior for name in names]
     blocked = np.zeros(len(names), bool)
     here: Linearisation | None = None
+    samples = sum(len(problem.whitened(i, r)) for i, r in enumerate(residuals))
     for _ in range(iterations):
         here, states, steps, state_steps_next = problem.linearise(model, current, residuals, steps, state_steps)
         jacobian, residual = here.jacobian, here.residual
@@ -259,7 +260,8 @@ def descend(
                 change = state_update(state, ahead)
                 moved.append(start + change * state_steps)
                 promised += float(np.sum((ahead + state @ change) ** 2))
-            if whole and damping <= 1e-6 and cost - promised < max(tolerance, 1e-7 * cost):
+            enough = max(tolerance * min(1.0, cost / samples), 1e-7 * cost)
+            if whole and damping <= 1e-6 and cost - promised < enough:
                 converged, message = True, "converged"
                 break
             trial_residuals = problem.residuals(trial, moved)
@@ -270,7 +272,7 @@ def descend(
                 residuals, here = trial_residuals, None
                 damping = max(damping * 0.1, 1e-12)
                 improved = True
-                if gain < tolerance or gain < 1e-7 * cost:
+                if gain < enough:
                     converged, message = True, "converged"
                 break
             damping = max(damping * 10.0, 1e-6)
@@ -290,7 +292,7 @@ def descend(
         starts=tuple(current),
         residuals=tuple(residuals),
         chi2=float(sum(np.sum(w**2) for w in white)),
-        samples=sum(len(w) for w in white),
+        samples=samples,
         converged=converged,
         message=message,
         at_bound=tuple(name for name, stuck in zip(names, blocked) if stuck),

@@ -17,6 +17,7 @@ from scipy.interpolate import PPoly
 from rhythmid.compiled import InputKind, OutputKind
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
+from rhythmid.identify.observer import Observer
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.signal import continuous, spline
@@ -33,7 +34,7 @@ class Series:
     `time` (n,) [s] and `value` (n,) are the stamps and samples of the measurement; `block` samples are averaged into
     one; `used` (n // block,) marks the averages that the fit may see; `period` [s] is the usual sample period.
     `ignored` (n // block, q) are signals any multiple of which the averages may contain, so that nothing is learnt from
-    them (the limit cycle's harmonics, where the cycle is not to be used).
+    them (the limit cycle's harmonics, where the cycle is not to be used). `observer` ties simulations to the record.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Series:
     kind: InputKind = "force"
     measured: OutputKind = "position"
     ignored: Array | None = None
+    observer: Observer | None = None
 
     @property
     def blocks(self) -> int:
@@ -82,6 +84,13 @@ class Series:
     def averaged(self) -> Array:
         """Block averages of the measurement."""
         return self.average(self.value)
+
+    def power(self, chosen: Mask) -> float:
+        """Sum of squares over the chosen averages that an error is a share of: of the motion, or where an observer holds the
+        simulation, of what the driving force would stretch it by."""
+        if self.observer is not None:
+            return float(chosen.sum()) * self.observer.size**2
+        return float(np.sum((self.averaged[chosen] - self.averaged.mean()) ** 2))
 
 
 def _extended(samples: Array, count: int) -> Array:

@@ -85,7 +85,7 @@ def _words(found: Findings) -> str:
     if ". " in summary:
         return summary
     detection = result["detection"]
-    said = f"{sentence(summary)} The refitted model's error is {percent(detection['refitted_nominal_nrmse'])} of the motion"
+    said = f"{sentence(summary)} The refitted model's error is {percent(detection['refitted_nominal_nrmse'])} of the {found.whole}"
     if found.noise is not None:
         said += f"; noise alone would make {percent(detection['noise_floor_nrmse'])}"
     return f"{said}."
@@ -115,14 +115,14 @@ def _tiles(found: Findings) -> Tiles:
         if found.repaired:
             value += f" → {percent(held[1], after.half if after else None)}"
         tiles.append(
-            Tile("error on held-out data, of the motion", value, "before → after" if found.repaired else "")
+            Tile(f"error on held-out data, of the {found.whole}", value, "before → after" if found.repaired else "")
         )
     if found.noise is not None:
         tiles.append(
             Tile(
                 "least possible: noise alone",
                 percent(detection["noise_floor_nrmse"]),
-                "of the motion in the fitted records, by what repeats in them",
+                f"of the {found.whole} in the fitted records, by what repeats in them",
             )
         )
     if result["verdict"] == "missing_physics":
@@ -189,7 +189,7 @@ def _better(found: Findings) -> Section:
     if found.repaired:
         lead = (
             f"In the records used for the fit the error goes from {percent(fit['refitted_nominal']['train_nrmse'])} to "
-            f"{percent(fit['augmented']['train_nrmse'])} of the motion"
+            f"{percent(fit['augmented']['train_nrmse'])} of the {found.whole}"
         )
         if fit["augmented"]["heldout_nrmse"] is not None:
             lead += (
@@ -197,7 +197,7 @@ def _better(found: Findings) -> Section:
                 f"{percent(fit['augmented']['heldout_nrmse'])}"
             )
     else:
-        lead = f"The refitted nominal model's error is {percent(fit['refitted_nominal']['train_nrmse'])} of the motion"
+        lead = f"The refitted nominal model's error is {percent(fit['refitted_nominal']['train_nrmse'])} of the {found.whole}"
         if fit["refitted_nominal"]["heldout_nrmse"] is not None:
             lead += f", and {percent(fit['refitted_nominal']['heldout_nrmse'])} on data that no fit has seen"
     scoring = result.get("scoring") or "free run"

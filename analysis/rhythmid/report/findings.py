@@ -114,6 +114,11 @@ class Findings:
     hints: tuple[tuple[str, str, str], ...] = ()
 
     @property
+    def whole(self) -> str:
+        """What errors are a share of, in words."""
+        return "motion" if self.runs[0].size is None else "driving force"
+
+    @property
     def repaired(self) -> bool:
         """Whether anything was added to the nominal model."""
         return bool(self.result["missing"])

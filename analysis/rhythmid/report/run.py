@@ -34,6 +34,7 @@ class Run:
     hidden : bool[n] samples of a record that the fit was not shown although it saw the rest.
     heldout : whether no fit has seen this record.
     quiet : whether nothing but the forcing drove the machine.
+    size : what an error is a share of, where that is not the measured motion [the output's unit].
     labels : what `before` and `after` are called in figures.
     """
 
@@ -49,6 +50,7 @@ class Run:
     hidden: Mask
     heldout: bool = False
     quiet: bool = False
+    size: float | None = None
     labels: tuple[str, str] = ("refitted nominal model", "with the added effect")
 
     def residual(self, which: Which) -> Array:
@@ -64,7 +66,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Error:
-    """rms of a residual, the same relative to the motion's standard deviation, and the half-width of the 95 % interval
+    """rms of a residual, the same as a share of the motion's standard deviation (or of the run's `size`), and the half-width of the 95 % interval
     of that ratio: how much it would differ in another stretch of the same kind."""
 
     rms: float
@@ -81,7 +83,10 @@ def error_of(runs: Sequence[Run], which: Which, hidden: bool = False) -> Error |
         if not mask.any():
             continue
         squares.append(run.residual(which)[mask] ** 2)
-        spread += float(np.sum((run.measured[mask] - run.measured[mask].mean()) ** 2))
+        if run.size is None:
+            spread += float(np.sum((run.measured[mask] - run.measured[mask].mean()) ** 2))
+        else:
+            spread += run.size**2 * int(mask.sum())
     if not squares or spread <= 0.0:
         return None
     joined = np.concatenate(squares)

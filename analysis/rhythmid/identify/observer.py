@@ -1,0 +1,113 @@
+"""Force scoring: the recorded motion draws the simulated machine along, through a spring and a damper.
+
+D. G. Luenberger, IEEE Trans. Autom. Control 16 (1971) 596. Where a machine integrates, or sticks and slips, a free run adds
+up every small disturbance until it means nothing. Tied to the record it cannot get far: what it stays behind by is the
+force that the model lacks, seen through 1 / (m s² + d s + k). This is inverse dynamics without a derivative of the
+measurement: force and simulation are compared below the observer's bandwidth, and all else goes on as in a free run.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PPoly
+
+from rhythmid.compiled import Compiled
+from rhythmid.elements.element import Element, Parameter
+from rhythmid.model import Model
+from rhythmid.signal import shifted, spline
+
+if TYPE_CHECKING:
+    from rhythmid.identify.series import Series
+
+Array = NDArray[np.float64]
+
+
+def _kernel(x, v, t, f, stiffness, damping):
+    return -stiffness * x - damping * v
+
+
+OBSERVER = Element(
+    name="observer",
+    slot="force",
+    title="Observer",
+    equation="F = −k x − d v, beside the recorded motion's k y + d ẏ",
+    parameters=(Parameter("stiffness", "N/m", "stiffness k"), Parameter("damping", "N*s/m", "damping d")),
+    kernel=_kernel,
+    acts="body",
+    candidate=False,
+    reference="D. G. Luenberger, IEEE Trans. Autom. Control 16 (1971) 596",
+)
+
+
+@dataclass(frozen=True)
+class Observer:
+    """A spring [N/m] and a damper [N s/m] from the simulated machine to the recorded motion, whose `pull` [N] is a function
+    of the measurement's stamps [s]. By `size` [m] the driving force (rms) would stretch the spring."""
+
+    stiffness: float
+    damping: float
+    pull: PPoly
+    size: float
+
+    def disturbance(self, late: float, further: PPoly | None = None) -> PPoly:
+        """Force on the mass [N] over physical time, the measurement being `late` [s] behind it, and a further one."""
+        moved = shifted(self.pull, -late)
+        return moved if further is None else _sum(moved, further)
+
+
+def observed(series: "Sequence[Series]", model: Model, frequency: float) -> "list[Series]":
+    """The series, position measured, each tied to its record by a critically damped observer of this frequency [Hz]."""
+    omega = 2.0 * math.pi * frequency
+    stiffness, damping = model.mass.value * omega**2, 2.0 * model.mass.value * omega
+    found = []
+    for one in series:
+        motion = spline(one.centres, _at_centres(one.averaged, one.block))
+        rate = motion.derivative()
+        cubic = np.vstack([np.zeros((1, rate.c.shape[1])), rate.c])
+        pull = PPoly(stiffness * motion.c + damping * cubic, motion.x, extrapolate=True)
+        effort = sum((part(one.centres) for part in (one.command, one.forcing) if part is not None), np.zeros(one.blocks))
+        size = float(np.std(effort)) / stiffness
+        found.append(replace(one, observer=Observer(stiffness, damping, pull, size)))
+    return found
+
+
+def _at_centres(averages: Array, block: int) -> Array:
+    """Values in the middle of blocks from their averages, which a bent motion moves by a 24th of its second difference."""
+    bend = np.zeros_like(averages)
+    bend[1:-1] = np.diff(averages, 2)
+    return averages - (1.0 - 1.0 / block**2) / 24.0 * bend
+
+
+def with_observer(model: Model, observer: Observer | None) -> Model:
+    """The model as it is simulated over a series with this observer."""
+    if observer is None:
+        return model
+    return model.with_element(OBSERVER, {"stiffness": observer.stiffness, "damping": observer.damping}, fixed=True)
+
+
+def tied(compiled: Compiled, observer: Observer | None) -> Compiled:
+    """The structure of a model `with_observer`, for parameter vectors of the model without it."""
+    if observer is None:
+        return compiled
+    known = {"observer.stiffness": observer.stiffness, "observer.damping": observer.damping}
+    parameters = tuple((name, known.get(name, default)) for name, default in compiled.layout.parameters)
+    return replace(compiled, layout=replace(compiled.layout, parameters=parameters))
+
+
+def _sum(first: PPoly, second: PPoly) -> PPoly:
+    """The sum of two piecewise polynomials, on the pieces of both."""
+    knots = np.unique(np.concatenate([first.x, second.x]))
+    return PPoly(_on(first, knots) + _on(second, knots), knots, extrapolate=True)
+
+
+def _on(signal: PPoly, knots: Array) -> Array:
+    """Coefficients (4, n − 1) of a signal of degree three at most on finer knots (n,)."""
+    coefficients = np.zeros((4, len(knots) - 1))
+    for order, scale in enumerate((1.0, 1.0, 0.5, 1.0 / 6.0)):
+        part = signal if order == 0 else signal.derivative(order)
+        coefficients[3 - order] = scale * part(knots[:-1])
+    return coefficients
