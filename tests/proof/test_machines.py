@@ -15,6 +15,7 @@ from rhythmid.diagnose.diagnosis import Answer, diagnose
 from rhythmid.model import Model
 
 NAMED: dict[str, Callable[[], Twin]] = {
+    "axis under a controller, sticking and slipping, driven by its motor's effort": lambda: twins.axis(duration=8.0),
     "joint driven by a current, velocity measured": twins.joint,
     "pendulum driven through large swings": twins.pendulum,
     "servo of which only command and motion are known": twins.servo,
@@ -26,7 +27,6 @@ NULLS: dict[str, Callable[[], Twin]] = {
     "film at 30 Hz": lambda: twins.camera(""),
 }
 SLOW: dict[str, Callable[[], Twin]] = {
-    "axis driven by its motor's effort": twins.axis,
     "axis in closed loop from its reference": lambda: twins.axis(known="reference"),
     "pendulum, free decay": lambda: twins.pendulum(driven=False),
     "rig, base displacement": twins.rig,
@@ -70,11 +70,11 @@ def test_a_machine_that_lacks_nothing_is_told_so(name):
     assert (result.verdict, result.missing) == ("consistent", ())
 
 
-def test_a_machine_that_integrates_is_scored_in_windows_and_it_is_said():
+def test_a_machine_that_integrates_is_scored_by_force_and_it_is_said():
     twin = twins.axis(friction=0.0, count=1, duration=6.0)
     answer = examined(twin)
-    assert "multiple shooting" in answer.diagnosis.scoring and "integrates" in answer.diagnosis.scoring
-    assert answer.diagnosis.heldout == "held out: the last fifth of every window"
+    assert "force" in answer.diagnosis.scoring and "integrates" in answer.diagnosis.scoring
+    assert answer.diagnosis.heldout == "held out: the last fifth of every record"
     assert answer.diagnosis.parameters["inertia.mass"].value == pytest.approx(2.0, rel=1e-3)
     assert answer.diagnosis.parameters["viscous_damper.damping"].value == pytest.approx(8.0, rel=1e-3)
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
@@ -29,6 +30,16 @@ def test_whitening_leaves_innovations_of_unit_variance():
     white = noise.whiten(coloured(np.random.default_rng(2), [1.2, -0.5], 0.3, 50_000)[500:])
     assert np.std(white) == pytest.approx(1.0, rel=0.02)
     assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 0.02
+
+
+def test_whitening_gives_the_sum_of_squares_of_the_exact_likelihood():
+    noise = NoiseModel(np.array([1.2, -0.5]), 0.3)
+    impulse = lfilter([1.0], [1.0, -1.2, 0.5], np.r_[1.0, np.zeros(400)])
+    covariance = [noise.std**2 * float(impulse[k:] @ impulse[: len(impulse) - k]) for k in range(9)]
+    samples = np.random.default_rng(3).standard_normal(9)
+    independent = solve_triangular(cholesky(toeplitz(covariance), lower=True), samples, lower=True)
+    assert noise.whiten(samples) == pytest.approx(independent, abs=1e-9)
+    assert noise.whiten(samples[:1]) == pytest.approx(samples[:1] / noise.variance**0.5, rel=1e-3)
 
 
 def test_variance_and_long_run_variance_match_the_closed_form_of_a_first_order_process():
