@@ -3,7 +3,8 @@
 The classical fourth-order Runge-Kutta method (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential
 Equations I, section II.1) with a fixed largest step. A step never crosses a sample time or a jump of the command, so
 its order holds for held commands; where a damper switches, the force is continuous and only its slope jumps, which
-costs a local error of second order in a step too short to matter (tested against an adaptive reference).
+costs a local error of second order in a step too short to matter (tested against an adaptive reference). What elements
+remember changes at the two ends of a step, the second of which takes one more evaluation.
 
 The source text of every kernel goes into the generated module; `machine_code` compiles it, or knows it from before.
 """
@@ -18,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.elements.element import STEP, Element
+from rhythmid.elements.element import ELAPSED, STEP, Element
 from rhythmid.errors import InputError
 from rhythmid.machine_code import load_module
 from rhythmid.model import INERTIA, Model, Term
@@ -33,12 +34,13 @@ class Layout:
     """Where everything stands in the compiled function's arrays.
 
     `parameters[i]` is the model parameter at index i of the parameter vector, with its value when the model lacks it;
-    `states` names the state vector: position, velocity, then the elements' own states. An output row holds the states,
-    then the sensor's output, then the total actuator force.
+    `states` names the state vector: position, velocity, then the elements' own states and memories; `memories` are the
+    places of the latter. An output row holds the states, then the sensor's output, then the total actuator force.
     """
 
     parameters: tuple[tuple[str, float | None], ...]
     states: tuple[str, ...]
+    memories: tuple[int, ...] = ()
 
     def vector(self, model: Model) -> NDArray[np.float64]:
         """Parameter vector of a model with this structure."""
@@ -85,6 +87,7 @@ class _Writer:
     def __init__(self) -> None:
         self.parameters: dict[str, float | None] = {INERTIA: None}
         self.states = ["position", "velocity"]
+        self.memories: list[int] = []
         self.lines: list[str] = []
         self.drive: list[str] = []  # depends on time alone, so it is computed once for equal times
 
@@ -99,9 +102,12 @@ class _Writer:
         values = [self._parameter(f"{term.label}.{parameter.name}") for parameter in element.parameters]
         values += [self._parameter(source, default) for source, default in element.borrows.values()]
         states, rates = [], []
-        for state in element.states:
+        for state in element.own:
             states.append(f"s{len(self.states)}")
             rates.append(f"d{len(self.states)}")
+            if state in element.memories:
+                self._parameter(ELAPSED, 1e-3)
+                self.memories.append(len(self.states))
             self.states.append(f"{term.label}.{state}")
         targets = ", ".join([result, *rates])
         self.lines.append(f"{targets} = {element.name}({', '.join([*arguments, *values, *states])})")
@@ -119,7 +125,7 @@ def _right_hand_side(
         writer.call(term, ["f", "s0", "s1", "t"] if term.element.acts == "feedback" else ["f", "t"], "f")
     writer.lines.append("f = f + w")
     for term in (term for term in force if term.element.acts == "drive"):
-        if term.element.states:
+        if term.element.own:
             raise InputError(f"element {term.label!r}: a drive depends on time alone and cannot have states")
         writer.call(term, ["t"], "part")
         writer.drive += [writer.lines.pop(), "w = w + part"]
@@ -161,7 +167,7 @@ def generate(
     `measured` is what the sensor sees; an acceleration is the mass's own, whatever the base does.
     """
     writer = _right_hand_side(terms, excited, disturbed, measured)
-    n = len(writer.states)
+    n, memories = len(writer.states), writer.memories
     p = ", ".join(f"p{i}" for i in range(len(writer.parameters)))
     s = ", ".join(f"s{i}" for i in range(n))
     total = "absolute - u" if excited == "base_acceleration" else "absolute"
@@ -182,12 +188,14 @@ def generate(
             *([f"x = {at} - td; d = ((g3 * x + g2) * x + g1) * x + g0"] if disturbed else []),
         ]
 
-    def stage(number: int, time: str, weight: str) -> str:
-        at = [f"s{i}" if number == 1 else f"s{i} + {weight} * a{number - 1}_{i}" for i in range(n)]
+    def stage(number: int, time: str, weight: str, elapsed: str) -> str:
+        at = [f"s{i} + {weight} * a{number - 1}_{i}" if weight and i not in memories else f"s{i}" for i in range(n)]
         targets = ", ".join([*(f"a{number}_{i}" for i in range(n)), "y", "f"])
         arguments = ", ".join([time, *known.split(", ")[1:], *at])
-        return f"{targets} = rhs({arguments}, {p})"
+        given = ", ".join(elapsed if name == ELAPSED else f"p{i}" for i, name in enumerate(writer.parameters))
+        return f"{targets} = rhs({arguments}, {given})"
 
+    remember = [f"s{i} = a1_{i}" for i in memories]
     piece_u = "tu = ku[i]; c0 = cu[0, i]; c1 = cu[1, i]; c2 = cu[2, i]; c3 = cu[3, i]"
     piece_w = "tw = kw[j]; e0 = cw[0, j]; e1 = cw[1, j]; e2 = cw[2, j]; e3 = cw[3, j]"
     piece_d = "td = kd[l]; g0 = cd[0, l]; g1 = cd[1, l]; g2 = cd[2, l]; g3 = cd[3, l]"
@@ -198,20 +206,22 @@ def generate(
         following += ["while kd[l + 1] <= t:", "    l += 1", piece_d]
     find = ["while ku[i + 1] <= t:", "    i += 1", piece_u, *following]
     step = [  # the stages at the half step share their inputs, and so do the end of a step and the next one's begin
-        stage(1, "t", ""),
+        stage(1, "t", "", "0.0"),
+        *remember,  # a jump of the command
         *inputs("t + half"),
-        stage(2, "t + half", "half"),
-        stage(3, "t + half", "half"),
+        stage(2, "t + half", "half", "half"),
+        stage(3, "t + half", "half", "half"),
         "t = begin + (substep + 1) * h",
         *following,
         *inputs("t"),
-        stage(4, "t", "h"),
-        *(f"s{i} = s{i} + h / 6.0 * (a1_{i} + 2.0 * (a2_{i} + a3_{i}) + a4_{i})" for i in range(n)),
+        stage(4, "t", "h", "h"),
+        *(f"s{i} = s{i} + h / 6.0 * (a1_{i} + 2.0 * (a2_{i} + a3_{i}) + a4_{i})" for i in range(n) if i not in memories),
+        *([stage(1, "t", "", "h"), *remember] if memories else []),
     ]
     record = [
         *find,
         *inputs("t"),
-        f"{', '.join([*(f'a1_{i}' for i in range(n)), 'y', 'f'])} = rhs({known}, {s}, {p})",
+        stage(1, "t", "", "0.0"),
         *(f"out[k, {i}] = s{i}" for i in range(n)),
         f"out[k, {n}] = y",
         f"out[k, {n + 1}] = f",
@@ -264,7 +274,7 @@ def run(times, ku, cu, kw, cw, kd, cd, parameters, start, max_step, out):
             return k
     return times.shape[0]
 '''
-    return text, Layout(tuple(writer.parameters.items()), tuple(writer.states))
+    return text, Layout(tuple(writer.parameters.items()), tuple(writer.states), tuple(memories))
 
 
 def _key(terms: tuple[Term, ...]) -> Hashable:
@@ -272,7 +282,8 @@ def _key(terms: tuple[Term, ...]) -> Hashable:
     return tuple(
         (
             term.label, term.element.name, term.element.slot, term.element.acts, term.element.states,
-            tuple(term.element.borrows.items()), tuple(parameter.name for parameter in term.element.parameters),
+            term.element.memories, tuple(term.element.borrows.items()),
+            tuple(parameter.name for parameter in term.element.parameters),
             getattr(term.element.kernel, "__code__", None),
         )
         for term in terms
@@ -325,6 +336,8 @@ def generate_rates(terms: tuple[Term, ...], excited: InputKind = "force") -> tup
     known = "t, u, w, 0.0" if excited == "base_displacement" else "t, u, w"
     arguments = ", ".join([known, *(f"states[k, {i}]" for i in range(n)), *(f"parameters[{i}]" for i in range(p))])
     values = [f"p{i} = parameters[{i}]" for i in range(p)]
+    elapsed = [name for name, _ in layout.parameters].index(ELAPSED) if layout.memories else -1
+    follow = [f"out[k, {i}] = (out[k, {i}] - states[k, {i}]) / p{elapsed}" for i in layout.memories]
     right_hand_side = text.split("@njit(\n", 1)[0]
     return f'''{right_hand_side}@njit(
     "int64(float64[::1], float64[::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1])",
@@ -337,7 +350,7 @@ def run(times, command, forcing, states, parameters, out):
         u = command[k]
         w = forcing[k]
 {_indent(writer.drive, 2)}
-        {targets} = rhs({arguments})
+{_indent([f"{targets} = rhs({arguments})", *follow], 2)}
     return times.shape[0]
 ''', layout
 
@@ -352,7 +365,8 @@ def compile_rates(model: Model, excited: InputKind = "force") -> Compiled:
     """The model's right-hand side at given points, for its linearisation.
 
     `run(times (n,), command (n,), forcing (n,), states (n, q), parameters, out (n, q + 2))` fills rows of state rates,
-    sensor output and total actuator force. Signals in the command path are taken as they are, without its delays.
+    sensor output and total actuator force. Signals in the command path are taken as they are, without its delays. A
+    memory's rate is its change over a step of the length that the parameter `ELAPSED` says.
     """
     terms = tuple(term for term in model.terms if term.element.kernel is not None)
     return _rates(_key(terms), _Terms(terms), excited)

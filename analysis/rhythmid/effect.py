@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.compiled import kernel_source
-from rhythmid.elements.element import STEP, Element
+from rhythmid.elements.element import ELAPSED, STEP, Element
 from rhythmid.errors import InputError
 from rhythmid.machine_code import load_module
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-MAX_STEP = 2.5e-4  # [s] for the element's own states
+MAX_STEP = 2.5e-4  # [s] for the element's own states; what it remembers takes one step a sample
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,9 @@ class Path:
 
 def _source(element: Element) -> str:
     p = [f"p{i}" for i in range(len(element.parameters) + len(element.borrows))]
-    s = [f"s{i}" for i in range(len(element.states))]
+    s = [f"s{i}" for i in range(len(element.own))]
+    flowing = len(element.states)  # the first of `s`; the others are remembered
+    sources = [*(parameter.name for parameter in element.parameters), *(source for source, _ in element.borrows.values())]
     if element.slot == "force":
         leading = ["leg"] if element.acts == "modifier" else []
         arguments = ["t"] if element.acts == "drive" else [*leading, "x", "v", "t", "f"]
@@ -45,28 +47,32 @@ def _source(element: Element) -> str:
         arguments, change = ["z", "t"], "value - z"
     rows = ["x", "v", "f", "leg", "z"]
 
-    def call(at: str, number: int, states: list[str]) -> list[str]:
+    def call(at: str, number: int, states: list[str], elapsed: str) -> list[str]:
         sets = "; ".join(f"{name} = {name}0 + {at} * ({name}1 - {name}0)" for name in rows)
         targets = ", ".join(["value", *(f"a{number}_{i}" for i in range(len(s)))])
+        given = [elapsed if source == ELAPSED else name for name, source in zip(p, sources)]
         return [
             sets,
             f"t = begin + {at} * width",
-            f"{targets} = kernel({', '.join([*arguments, *p, *states])})",
+            f"{targets} = kernel({', '.join([*arguments, *given, *states])})",
         ]
 
     def moved(weight: str, number: int) -> list[str]:
-        return [f"{name} + {weight} * a{number}_{i}" for i, name in enumerate(s)]
+        return [f"{name} + {weight} * a{number}_{i}" if i < flowing else name for i, name in enumerate(s)]
 
     body: list[str] = []
     if s:
         inner = [
-            "at = substep / substeps", *call("at", 1, s),
-            "at = (substep + 0.5) / substeps", *call("at", 2, moved("0.5 * h", 1)), *call("at", 3, moved("0.5 * h", 2)),
-            "at = (substep + 1.0) / substeps", *call("at", 4, moved("h", 3)),
-            *(f"{n} = {n} + h / 6.0 * (a1_{i} + 2.0 * (a2_{i} + a3_{i}) + a4_{i})" for i, n in enumerate(s)),
-        ]  # fmt: skip
+            "at = substep / substeps", *call("at", 1, s, "0.0"),
+            "at = (substep + 0.5) / substeps",
+            *call("at", 2, moved("0.5 * h", 1), "0.5 * h"), *call("at", 3, moved("0.5 * h", 2), "0.5 * h"),
+            "at = (substep + 1.0) / substeps", *call("at", 4, moved("h", 3), "h"),
+            *(f"{n} = {n} + h / 6.0 * (a1_{i} + 2.0 * (a2_{i} + a3_{i}) + a4_{i})" for i, n in enumerate(s[:flowing])),
+        ] if flowing else ["at = 1.0"]  # fmt: skip
+        if element.memories:
+            inner += [*call("at", 1, s, "h"), *(f"s{i} = a1_{i}" for i in range(flowing, len(s)))]
         body = [
-            "substeps = max(1, int(math.ceil(width / max_step * (1.0 - 1e-9))))",
+            "substeps = max(1, int(math.ceil(width / max_step * (1.0 - 1e-9))))" if flowing else "substeps = 1",
             "h = width / substeps",
             "for substep in range(substeps):",
             *(f"    {line}" for line in inner),
@@ -75,13 +81,13 @@ def _source(element: Element) -> str:
         "begin = time[k - 1]; width = time[k] - time[k - 1]",
         *(f"{name}0 = path[{i}, k - 1]; {name}1 = path[{i}, k]" for i, name in enumerate(rows)),
         *body,
-        *call("1.0", 1, s),
+        *call("1.0", 1, s, "0.0"),
         f"out[k] = {change}",
     ]
     start = [
         "begin = time[0]; width = 0.0",
         *(f"{name}0 = path[{i}, 0]; {name}1 = path[{i}, 0]" for i, name in enumerate(rows)),
-        *call("0.0", 1, s),
+        *call("0.0", 1, s, "0.0"),
         f"out[0] = {change}",
     ]
     return "\n".join(
@@ -132,8 +138,8 @@ def effect_along(element: Element, values: Mapping[str, float], model: Model, pa
         if value is None:
             raise InputError(f"element {element.name!r}: parameter {parameter.name!r} needs a value")
         parameters.append(value)
-    states = np.zeros(len(element.states))
-    if element.states and element.initial is not None:
+    states = np.zeros(len(element.own))
+    if element.own and element.initial is not None:
         first = path.signal[0] if element.slot == "sensor" else path.position[0]
         given = {p.name: v for p, v in zip(element.parameters, parameters, strict=True)} | borrowed
         signal = path.effort[0] if element.slot == "force" else path.signal[0]

@@ -86,12 +86,12 @@ def start_states(
     start[:2] = position, velocity
     index = {name: i for i, name in enumerate(compiled.layout.states)}
     for term in model.terms:
-        if term.element.states and term.element.initial is not None:
+        if term.element.own and term.element.initial is not None:
             arguments = {n: v.value for n, v in term.values.items()}
             for name, (source, default) in term.element.borrows.items():
                 arguments[name] = model.borrowed(source, default)  # type: ignore[assignment]
             signal = command if term.element.slot == "command" else command + forcing
-            for state, value in zip(term.element.states, term.element.initial(position, velocity, signal, **arguments)):
+            for state, value in zip(term.element.own, term.element.initial(position, velocity, signal, **arguments)):
                 start[index[f"{term.label}.{state}"]] = value
     return start
 

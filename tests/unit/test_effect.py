@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper
+from rhythmid.compiled import compile_model
 from rhythmid.effect import Path, effect_along
 from rhythmid.errors import InputError
 from rhythmid.parallel import fork_map
+from rhythmid.signal import first_order_hold
+from rhythmid.simulate import simulate, start_states
 
 T = np.arange(4000) * 1e-3
 X = 0.2 + 0.01 * np.sin(2 * np.pi * 1.3 * T)
@@ -38,6 +41,15 @@ def test_a_relaxing_force_is_the_filtered_velocity():
 def test_an_actuator_s_effect_is_the_change_of_its_signal():
     got = effect_along(CATALOGUE["actuator_deadband"], {"threshold": 0.1}, hopper(), PATH)
     assert np.abs(got).max() == pytest.approx(0.1, rel=0.05)
+
+
+@pytest.mark.parametrize(("name", "values"), [("backlash", {"width": 0.3}), ("actuator_rate_limit", {"rate": 5.0})])
+def test_what_an_actuator_remembers_along_a_path_is_what_it_does_in_the_simulator(name, values):
+    model = hopper().with_element(CATALOGUE[name], values)
+    run = simulate(model, T, first_order_hold(T, F), None, start_states(model, compile_model(model), 0.2, 0.0, F[0]), 1e-3)
+    got = effect_along(CATALOGUE[name], values, hopper(), PATH)
+    assert got == pytest.approx(run.effort - F, abs=1e-12)
+    assert np.abs(got).max() > 0.1
 
 
 def test_forked_workers_return_every_result_once_and_pass_on_refusals():

@@ -25,6 +25,12 @@ NOISY = plant_model(
     Noise(measurement_std=1e-4, correlation=0.7, quantisation=1e-5),
     CATALOGUE,
 )
+REMEMBERING = plant_model(
+    PAPER.with_element(CATALOGUE["backlash"], {"width": 0.3}).with_element(CATALOGUE["actuator_rate_limit"], {"rate": 300.0}),
+    Forcing(),
+    Noise(),
+    CATALOGUE,
+)
 MS = 1_000_000
 COUNT = 200
 LATE = np.arange(COUNT, dtype=np.int64) * MS + 40_300_001
@@ -44,7 +50,9 @@ def in_one_go(model: Model, initial=(0.15, 0.0)) -> dict[str, np.ndarray]:
     return together([plant.advance((COUNT - 1) * MS)])
 
 
-@pytest.mark.parametrize("model", [HOPPER, NOISY], ids=["hopper", "lag, noise and rounding"])
+@pytest.mark.parametrize(
+    "model", [HOPPER, NOISY, REMEMBERING], ids=["hopper", "lag, noise and rounding", "play and a limit of rate"]
+)
 @given(cuts=some.lists(some.integers(0, (COUNT - 1) * MS), max_size=30), early=some.integers(0, 5 * MS))
 def test_every_chunking_gives_the_same_bits(model, cuts, early):
     """Commands come one by one, as late as they may or earlier; samples are asked for at any time."""

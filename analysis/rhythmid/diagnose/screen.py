@@ -131,7 +131,7 @@ def _body_force(model: Model, time: Array, x: Array, v: Array, f: Array) -> Arra
             element.slot == "force"
             and element.acts == "body"
             and element.kernel is not None
-            and not element.states
+            and not element.own
         ):
             values = {name: value.value for name, value in term.values.items()}
             total += effect_along(element, values, model, Path(time, x, v, f, total, x))

@@ -3,13 +3,15 @@
 A file in `elements/<slot>/` defines one `ELEMENT`. Exactly one of these says what the effect does:
 
 - `kernel`   a pure numeric function of one instant, compiled into the simulator. Its arguments by slot:
-               command, actuator   (f, t, <parameters>, <borrowed>, <states>)            -> new f
+               command, actuator   (f, t, <parameters>, <borrowed>, <states>, <memories>) -> new f
                command, `acts="feedback"`  (f, x, v, t, <parameters>, …)                 -> force, of a controller
-               force               (x, v, t, f, <parameters>, <borrowed>, <states>)      -> force on the mass
+               force               (x, v, t, f, <parameters>, …)                         -> force on the mass
                force, `acts="modifier"`  (leg, x, v, t, f, <parameters>, …)              -> new sum of the leg's forces
                force, `acts="drive"`     (t, <parameters>, …)                            -> added to f before the actuator
-               sensor              (y, t, <parameters>, <borrowed>, <states>)            -> new y
-             A kernel with states returns (result, dstate/dt, …). It may use `math` and nothing else.
+               sensor              (y, t, <parameters>, …)                               -> new y
+             A kernel with states or memories returns (result, dstate/dt, …, new memory, …). It may use `math` and nothing
+             else. A memory is what an operator (play, a limit of rate) remembers: it takes the kernel's new value
+             where an integration step begins and where it ends, and keeps it between. `ELAPSED` is the time since it began.
 - `delay`    (stamps, **parameters) -> seconds; how much later a command acts, or how much older a measurement is
              than its stamp says. Shapes (n,) -> (n,).
 - `sampler`  (rng, **parameters) -> f(stamps, samples) -> samples; what happens to samples one after another
@@ -26,6 +28,7 @@ from numpy.typing import NDArray
 
 Slot = Literal["command", "actuator", "force", "sensor", "timing"]
 STEP = "simulation.step"  # borrowed under this name: the largest integration step [s], which no effect can be faster than
+ELAPSED = "simulation.elapsed"  # borrowed under this name: the time [s] since the integration step began
 SLOTS: tuple[Slot, ...] = ("command", "actuator", "force", "sensor", "timing")
 Acts = Literal["body", "leg", "modifier", "drive", "feedback"]
 Sampler = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
@@ -88,7 +91,7 @@ class Element:
     """One physical effect.
 
     `borrows` maps a kernel argument to (parameter of another element, value when the model has no such element;
-    None makes that element a condition for using this one); `STEP` is always there. `size` names the parameter that
+    None makes that element a condition for using this one); `STEP` and `ELAPSED` are always there. `size` names the parameter that
     measures how much of the effect there is; with it at `absent` the model behaves as without the element, whatever its
     other parameters. `starts` proposes first guesses of physical size from the record's scales, several where the shape
     matters. `special_case_of` names richer elements that contain this one, exactly or in a limit of their parameters;
@@ -109,7 +112,8 @@ class Element:
     sampler: Callable[..., Sampler] | None = None
     acts: Acts = "leg"
     states: tuple[str, ...] = ()
-    initial: Callable[..., tuple[float, ...]] | None = None  # (x, v, f, **parameters) -> states at the start; default 0
+    memories: tuple[str, ...] = ()
+    initial: Callable[..., tuple[float, ...]] | None = None  # (x, v, f, **parameters) -> `own` at the start; default 0
     borrows: Mapping[str, tuple[str, float | None]] = field(default_factory=dict)
     also_known_as: tuple[str, ...] = ()
     family: str = ""
@@ -132,6 +136,11 @@ class Element:
             raise TypeError(f"element {self.name}: needs exactly one of kernel, delay, sampler; has {given}")
         if self.slot not in SLOTS:
             raise TypeError(f"element {self.name}: slot {self.slot!r} is none of {', '.join(SLOTS)}")
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        """What it adds to the state vector: its states, then its memories."""
+        return (*self.states, *self.memories)
 
     def parameter(self, name: str) -> Parameter:
         """The parameter called `name`; KeyError if there is none."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from rhythmid.elements.catalogue import load_catalogue
-from rhythmid.elements.element import SLOTS, STEP, Element, Parameter
+from rhythmid.elements.element import ELAPSED, SLOTS, STEP, Element, Parameter
 
 SLOT_TITLES = {
     "command": "Command elements, on u",
@@ -63,11 +63,13 @@ def describe(element: Element) -> str:
     facts = []
     if element.size:
         facts.append(f"- Absent at `{element.size}` = {_number(element.absent)}.")
-    borrowed = tuple(source for source, _ in element.borrows.values() if source != STEP)
+    borrowed = tuple(source for source, _ in element.borrows.values() if source not in (STEP, ELAPSED))
     if borrowed:
         facts.append(f"- Uses {_names(borrowed)}.")
     if element.states:
         facts.append(f"- States of its own: {_names(element.states)}.")
+    if element.memories:
+        facts.append(f"- Remembers: {_names(element.memories)}.")
     if element.rotational:
         facts.append("- For rotational machines only.")
     if element.controlled:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from rhythmid.compiled import Compiled, InputKind, compile_model, compile_rates
-from rhythmid.elements.element import STEP
+from rhythmid.elements.element import ELAPSED, STEP
 from rhythmid.errors import InputError
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
@@ -49,11 +49,11 @@ class RightHandSide:
 
 
 def right_hand_side(model: Model, pumping: Pumping, excited: InputKind = "force") -> RightHandSide:
-    """The model's right-hand side under the pumping."""
+    """The model's right-hand side under the pumping; what an element remembers is from `MAX_STEP` before."""
     compiled = compile_rates(model, excited)
     parameters = compiled.layout.vector(model)
     for index, (name, _) in enumerate(compiled.layout.parameters):
-        if name == STEP:
+        if name in (STEP, ELAPSED):
             parameters[index] = MAX_STEP
     return RightHandSide(compiled, parameters, pumping)
 
@@ -65,7 +65,7 @@ class LimitCycle:
     Attributes
     ----------
     time : float64[n + 1] from 0 to T [s], both ends included.
-    states, rates : float64[n + 1, q] state vector and its derivative.
+    states, rates : float64[n + 1, q] state vector and its derivative; of memories, as they were `MAX_STEP` before.
     output : float64[n + 1] what the sensor says.
     monodromy : float64[q, q] Jacobian of the period map; its eigenvalues are the Floquet multipliers.
     closure : distance between the state's two ends, relative to its motion.
@@ -200,6 +200,8 @@ def limit_cycle(
             f"period to the next by {error:.1e} of its size; the machine is not damped or its motion is not periodic"
         )
     jacobian = period_map.jacobian(start, scale)
+    for place in period_map.compiled.layout.memories:  # its rate tells what it became since, see `right_hand_side`
+        states[:, place] = np.interp(grid - MAX_STEP, grid, states[:, place], period=pumping.period)
     rates = right_hand_side(model, pumping, excited)(grid, states[None])[0, :, : len(start)]
     return LimitCycle(
         model, pumping, excited, grid, states, rates, rows[:, len(start)].copy(), jacobian, error

@@ -1,18 +1,21 @@
 """Actuator rate limit: the force changes by at most R per second (slew rate of an amplifier, speed of a valve).
 
-A memory follows the force, at most at the rate R, with the integration step h as time constant; the output leads the
-memory by what one step allows, R h. Where the limit is not reached the output is the input, exactly; a jump of the
-input passes up to R h at once. The actuator starts at the force that is asked for.
+The output moves from its memory towards the force, at most by R times the time that has elapsed. That is exact where
+the input is held or stays on one side of the limit during an integration step, and of second order in the step else. The
+actuator starts at the force that is asked for.
 """
 
+import math
 from math import inf, tau
 
-from rhythmid.elements.element import STEP, Element, Parameter
+from rhythmid.elements.element import ELAPSED, Element, Parameter
 
 
-def kernel(f, t, rate, step, memory):
-    output = memory + max(-rate * step, min(rate * step, f - memory))
-    return output, (output - memory) / step
+def kernel(f, t, rate, elapsed, memory):
+    output = f
+    if abs(f - memory) > rate * elapsed:  # never at an infinite rate
+        output = memory + math.copysign(rate * elapsed, f - memory)
+    return output, output
 
 
 ELEMENT = Element(
@@ -21,9 +24,9 @@ ELEMENT = Element(
     title="Actuator rate limit",
     equation="|ḟ| ≤ R",
     parameters=(Parameter("rate", "N/s", "largest rate R of the force", bounds=(0.0, inf)),),
-    borrows={"step": (STEP, 1e-3)},
+    borrows={"elapsed": (ELAPSED, 1e-3)},
     kernel=kernel,
-    states=("memory",),
+    memories=("memory",),
     initial=lambda x, v, f, **_: (f,),
     size="rate",
     absent=inf,

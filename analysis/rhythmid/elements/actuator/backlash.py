@@ -1,18 +1,17 @@
 """Backlash: the play operator of width b on the actuator force; the output follows only after the gap is crossed.
 
-The play is the projection of its own memory w onto [f - b/2, f + b/2]. The kernel returns this projection exactly and
-lets the memory follow it as fast as the integration step h allows, with h / 1.5 as time constant: the output errs only
-after a reversal, by about h^2 d2f/dt2 / 4. The play starts in the middle, at the force that is asked for.
+The play is the projection of its memory w onto [f - b/2, f + b/2]. That is exact while the force does not turn within an
+integration step h, and errs by at most h^2 d2f/dt2 / 8 where it does. It starts in the middle, at the force asked for.
 """
 
 from math import inf
 
-from rhythmid.elements.element import STEP, Element, Parameter
+from rhythmid.elements.element import Element, Parameter
 
 
-def kernel(f, t, width, step, memory):
+def kernel(f, t, width, memory):
     played = max(f - 0.5 * width, min(f + 0.5 * width, memory))
-    return played, 1.5 * (played - memory) / step
+    return played, played
 
 
 ELEMENT = Element(
@@ -21,9 +20,8 @@ ELEMENT = Element(
     title="Backlash",
     equation="f → w,  w = clip(w₋, f − b/2, f + b/2)",
     parameters=(Parameter("width", "N", "width b of the play", bounds=(0.0, inf)),),
-    borrows={"step": (STEP, 1e-3)},
     kernel=kernel,
-    states=("memory",),
+    memories=("memory",),
     initial=lambda x, v, f, **_: (f,),
     size="width",
     starts=lambda s: [{"width": w * s.effort} for w in (0.05, 0.2) if s.effort > 0.0],

@@ -1,18 +1,21 @@
 """Reference rate limit: a controller's reference follows the command, but changes by at most R per second.
 
-What hobby servos and drives with a set-point ramp do; it limits the speed, not the force. A memory follows the command,
-at most at the rate R, with the integration step h as time constant; the output leads the memory by what one step
-allows, R h. Where the limit is not reached the output is the input, exactly. It starts where the machine is.
+What hobby servos and drives with a set-point ramp do; it limits the speed, not the force. The output moves from its memory
+towards the command, at most by R times the time that has elapsed: exact for a held command. It starts where the machine
+is.
 """
 
+import math
 from math import inf, tau
 
-from rhythmid.elements.element import STEP, Element, Parameter
+from rhythmid.elements.element import ELAPSED, Element, Parameter
 
 
-def kernel(f, t, rate, step, memory):
-    output = memory + max(-rate * step, min(rate * step, f - memory))
-    return output, (output - memory) / step
+def kernel(f, t, rate, elapsed, memory):
+    output = f
+    if abs(f - memory) > rate * elapsed:  # never at an infinite rate
+        output = memory + math.copysign(rate * elapsed, f - memory)
+    return output, output
 
 
 ELEMENT = Element(
@@ -21,9 +24,9 @@ ELEMENT = Element(
     title="Reference rate limit",
     equation="|dr/dt| ≤ R",
     parameters=(Parameter("rate", "m/s", "largest rate R of the reference", bounds=(0.0, inf)),),
-    borrows={"step": (STEP, 1e-3)},
+    borrows={"elapsed": (ELAPSED, 1e-3)},
     kernel=kernel,
-    states=("memory",),
+    memories=("memory",),
     initial=lambda x, v, f, **_: (x,),
     size="rate",
     absent=inf,
