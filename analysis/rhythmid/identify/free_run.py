@@ -128,7 +128,9 @@ def _sees_steps(model: Model) -> bool:
     """Whether an element of the command's path takes a held command otherwise than its smooth stand-in: one with memory
     of extremes, or with a limit of rate."""
     path = [term.element for term in model.terms if term.element.slot in ("command", "actuator")]
-    return any(source == STEP for element in path for source, _ in element.borrows.values())
+    return any(
+        element.memories or any(source == STEP for source, _ in element.borrows.values()) for element in path
+    )
 
 
 def _inputs(one: Series) -> Inputs:
