@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from rhythmid.errors import InputError
-from rhythmid.identify.identify import identify, paper_hopper, with_delays
+from rhythmid.identify.identification import Delays, Estimate, Observables
+from rhythmid.identify.identify import _open, identify, paper_hopper, with_delays
 from rhythmid.model import Model
 from rhythmid.record.signals import Sinusoid
 
@@ -100,3 +101,22 @@ def test_a_silent_record_is_refused(paper_record) -> None:
     assert made.input is not None
     with pytest.raises(InputError, match="silent"):
         identify(replace(made, input=replace(made.input, value=np.zeros(len(made.input)))))
+
+
+@pytest.mark.parametrize(
+    ("gap", "std", "noted"),
+    [(4e-6, 1e-7, False), (-4e-6, 1e-7, False), (4e-5, 1e-6, True), (-4e-5, 1e-6, True), (4e-5, 1e-5, False)],
+)
+def test_a_closure_is_open_beyond_five_deviations_and_a_hundredth_of_a_sample(gap, std, noted) -> None:
+    def seconds(value: float) -> Estimate:
+        return Estimate(value, std, "s")
+
+    z = gap / std
+    seen = Observables(seconds(0.05), seconds(0.09), seconds(0.04 + gap), z)
+    delays = Delays(seconds(0.04), seconds(0.05), seconds(0.09), True, "", closure=z, observables=seen)
+    assert _open(delays, 1e-3) is noted
+
+
+def test_a_closure_that_cannot_be_had_is_not_open() -> None:
+    nothing = Estimate(None, None, "s")
+    assert not _open(Delays(nothing, nothing, nothing, False, ""), 1e-3)

@@ -1,0 +1,98 @@
+"""Free runs over records: delays of the command path in order, stand-ins for held commands, where elements start."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import PPoly
+
+from machines import CATALOGUE, hopper
+from rhythmid.identify.free_run import _delay_of, prepare_run, start_of
+from rhythmid.identify.series import Series
+from rhythmid.model import Model
+from rhythmid.signal import spline, zero_order_hold
+from rhythmid.simulate import simulate
+
+PERIOD, N = 1e-3, 1500
+TIME = PERIOD * np.arange(N)
+COMMAND = zero_order_hold(TIME, np.sin(2 * np.pi * 3.1 * TIME**2))
+FORCING = spline(TIME, np.cos(2 * np.pi * TIME))
+DELAYED = {"input_delay.delay": 0.0133, "measurement_delay.delay": 0.0041}
+
+
+def series(block: int = 1, begin: float = 0.0, command: PPoly | None = COMMAND, forcing: PPoly | None = FORCING) -> Series:
+    """A measurement of nothing, under the command and the forcing."""
+    time = begin + TIME
+    return Series("made", time, np.zeros(N), command, forcing, block, np.ones(N // block, bool), PERIOD)
+
+
+def machine(**elements: dict[str, float]) -> Model:
+    """The hopper, delayed, with these elements."""
+    model = hopper().with_values(DELAYED)
+    for name, values in elements.items():
+        model = model.with_element(CATALOGUE[name], values)
+    return model
+
+
+@pytest.mark.parametrize("block", [1, 5])
+def test_a_delay_and_a_hold_act_as_in_the_simulator(block):
+    model, one = machine(command_hold={"period": 0.0217}), series(block)
+    run = prepare_run(model, [one], 1e-3)
+    start = start_of(model, run, 0, 0.15, 0.1)
+    outputs = run.outputs(model, [start])
+    assert outputs is not None
+    expected = simulate(model, one.centres, COMMAND, FORCING, start, 1e-3).output
+    np.testing.assert_allclose(outputs[0], one.of_block(expected), atol=1e-12)
+
+
+def test_a_command_is_delayed_before_it_waits_for_the_tick():
+    late = _delay_of(machine(command_hold={"period": 0.02}), np.array([0.0, 0.006, 0.008, 0.03]))
+    assert late is not None  # it arrives at 13.3, 19.3, 21.3 and 43.3 ms
+    np.testing.assert_allclose(late, [0.02, 0.014, 0.032, 0.03], atol=1e-12)
+
+
+def test_a_command_never_overtakes_an_earlier_one():
+    jitter = {"std": 0.005, "seed": 3.0}
+    alone = CATALOGUE["command_jitter"].delay
+    assert alone is not None and np.any(np.diff(TIME + alone(TIME, **jitter)) < 0.0)
+    for more in ({}, {"command_hold": {"period": 0.004}}):
+        late = _delay_of(machine(command_jitter=jitter, **more), TIME)
+        assert late is not None and np.all(np.diff(TIME + late) >= 0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("backlash", {"width": 0.2}), ("actuator_rate_limit", {"rate": 5.0}), ("reference_rate_limit", {"rate": 5.0})],
+)
+def test_play_and_rate_limits_see_every_step_of_a_held_command(name, values):
+    run = prepare_run(machine(**{name: values}), [series(5)])
+    assert [given.smooth for given in run.inputs] == [None]
+
+
+@pytest.mark.parametrize(
+    ("name", "values"), [("actuator_saturation", {"limit": 2.0}), ("coulomb_friction", {"force": 0.1, "transition": 0.01})]
+)
+def test_what_remembers_no_extreme_is_driven_by_the_smooth_stand_in(name, values):
+    run = prepare_run(machine(**{name: values}), [series(5)])
+    assert run.inputs[0].smooth is not None
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "state", "forced"),
+    [
+        ("command_lag", {"time_constant": 0.01}, "lagged", 0.0),
+        ("actuator_lag", {"time_constant": 0.01}, "lagged", 1.0),
+        ("backlash", {"width": 0.2}, "memory", 1.0),
+        ("actuator_rate_limit", {"rate": 5.0}, "memory", 1.0),
+    ],
+)
+def test_lags_play_and_rate_limits_start_at_the_signal_that_acts_there(name, values, state, forced):
+    model = machine(**{name: values})
+    run = prepare_run(model, [series(1, 0.4005), series(1, 0.009)])
+    place = run.compiled.layout.states.index(f"{name}.{state}")
+    taken = 0.4005 - DELAYED["measurement_delay.delay"]
+    command, forcing = COMMAND(taken - DELAYED["input_delay.delay"]), FORCING(taken)
+    assert abs(command) > 0.1 and abs(command - COMMAND(taken)) > 0.1
+    start = start_of(model, run, 0, 0.15, -0.3)
+    assert start[:2].tolist() == [0.15, -0.3]
+    assert start[place] == pytest.approx(command + forced * forcing)
+    before = start_of(model, run, 1, 0.15, 0.0)  # 4.9 ms after the first command was sent, none has arrived
+    assert before[place] == pytest.approx(forced * FORCING(0.009 - DELAYED["measurement_delay.delay"]))

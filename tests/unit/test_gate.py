@@ -1,0 +1,50 @@
+"""The gate of free-run error: an effect whose size may as well be nothing is dropped, whatever it predicts."""
+
+import math
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from machines import CATALOGUE, hopper
+from rhythmid.diagnose.gate import _faint, admitted
+from rhythmid.diagnose.refit import Trial
+from rhythmid.diagnose.search import Search
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.output_error import Fit
+
+QUIET = NoiseModel(np.empty(0), 1.0)
+
+
+def found(name: str, values: dict[str, float], size: str, std: float) -> Search:
+    """A search that chose one effect, the size of which has this standard deviation."""
+    model = hopper().with_element(CATALOGUE[name], values)
+    best = Trial((name,), model, (), 100.0, 1000, len(model.free), True, QUIET)
+    none = Trial((), hopper(), (), 110.0, 1000, len(hopper().free), True, QUIET)
+    fit, nominal = SimpleNamespace(model=model, std={f"{name}.{size}": std}), SimpleNamespace(model=hopper(), std={})
+    return Search(cast(Fit, nominal), best, cast(Fit, fit), QUIET, (best, none), (), ())
+
+
+@pytest.mark.parametrize(("std", "faint"), [(0.011, True), (0.2, True), (0.009, False), (1e-4, False)])
+def test_a_size_within_three_standard_deviations_of_absence_is_faint(std, faint):
+    assert _faint(found("coulomb_friction", {"force": 0.03, "transition": 0.01}, "force", std), "coulomb_friction") is faint
+
+
+@pytest.mark.parametrize(("std", "faint"), [(0.011, True), (0.009, False)])
+def test_a_gain_is_measured_from_the_one_that_it_has_where_it_is_absent(std, faint):
+    gain = CATALOGUE["actuator_gain"]
+    assert gain.absent == 1.0
+    assert _faint(found("actuator_gain", {gain.size: 0.97}, gain.size, std), "actuator_gain") is faint
+
+
+@pytest.mark.parametrize("std", [100.0, math.inf])
+def test_a_limit_that_is_absent_at_infinity_is_not_judged_by_its_distance(std):
+    assert not _faint(found("actuator_saturation", {"limit": 2.0}, "limit", std), "actuator_saturation")
+
+
+def test_a_faint_effect_alone_leaves_the_nominal_model_and_is_told():
+    friction = found("coulomb_friction", {"force": 0.03, "transition": 0.01}, "force", 0.02)
+    left, told = admitted(friction, None)
+    assert left.best.added == () and left.fit is friction.nominal
+    assert len(told) == 1 and told[0].startswith("coulomb_friction: its size is within 3 standard deviations")

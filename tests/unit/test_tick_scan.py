@@ -1,0 +1,54 @@
+"""The scan for a drive's own clock: the period of a hold is found where no descent could find it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from machines import CATALOGUE, hopper
+from rhythmid.diagnose.tick_scan import DELAY, PERIOD, scanned
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.series import Series
+from rhythmid.model import Model
+from rhythmid.signal import zero_order_hold
+from rhythmid.simulate import simulate
+
+SAMPLE, DURATION, STEP = 1e-3, 12.0, 2e-3
+TRUE = {DELAY: 0.0130457, PERIOD: 0.0812347}
+NOISE = NoiseModel(np.empty(0), 1e-4)
+
+
+def held(values: dict[str, float]) -> Model:
+    """The hopper with a command hold."""
+    return hopper().with_element(CATALOGUE["command_hold"], {"period": 0.05}).with_values(values)
+
+
+@pytest.fixture(scope="module")
+def case() -> tuple[Series, np.ndarray]:
+    """A record of the hopper under commands of up to 7 Hz, held by its drive, and the state that it begins in."""
+    rng = np.random.default_rng(4)
+    time = SAMPLE * np.arange(round(DURATION / SAMPLE))
+    command = zero_order_hold(time, 0.8 * np.sin(2 * np.pi * 7.0 / (2.0 * DURATION) * time**2))
+    run = simulate(held(TRUE), time, command, None, (0.16, 0.0), STEP)
+    value = run.output + NOISE.std * rng.standard_normal(len(time))
+    return Series("made", time, value, command, None, 1, np.ones(len(time), bool), SAMPLE), run.states[0]
+
+
+def test_the_period_of_a_held_command_is_found_within_ten_microseconds(case):
+    series, start = case
+    mean = TRUE[DELAY] + 0.5 * TRUE[PERIOD]
+    off = held({DELAY: mean, "linear_spring.stiffness": 200.05, "switched_damper.stance": 1.99})
+    best = scanned(off, [series], [start], NOISE, STEP)[0]
+    assert best[PERIOD] == pytest.approx(TRUE[PERIOD], abs=1e-5)
+    assert best[DELAY] + 0.5 * best[PERIOD] == pytest.approx(mean)
+
+
+def test_nothing_is_guessed_without_delay_or_command(case):
+    series, start = case
+    assert scanned(held({DELAY: 0.0}), [series], [start], NOISE, STEP) == []
+    assert scanned(held({DELAY: 0.03}), [replace(series, command=None)], [start], NOISE, STEP) == []
+
+
+def test_nothing_is_guessed_where_a_hold_would_have_to_be_faster_than_the_measurement_shows(case):
+    series, start = case
+    assert scanned(held({DELAY: 0.001}), [series], [start], NOISE, STEP) == []

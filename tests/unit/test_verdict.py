@@ -1,0 +1,66 @@
+"""The verdict: what the records cannot tell apart, and which lines in a residual are unknown physics."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from machines import CATALOGUE, hopper
+from rhythmid.diagnose.refit import Trial
+from rhythmid.diagnose.search import Search
+from rhythmid.diagnose.verdict import twins_of, verdict_of
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.output_error import Fit, normalised_error
+from rhythmid.identify.series import Series
+from rhythmid.model import Model
+
+QUIET = NoiseModel(np.empty(0), 1.0)
+TIME = 5e-3 * np.arange(2000)
+SERIES = Series("made", TIME, np.sin(2 * np.pi * TIME), None, None, 1, np.ones(2000, bool), 5e-3)
+
+
+def trial(base: Model, name: str, **values: float) -> Trial:
+    """A model with one more element, as if it had been fitted."""
+    model = base.with_element(CATALOGUE[name], values)
+    return Trial((name,), model, (), 100.0, 2000, len(model.free), True, QUIET)
+
+
+def test_flight_damping_beside_a_free_switched_damper_is_a_viscous_damper_too():
+    assert twins_of(trial(hopper(), "flight_damping", damping=0.1), []) == [("flight_damping", "viscous_damper")]
+
+
+def test_flight_damping_has_no_twin_where_the_switched_damper_is_known_or_absent():
+    stance = replace(hopper().parameters["switched_damper.stance"], fixed=True)
+    known = hopper().with_parameters({"switched_damper.stance": stance})
+    for base in (known, hopper().without("switched_damper")):
+        assert twins_of(trial(base, "flight_damping", damping=0.1), []) == []
+
+
+def test_a_rival_that_replaces_an_effect_is_its_twin_once_and_never_one_that_contains_it():
+    best = trial(hopper(), "flight_damping", damping=0.1)
+    rivals = [
+        trial(hopper(), "viscous_damper", damping=0.1),
+        trial(hopper(), "quadratic_drag", coefficient=0.1),
+        trial(hopper(), "viscoelastic_relaxation", stiffness=1.0, time_constant=0.1),
+    ]
+    assert twins_of(best, rivals) == [("flight_damping", "viscous_damper", "quadratic_drag")]
+
+
+def fit_of(rest: float, line: float) -> Fit:
+    """A fit that leaves noise of size `rest`, as a share of the motion, and in it a line of this size, at 3.7 Hz."""
+    noise = rest * np.random.default_rng(2).standard_normal(len(TIME))
+    residuals = (np.std(SERIES.value) * (noise + np.sqrt(2.0) * line * np.sin(2 * np.pi * 3.7 * TIME)),)
+    run, power = SimpleNamespace(series=(SERIES,)), float(np.sum(residuals[0] ** 2))
+    made = SimpleNamespace(run=run, residuals=residuals, chi2=power, nrmse=lambda: normalised_error(residuals, run.series))
+    return cast(Fit, made)
+
+
+@pytest.mark.parametrize(("unexplained", "expected"), [(0.1, "missing_physics"), (0.0125, "unknown_physics")])
+def test_a_line_is_unknown_physics_unless_it_is_faint_beside_what_was_explained(unexplained, expected):
+    best = trial(hopper(), "coulomb_friction", force=0.1, transition=0.01)
+    found = Search(fit_of(unexplained, 0.0), best, fit_of(0.01, 0.005), QUIET, (best,), (), ())
+    verdict, why = verdict_of(found, 1e-9, [], [], None, [SERIES])
+    assert verdict == expected
+    assert ("a line at 3.7 Hz remains" in why) is (expected == "unknown_physics")
