@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper
-from rhythmid.diagnose.gate import _faint, admitted
+from rhythmid.diagnose.gate import NEEDED, _faint, admitted
 from rhythmid.diagnose.refit import Trial
 from rhythmid.diagnose.search import Search
 from rhythmid.identify.noise import NoiseModel
@@ -17,12 +17,13 @@ from rhythmid.identify.output_error import Fit
 QUIET = NoiseModel(np.empty(0), 1.0)
 
 
-def found(name: str, values: dict[str, float], size: str, std: float) -> Search:
-    """A search that chose one effect, the size of which has this standard deviation."""
+def found(name: str, values: dict[str, float], size: str, std: float, gain: float = 10.0) -> Search:
+    """A search that chose one effect, the size of which has this standard deviation; chi2 falls by `gain` with it."""
     model = hopper().with_element(CATALOGUE[name], values)
     best = Trial((name,), model, (), 100.0, 1000, len(model.free), True, QUIET)
     none = Trial((), hopper(), (), 110.0, 1000, len(hopper().free), True, QUIET)
-    fit, nominal = SimpleNamespace(model=model, std={f"{name}.{size}": std}), SimpleNamespace(model=hopper(), std={})
+    fit = SimpleNamespace(model=model, std={f"{name}.{size}": std}, chi2=100.0, nrmse=lambda unused=False: math.nan)
+    nominal = SimpleNamespace(model=hopper(), std={}, chi2=100.0 + gain)
     return Search(cast(Fit, nominal), best, cast(Fit, fit), QUIET, (best, none), (), ())
 
 
@@ -43,8 +44,17 @@ def test_a_limit_that_is_absent_at_infinity_is_not_judged_by_its_distance(std):
     assert not _faint(found("actuator_saturation", {"limit": 2.0}, "limit", std), "actuator_saturation")
 
 
+FRICTION = {"force": 0.03, "transition": 0.01}
+
+
 def test_a_faint_effect_alone_leaves_the_nominal_model_and_is_told():
-    friction = found("coulomb_friction", {"force": 0.03, "transition": 0.01}, "force", 0.02)
+    friction = found("coulomb_friction", FRICTION, "force", 0.02)
     left, told = admitted(friction, None)
     assert left.best.added == () and left.fit is friction.nominal
     assert len(told) == 1 and told[0].startswith("coulomb_friction: its size is within 3 standard deviations")
+
+
+def test_an_effect_that_is_needed_stays_however_uncertain_its_size():
+    friction = found("coulomb_friction", FRICTION, "force", 0.02, gain=10.0 * NEEDED)
+    left, told = admitted(friction, None)
+    assert left is friction and told == ()

@@ -41,13 +41,14 @@ def test_an_element_without_a_size_has_no_fainter_guesses():
         assert propose(hopper(), element, [values], ()).faint == ()
 
 
-def fitted_force(monkeypatch, proposal: Proposal, chi2: dict[float, float]) -> tuple[float, list[float]]:
-    """The force that a trial ends with, and those it was tried from, where a descent from a force ends with this chi2."""
+def fitted_force(monkeypatch, proposal: Proposal, chi2: dict[float, float], felt: float = 1e-6) -> tuple[float, list[float]]:
+    """The force that a trial ends with, and those it was tried from, where a descent from a force ends with this chi2
+    and a change of a parameter by `felt` shows."""
     tried: list[float] = []
 
     def descend(model, run, names, noise, starts, *_, **__) -> Descent:
         tried.append(model.value("coulomb_friction.force"))
-        steps = np.ones(len(names)), np.ones(run.states)
+        steps = np.full(len(names), felt), np.ones(run.states)
         return Descent(model, tuple(starts), (), chi2[tried[-1]], 64, True, "", (), steps, None)
 
     monkeypatch.setattr(refit, "descend", descend)
@@ -72,3 +73,8 @@ def test_no_fainter_guess_is_tried_once_one_is_below_the_ceiling(monkeypatch):
     ends = {0.5: 900.0, 1.0: 800.0, 0.05: 95.0}
     assert fitted_force(monkeypatch, friction(100.0), ends) == (0.05, [0.5, 1.0, 0.05])
     assert fitted_force(monkeypatch, friction(math.inf), {0.5: 900.0, 1.0: 800.0}) == (1.0, [0.5, 1.0])
+
+
+def test_parameters_that_have_wandered_to_where_nothing_shows_are_tried_again_from_the_first_guess(monkeypatch):
+    ends = {0.5: 70.0, 1.0: 60.0}
+    assert fitted_force(monkeypatch, friction(100.0), ends, felt=1.5) == (1.0, [0.5, 1.0, 0.5])
