@@ -12,6 +12,7 @@ from rhythmid.diagnose.result import Verdict
 from rhythmid.diagnose.search import LEVEL, Search
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series, dominant_frequency
+from rhythmid.model import Model
 
 TWINS = 2  # a family of this many is an answer; a larger one is undecided
 REMAINDER_LEVEL = 1e-6  # p-value of a structured remainder
@@ -29,11 +30,8 @@ def twins_of(best: Trial, rivals: Sequence[Trial]) -> list[tuple[str, ...]]:
     groups: list[tuple[str, ...]] = []
     for label in best.added:
         element = best.element(label)
-        others = [
-            other
-            for beside, other in element.same_beside.items()
-            if any(t.element.name == beside and not all(v.fixed for v in t.values.values()) for t in best.model.terms)
-        ]
+        others = list(element.same_as)
+        others += [other for beside, other in element.same_beside.items() if _estimated(best.model, beside)]
         for rival in rivals:
             gone = set(best.added) - set(rival.added)
             come = set(rival.added) - set(best.added)
@@ -44,6 +42,11 @@ def twins_of(best: Trial, rivals: Sequence[Trial]) -> list[tuple[str, ...]]:
         if others:
             groups.append((element.name, *others))
     return groups
+
+
+def _estimated(model: Model, name: str) -> bool:
+    """Whether the model has the named element, with parameters that are not all known."""
+    return any(t.element.name == name and not all(v.fixed for v in t.values.values()) for t in model.terms)
 
 
 def verdict_of(

@@ -123,6 +123,7 @@ class Element:
     absent: float = 0.0
     candidate: bool = True  # takes part in the search for missing physics
     needless_with: tuple[str, ...] = ()  # elements beside which another candidate says the same
+    same_as: tuple[str, ...] = ()  # elements that make one and the same model, with other parameters
     same_beside: Mapping[str, str] = field(default_factory=dict)  # beside which element it is the same as which other
     rotational: bool = False  # makes sense only where the position is an angle
     controlled: bool = False  # makes sense only where a controller in the command path closes the loop

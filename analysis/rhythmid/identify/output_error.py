@@ -19,6 +19,7 @@ from rhythmid.identify.free_run import FreeRun, accurate, prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.sensitivity import Linearisation, Problem, state_update
 from rhythmid.identify.series import Series, dominant_frequency
+from rhythmid.identify.start_memory import sought
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
@@ -223,7 +224,8 @@ def descend(
         )
     else:
         steps, state_steps = differences
-    damping, converged, message = 1e-6, False, f"no convergence in {iterations} iterations"
+    held = np.isin(range(run.states), run.compiled.layout.memories)
+    damping, converged, searched = 1e-6, False, not held.any()
     low = np.array([model.parameters[name].bounds[0] for name in names])
     high = np.array([model.parameters[name].bounds[1] for name in names])
     brink = [a + BRINK * (model.value(n) - a) if math.isfinite(a) else math.inf for n, a in zip(names, low)]
@@ -257,12 +259,12 @@ def descend(
             moved, promised = [], _prior_cost(priors, proposed)
             for start, (error, slope, state) in zip(current, states):
                 ahead = error + slope @ step
-                change = state_update(state, ahead)
+                change = state_update(state, ahead, held * damping)
                 moved.append(start + change * state_steps)
                 promised += float(np.sum((ahead + state @ change) ** 2))
             enough = max(tolerance * min(1.0, cost / samples), 1e-7 * cost)
             if whole and damping <= 1e-6 and cost - promised < enough:
-                converged, message = True, "converged"
+                converged = True
                 break
             trial_residuals = problem.residuals(trial, moved)
             trial_cost = problem.cost(trial, trial_residuals, moved)
@@ -272,17 +274,20 @@ def descend(
                 residuals, here = trial_residuals, None
                 damping = max(damping * 0.1, 1e-12)
                 improved = True
-                if gain < enough:
-                    converged, message = True, "converged"
+                converged = gain < enough
                 break
             damping = max(damping * 10.0, 1e-6)
             if damping > 1e8:
                 break
+        converged = converged or not improved  # no direction lowers the cost any more
+        if converged and not searched:
+            searched, moved = True, sought(problem, model, current, states, state_steps)
+            trial_residuals = problem.residuals(model, moved)
+            trial_cost = problem.cost(model, trial_residuals, moved)
+            if trial_cost < cost - enough:
+                current, cost, residuals, here, damping, converged = moved, trial_cost, trial_residuals, None, 1e-6, False
         state_steps = state_steps_next
         assert residuals is not None
-        if not improved:
-            converged, message = True, "converged"  # no direction lowers the cost any more
-            break
         if converged:
             break
     assert residuals is not None
@@ -294,7 +299,7 @@ def descend(
         chi2=float(sum(np.sum(w**2) for w in white)),
         samples=samples,
         converged=converged,
-        message=message,
+        message="converged" if converged else f"no convergence in {iterations} iterations",
         at_bound=tuple(name for name, stuck in zip(names, blocked) if stuck),
         differences=(steps, state_steps),
         linearisation=here,

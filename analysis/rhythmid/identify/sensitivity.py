@@ -207,15 +207,17 @@ class Problem:
         return linearisation, states, steps * ratio[:p], state_steps * ratio[p:]
 
 
-def state_update(sensitivity: Array, target: Array) -> Array:
-    """Least-squares change of a series' initial state (in units of its difference steps)."""
+def state_update(sensitivity: Array, target: Array, damping: Array | None = None) -> Array:
+    """Least-squares change of a series' initial state (in units of its difference steps), each part of it damped (q,)."""
     norms = np.linalg.norm(sensitivity, axis=0)
     live = norms > 1e-9 * max(norms.max(initial=0.0), 1e-300)
     change = np.zeros(sensitivity.shape[1])
     if live.any():
-        change[live] = (
-            np.linalg.lstsq(sensitivity[:, live] / norms[live], -target, rcond=1e-7)[0] / norms[live]
-        )
+        scaled = sensitivity[:, live] / norms[live]
+        if damping is not None and damping.any():
+            scaled = np.vstack([scaled, np.diag(np.sqrt(damping[live]))])
+            target = np.concatenate([target, np.zeros(len(scaled) - len(target))])
+        change[live] = np.linalg.lstsq(scaled, -target, rcond=1e-7)[0] / norms[live]
     return change
 
 

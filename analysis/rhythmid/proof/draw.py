@@ -261,8 +261,8 @@ def _draw(
         found = [observe_run(machine, effects, forcing, run, *delays) for run in runs]
         return [one for one in found if one is not None] if None not in found else None
 
-    def ratio(effects: Sequence[Effect]) -> float:
-        return mismatch(exact, times, commands, forcings, seen(effects), noise.std) / noise.std
+    def ratio(effects: Sequence[Effect], nominal: Model = exact) -> float:
+        return mismatch(nominal, times, commands, forcings, seen(effects), noise.std) / noise.std
 
     plain = seen([])
     if plain is None:
@@ -277,6 +277,10 @@ def _draw(
             return None
         concealed.append(Concealed(Effect(name, sized(strength)), reached))
     effects = [one.effect for one in concealed]
+    for effect in effects if len(effects) > 1 else ():  # one may hide the other: each must show beside it
+        beside = next(other for other in effects if other is not effect)
+        if ratio(effects, exact.with_element(catalogue[beside.name], beside.parameters)) < FAINTEST:
+            return None
     joint = concealed[0].ratio if len(concealed) == 1 else ratio(effects)
     if not math.isfinite(joint):
         return None

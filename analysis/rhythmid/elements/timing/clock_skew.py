@@ -22,8 +22,9 @@ ELEMENT = Element(
     starts=lambda s: [{"skew": 0.02 / (s.natural_frequency * s.duration)}],
     also_known_as=("sample-rate error", "clock drift"),
     family="clock",
+    same_as=("delay_drift",),
     confusable={
-        "delay_drift": "the same to first order: only knowledge of the clocks tells",
+        "delay_drift": "the same model: only knowledge of the clocks tells",
         "input_delay_drift": "moves the limit cycle's phase as well",
     },
     reference="S. B. Moon, P. Skelly, D. Towsley, INFOCOM 1999, 227-234",

@@ -22,8 +22,9 @@ ELEMENT = Element(
     starts=lambda s: [{"rate": 0.02 / (s.natural_frequency * s.duration)}],
     also_known_as=("latency drift",),
     family="clock",
+    same_as=("clock_skew",),
     confusable={
-        "clock_skew": "the same to first order: only knowledge of the clocks tells",
+        "clock_skew": "the same model: only knowledge of the clocks tells",
         "input_delay_drift": "moves the limit cycle's phase as well",
     },
     reference="S. B. Moon, P. Skelly, D. Towsley, INFOCOM 1999, 227-234",
