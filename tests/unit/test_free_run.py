@@ -13,7 +13,7 @@ from rhythmid.simulate import simulate
 
 PERIOD, N = 1e-3, 1500
 TIME = PERIOD * np.arange(N)
-COMMAND = zero_order_hold(TIME, np.sin(2 * np.pi * 3.1 * TIME**2))
+COMMAND = zero_order_hold(TIME, np.sin(1.0 + 2 * np.pi * 3.1 * TIME**2))
 FORCING = spline(TIME, np.cos(2 * np.pi * TIME))
 DELAYED = {"input_delay.delay": 0.0133, "measurement_delay.delay": 0.0041}
 
