@@ -8,6 +8,7 @@ import pytest
 from machines import CATALOGUE, SHORT, hopper, record, records
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import split
+from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate, start_only
 from rhythmid.identify.series import block_length, hold_out_tail, prepare
 from rhythmid.model import Prior
@@ -105,3 +106,12 @@ def test_slow_motion_is_averaged_and_fast_motion_is_not():
     t = np.arange(20_000) * 1e-3
     assert block_length(np.sin(2 * np.pi * 1.0 * t), 1e-3) == 10
     assert block_length(np.sin(2 * np.pi * 200.0 * t), 1e-3) == 1
+
+
+@pytest.mark.parametrize(("name", "values"), [("backlash", {"width": 0.4}), ("actuator_rate_limit", {"rate": 6.0})])
+def test_what_an_actuator_remembers_at_a_records_start_is_found(name, values):
+    machine, noise = hopper().with_element(CATALOGUE[name], values), NoiseModel(np.empty(0), 1e-5)
+    whole = records(machine, SHORT[1:2], std=1e-5, delays=(0.0, 0.0))[0]
+    for start in (1.3, 1.5, 1.7):
+        fit = start_only(machine, prepare([whole.cut(start, 9.0)]), noise, 5e-4)
+        assert np.sqrt(fit.chi2 / fit.samples) < 1.1

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.tick_scan import HOLD, scanned
-from rhythmid.elements.element import STEP, Element
+from rhythmid.elements.element import ELAPSED, STEP, Element
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import FreeRun, prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel
@@ -120,9 +120,10 @@ def _fainter(element: Element, guess: dict[str, float], share: float) -> dict[st
 
 
 def fine_enough(model: Model, step: float) -> float:
-    """Integration step [s] for a model: shorter where an element asks for the step because it may be stiff."""
-    stiff = any(source == STEP for term in model.terms for source, _ in term.element.borrows.values())
-    return min(step, 1e-3 if stiff else step)
+    """Integration step [s] for a model: shorter where an element asks for the step because it may be stiff, or for the time
+    since it began because its force then bends within it."""
+    asked = {source for term in model.terms for source, _ in term.element.borrows.values()}
+    return min(step, 5e-4 if ELAPSED in asked else 1e-3 if STEP in asked else step)
 
 
 def _fit_proposal(

@@ -133,6 +133,12 @@ def _sees_steps(model: Model) -> bool:
     )
 
 
+def _ticks(series: Sequence[Series]) -> list[float]:
+    """Usual time [s] between the knots of each series' command."""
+    knots = [one.command.x[:-1] for one in series if one.command is not None]
+    return [float(np.median(np.diff(times))) for times in knots if len(times) > 2]
+
+
 def _inputs(one: Series) -> Inputs:
     return Inputs(_contiguous(pieces(one.command)), _stand_in(one), _contiguous(pieces(one.forcing)))
 
@@ -142,7 +148,7 @@ def prepare_run(
 ) -> FreeRun:
     """Prepare the model's structure for the series. Raises InputError when series of different input kinds are mixed.
 
-    `max_step` [s] None means one Runge-Kutta step a block at most.
+    `max_step` [s] None means one Runge-Kutta step a block, or a value of a command at whose knots steps end, at most.
     """
     kinds: set[InputKind] = {one.kind for one in series if one.command is not None}
     if len(kinds) > 1:
@@ -165,7 +171,7 @@ def prepare_run(
         lambda: tied(compile_model(whole, disturbed, excited, measured=measured), observer),
         tuple(series),
         inputs,
-        max_step or min(one.period * one.block for one in series),
+        max_step or min([one.period * one.block for one in series] + ([] if smooth else _ticks(series))),
     )
 
 

@@ -224,7 +224,7 @@ def descend(
         )
     else:
         steps, state_steps = differences
-    held = np.isin(range(run.states), run.compiled.layout.memories)
+    held = np.array([float(place in run.compiled.layout.memories) for place in range(run.states)])
     damping, converged, searched = 1e-6, False, not held.any()
     low = np.array([model.parameters[name].bounds[0] for name in names])
     high = np.array([model.parameters[name].bounds[1] for name in names])
