@@ -51,6 +51,7 @@ Tell = Callable[[str], None]
 WORTH = (
     10.0  # difference of the information criterion below which two models are told apart by nothing but hope
 )
+SHARE = 5e-4  # of what is explained already, below which a further effect is an imperfection of the others
 LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
 REFITTED = (
     6  # elements of a round that are refitted; the right one was among the first five in all of 234 trials
@@ -217,7 +218,9 @@ def search(
         trials |= {tuple(sorted(t.added)): t for t in compared}
         winner = compared[0]
         before = next((t for t in compared if t.added == best.added), best)
-        if winner.added == best.added or before.bic() - winner.bic() < WORTH:
+        plain = next((t.bic() for t in compared if not t.added), before.bic())
+        least = max(WORTH, SHARE * (plain - before.bic()))
+        if winner.added == best.added or before.bic() - winner.bic() < least:
             break
         noise = settled
         best = winner

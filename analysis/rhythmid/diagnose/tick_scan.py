@@ -1,7 +1,8 @@
 """Scan for the period of a drive's own clock: a parameter whose best value is too narrow for any descent to find.
 
 After a time T an error dP of the period P has moved the ticks by T dP / P; once that is half a period the likelihood has
-forgotten the truth. So the rate 1/P is tried on a grid of 1 / (4 T) over a short first stretch, and the best rates are
+forgotten their phase. What a hold does to the size of the response it still knows, and that tells the rate 1/P roughly: a
+coarse scan leaves a band of rates. They are tried on a grid of 1 / (4 T) over a first stretch, and the best of them
 followed while the stretch grows to the whole record. The mean delay, of which half a period is the hold's, is kept;
 what small changes of the other parameters and of the initial states do is projected off each residual.
 """
@@ -22,10 +23,13 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 HOLD, PERIOD, DELAY = "command_hold", "command_hold.period", "input_delay.delay"
-STRETCH = 4.0  # [s] of the first stretch
+STRETCH = 16.0  # [s] of the first stretch, at most: shorter ones see little of the ticks' phase
+COARSE = 50  # rates of the coarse scan
+BAND = 0.5  # of the way from the best to the middling cost of the coarse scan, up to which a rate is in the band
+MOST = 2000  # rates tried over the first stretch
 SERIES = 2  # looked at, those with the strongest command at first
 FASTEST = 100.0  # [Hz] beyond which a hold is little but a delay, and its ticks do not matter
-FOLLOWED = 8  # rates that are followed
+FOLLOWED = 24  # rates that are followed
 FOUND = 2  # guesses returned
 FINEST = 0.002  # spacing of the rates at the end, over the inverse length of the record
 
@@ -45,29 +49,39 @@ def scanned(
     fastest = min(FASTEST, 0.5 / max(one.period for one, _ in driven))
     if slowest >= fastest:
         return []
-    firsts = [(split(one, STRETCH)[0], one, start) for one, start in driven]
-    firsts.sort(key=lambda case: -_strength(case[0]))
-    chosen = firsts[:SERIES]
+    driven.sort(key=lambda case: -_strength(case[0]))
+    chosen = [one for one, _ in driven[:SERIES]]
+    begin = [start for _, start in driven[:SERIES]]
+    longest = max(one.time[-1] - one.time[0] for one in chosen)
 
     def guess(rate: float) -> dict[str, float]:
         return {PERIOD: 1.0 / rate, DELAY: max(mean - 0.5 / rate, 0.0)}
 
-    length = STRETCH
-    longest = max(one.time[-1] - one.time[0] for _, one, _ in chosen)
+    def costs(length: float, rates: Array, middle: float) -> Array:
+        stretches = [split(one, length)[0] for one in chosen]
+        run = prepare_run(model, stretches, step)
+        return _costs(run, model.with_values(guess(middle)), [guess(float(rate)) for rate in rates], begin, noise)
+
+    whole = 1.01 * longest
+    rates = np.geomspace(slowest, fastest, COARSE)
+    coarse = costs(whole, rates, float(np.sqrt(slowest * fastest)))
+    if not np.isfinite(coarse).any():
+        return []
+    near = rates[coarse <= coarse.min() + BAND * (np.median(coarse) - coarse.min())]
+    best = float(rates[np.argmin(coarse)])
+    low, high = near.min() / 1.05, near.max() * 1.05
+    length = min(STRETCH, whole, 0.25 * MOST / (high - low))
     spacing = 0.25 / length
-    rates = np.arange(slowest, fastest, spacing)
-    begin = [start for _, _, start in chosen]
-    middle = model.with_values(guess(float(rates[len(rates) // 2])))
+    rates = np.arange(low, high, spacing)
     while True:
-        stretches = [split(one, length)[0] for _, one, _ in chosen]
-        costs = _costs(prepare_run(model, stretches, step), middle, [guess(r) for r in rates], begin, noise)
-        best = rates[np.argsort(costs)[:FOLLOWED]]
+        found = rates[np.argsort(costs(length, rates, best))[:FOLLOWED]]
+        best = float(found[0])
         if spacing < FINEST / longest:
-            return [guess(float(rate)) for rate in best[:FOUND]] if np.isfinite(costs).any() else []
-        middle = model.with_values(guess(float(best[0])))
-        length = min(2.0 * length, 1.01 * longest)
+            apart = [rate for rate in found[1:] if abs(rate - best) > 0.25 / longest]
+            return [guess(float(rate)) for rate in (best, *apart)[:FOUND]]
+        length = min(2.0 * length, whole)
         spacing *= 0.5
-        rates = np.unique(np.round((best[:, None] + spacing * np.arange(-2, 3)).ravel(), 9))
+        rates = np.unique(np.round((found[:, None] + spacing * np.arange(-2, 3)).ravel(), 9))
 
 
 def _strength(series: Series) -> float:
