@@ -44,17 +44,17 @@ def test_the_period_of_a_held_command_is_found_within_ten_microseconds(period):
     series, start = recorded(period)
     mean = TRUE[DELAY] + 0.5 * period
     off = held({DELAY: mean, "linear_spring.stiffness": 200.05, "switched_damper.stance": 1.99})
-    best = scanned(off, [series], [start], NOISE, STEP)[0]
+    best = scanned(off, [series], [start], NOISE)[0]
     assert best[PERIOD] == pytest.approx(period, abs=1e-5)
-    assert best[DELAY] + 0.5 * best[PERIOD] == pytest.approx(mean)
+    assert best[DELAY] + 0.5 * best[PERIOD] == pytest.approx(mean, abs=1e-3)
 
 
 def test_nothing_is_guessed_without_delay_or_command(case):
     series, start = case
-    assert scanned(held({DELAY: 0.0}), [series], [start], NOISE, STEP) == []
-    assert scanned(held({DELAY: 0.03}), [replace(series, command=None)], [start], NOISE, STEP) == []
+    assert scanned(held({DELAY: 0.0}), [series], [start], NOISE) == []
+    assert scanned(held({DELAY: 0.03}), [replace(series, command=None)], [start], NOISE) == []
 
 
 def test_nothing_is_guessed_where_a_hold_would_have_to_be_faster_than_the_measurement_shows(case):
     series, start = case
-    assert scanned(held({DELAY: 0.001}), [series], [start], NOISE, STEP) == []
+    assert scanned(held({DELAY: 0.001}), [series], [start], NOISE) == []

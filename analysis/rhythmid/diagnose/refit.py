@@ -147,7 +147,7 @@ def _fit_proposal(
     ticks: list[dict[str, float]] = []
     if proposal.added[-1:] == (HOLD,):
         begin = [_extended(proposal.model, run, i, start, known) for i, start in enumerate(starts)]
-        ticks = scanned(proposal.model, series, begin, noise, run.max_step)
+        ticks = scanned(proposal.model, series, begin, noise)
     for guess in (*ticks, *proposal.guesses, *proposal.faint):
         if guess in proposal.faint and best is not None and best.chi2 < proposal.ceiling:
             break

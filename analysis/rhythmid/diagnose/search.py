@@ -195,6 +195,7 @@ def search(
     best = base
     rounds, excluded = [first], []
     now = first
+    gained = 0.0
     while now.p_value < LEVEL and _could_pay(now, best) and len(best.added) < most:
         count = REFITTED if not best.added else REFITTED - 2
         proposals, enough = _proposals(best.model, best.added, now.scores, count, best.chi2)
@@ -218,13 +219,13 @@ def search(
         trials |= {tuple(sorted(t.added)): t for t in compared}
         winner = compared[0]
         before = next((t for t in compared if t.added == best.added), best)
-        plain = next((t.bic() for t in compared if not t.added), before.bic())
-        least = max(WORTH, SHARE * (plain - before.bic()))
-        if winner.added == best.added or before.bic() - winner.bic() < least:
+        gain = before.bic() - winner.bic()
+        if winner.added == best.added or gain < max(WORTH, SHARE * gained):
             break
+        gained += gain
         noise = settled
         best = winner
-        tell(f"{best.added[-1]} explains it better by {before.bic() - winner.bic():.0f}; looking for more")
+        tell(f"{best.added[-1]} explains it better by {gain:.0f}; looking for more")
         current = whole_fit(best, series, noise, step, pool=pool)
         if len(best.added) >= most:
             break

@@ -2,9 +2,10 @@
 
 After a time T an error dP of the period P has moved the ticks by T dP / P; once that is half a period the likelihood has
 forgotten their phase. What a hold does to the size of the response it still knows, and that tells the rate 1/P roughly: a
-coarse scan leaves a band of rates. They are tried on a grid of 1 / (4 T) over a first stretch, and the best of them
-followed while the stretch grows to the whole record. The mean delay, of which half a period is the hold's, is kept;
-what small changes of the other parameters and of the initial states do is projected off each residual.
+coarse scan leaves a band of rates. They are tried on a grid of 1 / (4 T), over a first stretch where the whole record asks
+for too many, and the best of them followed while the grid gets finer. The mean delay, of which half a period is the
+hold's, is kept at first, and shifted a little with the rate in the end: it decides which command a tick finds. What small
+changes of the other parameters and of the initial states do is projected off each residual.
 """
 
 from collections.abc import Sequence
@@ -23,20 +24,17 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 HOLD, PERIOD, DELAY = "command_hold", "command_hold.period", "input_delay.delay"
-STRETCH = 16.0  # [s] of the first stretch, at most: shorter ones see little of the ticks' phase
 COARSE = 50  # rates of the coarse scan
 BAND = 0.5  # of the way from the best to the middling cost of the coarse scan, up to which a rate is in the band
-MOST = 2000  # rates tried over the first stretch
+MOST = 3000  # rates tried over the first stretch
 SERIES = 2  # looked at, those with the strongest command at first
 FASTEST = 100.0  # [Hz] beyond which a hold is little but a delay, and its ticks do not matter
-FOLLOWED = 24  # rates that are followed
+FOLLOWED = 12  # cases that are followed
 FOUND = 2  # guesses returned
-FINEST = 0.002  # spacing of the rates at the end, over the inverse length of the record
+FINEST = 0.008  # spacing of the rates at the end, over the inverse length of the record
 
 
-def scanned(
-    model: Model, series: Sequence[Series], starts: Sequence[Array], noise: NoiseModel, step: float
-) -> list[dict[str, float]]:
+def scanned(model: Model, series: Sequence[Series], starts: Sequence[Array], noise: NoiseModel) -> list[dict[str, float]]:
     """First guesses of period and delay [s] of a model with a command hold, best first; empty where no rate is possible.
 
     `starts` are the initial states of the series; the other parameters stay at the model's values.
@@ -54,34 +52,39 @@ def scanned(
     begin = [start for _, start in driven[:SERIES]]
     longest = max(one.time[-1] - one.time[0] for one in chosen)
 
-    def guess(rate: float) -> dict[str, float]:
-        return {PERIOD: 1.0 / rate, DELAY: max(mean - 0.5 / rate, 0.0)}
+    def guess(rate: float, shift: float) -> dict[str, float]:
+        return {PERIOD: float(1.0 / rate), DELAY: float(max(mean - 0.5 / rate + shift, 0.0))}
 
-    def costs(length: float, rates: Array, middle: float) -> Array:
+    def best_of(length: float, cases: Array, middle: Array) -> tuple[Array, Array]:
+        """The cases (n, 2) of rate and shift, best first, with their costs over stretches of this length."""
         stretches = [split(one, length)[0] for one in chosen]
-        run = prepare_run(model, stretches, step)
-        return _costs(run, model.with_values(guess(middle)), [guess(float(rate)) for rate in rates], begin, noise)
+        run = prepare_run(model, stretches)  # in long steps, whose errors all cases share
+        costs = _costs(run, model.with_values(guess(*middle)), [guess(*case) for case in cases], begin, noise)
+        order = np.argsort(costs)
+        return cases[order], costs[order]
 
     whole = 1.01 * longest
     rates = np.geomspace(slowest, fastest, COARSE)
-    coarse = costs(whole, rates, float(np.sqrt(slowest * fastest)))
-    if not np.isfinite(coarse).any():
+    cases, costs = best_of(whole, _unshifted(rates), np.array([np.sqrt(slowest * fastest), 0.0]))
+    if not np.isfinite(costs).any():
         return []
-    near = rates[coarse <= coarse.min() + BAND * (np.median(coarse) - coarse.min())]
-    best = float(rates[np.argmin(coarse)])
+    near = cases[costs <= costs[0] + BAND * (np.median(costs) - costs[0]), 0]
     low, high = near.min() / 1.05, near.max() * 1.05
-    length = min(STRETCH, whole, 0.25 * MOST / (high - low))
-    spacing = 0.25 / length
-    rates = np.arange(low, high, spacing)
-    while True:
-        found = rates[np.argsort(costs(length, rates, best))[:FOLLOWED]]
-        best = float(found[0])
-        if spacing < FINEST / longest:
-            apart = [rate for rate in found[1:] if abs(rate - best) > 0.25 / longest]
-            return [guess(float(rate)) for rate in (best, *apart)[:FOUND]]
+    length = min(whole, 0.25 * MOST / (high - low))
+    spacing, late = 0.25 / length, 0.5 * chosen[0].period
+    cases, _ = best_of(length, _unshifted(np.arange(low, high, spacing)), cases[0])
+    while spacing > FINEST / longest:
         length = min(2.0 * length, whole)
-        spacing *= 0.5
-        rates = np.unique(np.round((found[:, None] + spacing * np.arange(-2, 3)).ravel(), 9))
+        around = np.array([(r * spacing, d * late) for r in (-1.0, -0.5, 0.0, 0.5, 1.0) for d in (-1.0, 0.0, 1.0)])
+        tried = (cases[:FOLLOWED, None, :] + around).reshape(-1, 2)
+        cases, _ = best_of(length, np.unique(np.round(tried, 9), axis=0), cases[0])
+        spacing, late = 0.5 * spacing, 0.5 * late
+    apart = cases[np.abs(cases[:, 0] - cases[0, 0]) > 0.25 / longest]
+    return [guess(*case) for case in (cases[0], *apart)[:FOUND]]
+
+
+def _unshifted(rates: Array) -> Array:
+    return np.column_stack([rates, np.zeros_like(rates)])
 
 
 def _strength(series: Series) -> float:

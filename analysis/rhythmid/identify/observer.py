@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rhythmid.identify.series import Series
 
 Array = NDArray[np.float64]
+FINER = 4  # times as many averages a second in the motion that pulls as in those that are compared
 
 
 def _kernel(x, v, t, f, stiffness, damping):
@@ -65,7 +66,7 @@ def observed(series: "Sequence[Series]", model: Model, frequency: float) -> "lis
     stiffness, damping = model.mass.value * omega**2, 2.0 * model.mass.value * omega
     found = []
     for one in series:
-        motion = spline(one.centres, _at_centres(one.averaged, one.block))
+        motion = _motion(one.time, one.value, max(1, one.block // FINER))
         rate = motion.derivative()
         cubic = np.vstack([np.zeros((1, rate.c.shape[1])), rate.c])
         pull = PPoly(stiffness * motion.c + damping * cubic, motion.x, extrapolate=True)
@@ -75,11 +76,13 @@ def observed(series: "Sequence[Series]", model: Model, frequency: float) -> "lis
     return found
 
 
-def _at_centres(averages: Array, block: int) -> Array:
-    """Values in the middle of blocks from their averages, which a bent motion moves by a 24th of its second difference."""
-    bend = np.zeros_like(averages)
+def _motion(time: Array, value: Array, block: int) -> PPoly:
+    """Spline through averages of the measurement, which a bent motion moves by a 24th of its second difference."""
+    count = len(time) // block
+    centres, averages = (a[: count * block].reshape(count, block).mean(axis=1) for a in (time, value))
+    bend = np.zeros(count)
     bend[1:-1] = np.diff(averages, 2)
-    return averages - (1.0 - 1.0 / block**2) / 24.0 * bend
+    return spline(centres, averages - (1.0 - 1.0 / block**2) / 24.0 * bend)
 
 
 def with_observer(model: Model, observer: Observer | None) -> Model:
