@@ -15,7 +15,7 @@ from rhythmid.diagnose.diagnosis import Answer, diagnose
 from rhythmid.model import Model
 
 NAMED: dict[str, Callable[[], Twin]] = {
-    "axis under a controller, sticking and slipping, driven by its motor's effort": lambda: twins.axis(duration=8.0),
+    "axis under a controller, sticking and slipping, driven by its motor's effort": twins.axis,
     "joint driven by a current, velocity measured": twins.joint,
     "pendulum driven through large swings": twins.pendulum,
     "servo of which only command and motion are known": twins.servo,
