@@ -7,7 +7,7 @@ that is missing from the others must not be taken for coloured noise.
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.free_run import FreeRun, prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Descent, Fit, descend, minimise
-from rhythmid.identify.series import Series
+from rhythmid.identify.series import Series, scales
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
 
@@ -168,7 +168,8 @@ def _fit_proposal(
     if not best.converged:
         more = BRIEF - SKETCH
         best = descend(best.model, run, names, noise, best.starts, more, None, TOLERANCE, best.differences)
-    flat = _flat(best, proposal)
+    guessed = proposal.guesses[0] if proposal.guesses else {}
+    flat = _flat(best.model, best.differences[0], list(guessed))
     if flat:
         back = best.model.with_values({name: proposal.guesses[0][name] for name in flat})
         again = descend(back, run, names, noise, best.starts, BRIEF, None, TOLERANCE)
@@ -176,12 +177,35 @@ def _fit_proposal(
     return _outcome(best)
 
 
-def _flat(end: Descent, proposal: Proposal) -> list[str]:
-    """Parameters of the added element that have wandered to where they change nothing: a step large enough to be felt is
+def _flat(model: Model, steps: Array, names: Sequence[str]) -> list[str]:
+    """Those of the named parameters that have wandered to where they change nothing: a step large enough to be felt is
     larger than their value. What they did before, when the others were still wrong, says nothing against them now."""
-    steps = dict(zip(end.model.free, end.differences[0]))
-    guessed = proposal.guesses[0] if proposal.guesses else {}
-    return [name for name in guessed if name in steps and abs(steps[name]) > abs(end.model.value(name))]
+    felt = dict(zip(model.free, steps))
+    return [name for name in names if name in felt and abs(felt[name]) > abs(model.value(name))]
+
+
+def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
+    """The trial with flat parameters of its effects tried again from the elements' own guesses, where that is better."""
+    best = trial
+    if trial.differences is None:
+        return best
+    for label in trial.added:
+        element = trial.element(label)
+        names = [f"{label}.{parameter.name}" for parameter in element.parameters]
+        flat = _flat(trial.model, trial.differences[0], names)
+        if not flat or element.starts is None:
+            continue
+        guesses = element.starts(scales(series, trial.model))
+        known = {tuple(guess[name.rpartition(".")[2]] for name in flat) for guess in guesses}
+        for values in [tuple(share * value for value in one) for one in sorted(known) for share in (1.0, *FAINTER)]:
+            again = replace(trial, model=trial.model.with_values(dict(zip(flat, values))), differences=None)
+            try:
+                end = _outcome(_end(again, series, trial.noise, max_step, THOROUGH))
+            except InputError:
+                continue
+            if end.chi2 < best.chi2:
+                best = _trial(trial.added, again.model, end, trial.noise)
+    return best
 
 
 def _extended(model: Model, run: FreeRun, index: int, start: Array, known: Sequence[str]) -> Array:
@@ -280,9 +304,10 @@ def under_noise(
 def near_under_noise(
     trials: Sequence[Trial], series: Sequence[Series], noise: NoiseModel, max_step: float, near: float
 ) -> list[Trial]:
-    """The trials, best first, under one noise model: as they are, but those `near` the best are fitted again."""
+    """The trials, best first, under one noise model: as they are, but those `near` the best are fitted again, also from
+    guesses of parameters that have wandered to where they change nothing."""
     level = under_noise(trials, series, noise, max_step, 0)
     close = [trial for trial in level if trial.bic() - level[0].bic() < near]
-    fitted = under_noise(close, series, noise, max_step)
+    fitted = [_unstuck(trial, series, max_step) for trial in under_noise(close, series, noise, max_step)]
     known = {trial.added for trial in fitted}
     return sorted([*fitted, *(t for t in level if t.added not in known)], key=lambda trial: trial.bic())
