@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
+from rhythmid.identify.covariance import covariance_of, on_the_edge
 from rhythmid.identify.faint_directions import faint, with_faint_directions
 from rhythmid.identify.free_run import FreeRun, accurate, prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
@@ -26,8 +27,8 @@ Array = NDArray[np.float64]
 WHITE = NoiseModel(np.empty(0), 1.0)
 STAY = 0.1  # share of its distance from a lower bound that one step leaves a parameter: a width of zero is hard to leave
 BRINK = 1e-3  # share of its first distance within which it may reach the bound
-PART = 1e-5  # of an undetermined direction's largest component, below which a parameter takes no part in it
 LOST = 0.3  # error, as a share of the motion, above which a model has lost the machine
+FALSE_EDGE = 25.0  # chi2 that it may cost to put a parameter on its bound where the fit says that it cannot tell
 Progress = Callable[[str], None]
 INTEGRATION = 0.02  # of the residual, below which an error of integration has to stay: it must not count among models
 
@@ -162,8 +163,20 @@ def minimise(
     tolerance: float = 1e-3,
     differences: tuple[Array, Array] | None = None,
 ) -> Fit:
-    """The fit that `descend` leads to, with its sensitivities and covariance."""
-    end = descend(model, run, names, noise, starts, iterations, pool, tolerance, differences)
+    """The fit that `descend` leads to, with its sensitivities and covariance.
+
+    A parameter that the records cannot tell from its bound is put there: what else it would be drags others along.
+    """
+    fit = _fit(descend(model, run, names, noise, starts, iterations, pool, tolerance, differences), run, names, noise, pool)
+    edge = on_the_edge(fit.model, names, fit.covariance)
+    if edge:
+        end = descend(fit.model.with_values(edge), run, names, noise, fit.starts, max(iterations, 3), pool, tolerance)
+        if end.chi2 < fit.chi2 + FALSE_EDGE:
+            return _fit(end, run, names, noise, pool)
+    return fit
+
+
+def _fit(end: Descent, run: FreeRun, names: Sequence[str], noise: NoiseModel, pool: ThreadPoolExecutor | None) -> Fit:
     linearisation = end.linearisation
     if linearisation is None or faint(linearisation.jacobian):
         problem = Problem(run, names, noise, pool)
@@ -175,7 +188,7 @@ def minimise(
         model=end.model,
         names=tuple(names),
         values=np.array([end.model.value(name) for name in names]),
-        covariance=_covariance(linearisation.jacobian, [end.model.parameters[name].prior for name in names]),
+        covariance=covariance_of(linearisation.jacobian, [end.model.parameters[name].prior for name in names]),
         starts=end.starts,
         run=run,
         residuals=end.residuals,
@@ -308,27 +321,6 @@ def descend(
 
 def _prior_cost(priors: Sequence, values: Array) -> float:
     return sum(((value - prior.mean) / prior.std) ** 2 for prior, value in zip(priors, values) if prior is not None)
-
-
-def _covariance(jacobian: Array, priors: Sequence) -> Array:
-    """Inverse of the Fisher information; infinite variances in directions that the records do not determine."""
-    p = jacobian.shape[1]
-    if p == 0:
-        return np.zeros((0, 0))
-    norms = np.linalg.norm(jacobian, axis=0)
-    norms[norms == 0.0] = 1e-150
-    scaled = jacobian / norms
-    information = scaled.T @ scaled
-    for i, prior in enumerate(priors):
-        if prior is not None:
-            information[i, i] += 1.0 / (prior.std * norms[i]) ** 2
-    eigenvalues, vectors = np.linalg.eigh(information)
-    known = eigenvalues > 1e-11 * max(eigenvalues[-1], 1e-300)
-    inverse = np.where(known, 1.0 / np.maximum(eigenvalues, 1e-300), 1e24)
-    # rounding gives every parameter a trace of an undetermined direction; only those that take part are undetermined
-    vectors = np.where(~known & (np.abs(vectors) < PART * np.abs(vectors).max(axis=0)), 0.0, vectors)
-    with np.errstate(over="ignore"):
-        return (vectors * inverse) @ vectors.T / np.outer(norms, norms)
 
 
 def noise_of(residuals: Sequence[Array], series: Sequence[Series], floor: float = 0.0) -> NoiseModel:
