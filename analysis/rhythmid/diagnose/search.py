@@ -239,7 +239,8 @@ def search(
             noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
     ranked = near_under_noise(_contenders(trials, best), series, noise, step, NEAR)
     best = next(t for t in ranked if set(t.added) == set(best.added))
-    if ranked[0].bic() < best.bic() - WORTH and ranked[0].added:
+    richer = len(ranked[0].added) > len(best.added)
+    if ranked[0].bic() < best.bic() - (max(WORTH, SHARE * gained) if richer else WORTH) and ranked[0].added:
         best = ranked[0]  # a model set aside under an earlier noise model has overtaken the chosen one
         noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
         ranked = near_under_noise(ranked, series, noise, step, NEAR)

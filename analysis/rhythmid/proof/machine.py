@@ -153,7 +153,8 @@ def integrate(effects, places, layout, m, p, held, z, begin, knots, values, samp
             stop = samples[i]
             if j < len(knots) and knots[j] < stop:
                 stop = knots[j]
-            rates(t, z, u, effects, places, layout, m, p, held, False, k1)
+            # the command may just have jumped: what remembers has to see it
+            rates(t, z, u, effects, places, layout, m, p, held, True, k1)
             while t < stop:
                 last = h >= stop - t
                 step = stop - t if last else h
