@@ -72,6 +72,7 @@ def _by_scipy(effect: Effect, command: np.ndarray, samples: int) -> np.ndarray:
         u = command[round(begin * 1000)] if begin >= 0.0 else 0.0
         if begin >= 0.0:
             out.append(walk(begin, z, u)[1])
+        walk(begin, z, u, True)  # what remembers sees the command jump
         solved = solve_ivp(lambda t, z: walk(t, z, u)[0], (begin, end), z, rtol=1e-8, atol=1e-11)  # noqa: B023
         z = solved.y[:, -1]
         walk(end, z, u, True)
