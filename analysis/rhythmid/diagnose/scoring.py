@@ -30,7 +30,7 @@ SHORTER = 2.0  # factor from one length of windows to the next
 FINE = 0.08  # of a sample rate that an observer's frequency may be
 INTEGRATES = "the model integrates or is unstable, so that a long free run would add up every small disturbance"
 FREE_RUN = "free run"
-TIED = "force, the model tied to the recorded motion by an observer of {0:.2g} Hz: "
+TIED = "the balance of forces, the model tied to the recorded motion by an observer of {0:.2g} Hz: "
 LOSES = "in free run the nominal model loses the machine"
 Tell = Callable[[str], None]
 
