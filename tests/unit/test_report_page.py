@@ -315,7 +315,7 @@ def test_a_page_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     write_page(tmp_path / "report.html", page)
     assert (tmp_path / "report.html").read_text(encoding="utf-8").endswith("</html>\n")
     with pytest.raises(InputError):
-        write_page(tmp_path / "missing" / "report.html", page)
+        write_page(tmp_path / "report.html" / "below a file.html", page)
     assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
 
 

@@ -130,7 +130,8 @@ def read_tables(signals: Signals) -> Record:
             )
         made[role] = Samples(source, time, value * source.scale + source.offset)
     assert signals.path is not None
-    record = _record(signals.path.stem, made, signals, "sort or split the table", Quality({}))
+    name = signals.path.stem if signals.path.stem != "signals" else signals.path.resolve().parent.name  # tells more
+    record = _record(name, made, signals, "sort or split the table", Quality({}))
     return _finish(replace(record, hold=signals.hold or _measured_hold(record)), signals)
 
 

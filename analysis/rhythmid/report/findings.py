@@ -116,7 +116,7 @@ class Findings:
     @property
     def whole(self) -> str:
         """What errors are a share of, in words."""
-        return "motion" if self.runs[0].size is None else "driving force"
+        return self.runs[0].whole if self.runs else "motion"
 
     @property
     def repaired(self) -> bool:

@@ -34,7 +34,7 @@ def residual_folds(runs: Sequence[Run], unit: str) -> list[Fold | Paragraph]:
         role = HELD_OUT if run.heldout else "used in the fit"
         blocks.append(
             Fold(
-                f"{run.name} ({role}): error {told} of the motion",
+                f"{run.name} ({role}): error {told} of the {run.whole}",
                 (residual_grid(run, unit),),
                 run is ranked[0],
             )
@@ -202,7 +202,7 @@ def error_changes(runs: Sequence[Run], noise: float | None) -> Drawing:
                 f"{row.label} {number(row.before, 3)} %" + (f" to {number(row.after, 3)} %" if row.after is not None else "")
                 for row in shown
             ),
-            shown, "error [% of the motion]",
+            shown, f"error [% of the {runs[0].whole if runs else 'motion'}]",
         ),
         f"{'Squares: before; circles: after' if repaired else 'Squares: error'}. "
         + (
@@ -224,8 +224,8 @@ def error_table(runs: Sequence[Run], unit: str) -> Table:
         rows.append((*row, _told(after, unit)) if repaired else tuple(row))
     columns = ("record", "used for", "before" if repaired else "error")
     return Table(
-        "Free-run error: rms residual, and its share of the motion's standard deviation with a 95 % interval from ten stretches "
-        "of the record.",
+        f"Rms residual, and its share of the {runs[0].whole if runs else 'motion'} (standard deviation) with a 95 % interval "
+        "from ten stretches of the record.",
         (*columns, "after") if repaired else columns,
         tuple(rows),
     )

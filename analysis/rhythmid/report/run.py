@@ -59,6 +59,11 @@ class Run:
         return self.measured - simulated
 
     @property
+    def whole(self) -> str:
+        """What an error is a share of, in words."""
+        return "motion" if self.size is None else "driving force"
+
+    @property
     def step(self) -> float:
         """Time between samples [s]."""
         return float(np.median(np.diff(self.time)))
