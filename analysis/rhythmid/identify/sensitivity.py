@@ -85,7 +85,8 @@ class Problem:
     def cost(self, model: Model, residuals: Sequence[Array] | None, starts: Sequence[Array]) -> float:
         if residuals is None:
             return math.inf
-        total = sum(float(np.sum(self.whitened(i, r) ** 2)) for i, r in enumerate(residuals))
+        with np.errstate(over="ignore"):  # a run that has all but diverged costs infinitely much
+            total = sum(float(np.sum(self.whitened(i, r) ** 2)) for i, r in enumerate(residuals))
         total += sum(float(np.sum(self.departure(i, start) ** 2)) for i, start in enumerate(starts))
         for name in self.names:
             value = model.parameters[name]
