@@ -232,14 +232,15 @@ def search(
         now, _ = _one_round(current, catalogue, pool, colour=False)
         rounds.append(now)
     if best.added:
-        defended, more = _defend(best, series, catalogue, trials, noise, step, rounds, tell)
+        margin = max(WORTH, SHARE * gained)
+        defended, more = _defend(best, series, catalogue, trials, noise, step, rounds, margin, tell)
         trials |= more
         if defended is not best:
             best = defended
             noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
     ranked = near_under_noise(_contenders(trials, best), series, noise, step, NEAR)
     best = next(t for t in ranked if set(t.added) == set(best.added))
-    richer = len(ranked[0].added) > len(best.added)
+    richer = ranked[0].free > best.free
     if ranked[0].bic() < best.bic() - (max(WORTH, SHARE * gained) if richer else WORTH) and ranked[0].added:
         best = ranked[0]  # a model set aside under an earlier noise model has overtaken the chosen one
         noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
@@ -289,12 +290,14 @@ def _defend(
     noise: NoiseModel,
     step: float,
     rounds: Sequence[Round],
+    margin: float,
     tell: Tell,
 ) -> tuple[Trial, dict[tuple[str, ...], Trial]]:
     """Let every added element defend its place; returns the survivor and the models that were tried on the way.
 
     First whether it can be left out, then whether another one does better in its place: a simpler member of its family,
-    or, where there are several effects, an element that scored well before the others were known.
+    or, where there are several effects, an element that scored well before the others were known. A model that says less
+    may be worse by the `margin` in the criterion.
     """
     tried: dict[tuple[str, ...], Trial] = {}
 
@@ -311,7 +314,7 @@ def _defend(
         dropped = run(
             [Proposal(_rest(best, label), best.model.without(label), ({},)) for label in best.added]
         )
-        kept = [t for t in dropped if t.bic() < best.bic() + WORTH]
+        kept = [t for t in dropped if t.bic() < best.bic() + margin]
         if not kept:
             break
         best = min(kept, key=lambda t: t.bic())
@@ -333,7 +336,7 @@ def _defend(
             swaps.append(propose(slim, catalogue[name], starts, rest))
     found = run(swaps)
     earlier = [t for t in trials.values() if t.added and _stands_for(t, best)]
-    simpler = [t for t in [*found, *under_noise(earlier, series, noise, step)] if _simpler(t, best)]
+    simpler = [t for t in [*found, *under_noise(earlier, series, noise, step)] if _stands_for(t, best) and t.bic() < best.bic() + margin]
     better = [t for t in found if t.bic() < best.bic()]
     if better:
         best = min(better, key=lambda t: t.bic())
@@ -350,11 +353,6 @@ def _shared(trial: Trial, label: str, element: Element) -> dict[str, float]:
 
 def _rest(trial: Trial, label: str) -> tuple[str, ...]:
     return tuple(name for name in trial.added if name != label)
-
-
-def _simpler(trial: Trial, best: Trial) -> bool:
-    """A model with fewer parameters that the information criterion does not reject, of the same family."""
-    return _stands_for(trial, best) and trial.bic() < best.bic() + WORTH
 
 
 def _stands_for(trial: Trial, best: Trial) -> bool:
