@@ -61,13 +61,14 @@ def fork_map(
         running[receive] = (process, set(own))
     try:
         while running:
-            for pipe in multiprocessing.connection.wait(list(running)):
-                process, left = running[pipe]  # type: ignore[index]
+            ready = multiprocessing.connection.wait(list(running))
+            for pipe in [one for one in running if one in ready]:
+                process, left = running[pipe]
                 try:
-                    index, result, error = pipe.recv()  # type: ignore[union-attr]
+                    index, result, error = pipe.recv()
                 except EOFError:
                     process.join()
-                    del running[pipe]  # type: ignore[arg-type]
+                    del running[pipe]
                     if left:
                         raise RuntimeError(f"a worker died with exit code {process.exitcode}") from None
                     continue

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 from scipy.interpolate import CubicHermiteSpline, CubicSpline, PPoly
 
 Hold = Literal["zero", "linear", "band_limited"]
@@ -72,9 +73,9 @@ def continuous(time: Array, value: Array, hold: Hold) -> PPoly:
 def impulse_preserving(held: PPoly) -> PPoly:
     """Smooth stand-in for a zero-order-held command that is sampled far above the machine's dynamics.
 
-    The derivative of a cubic spline through the command's integral at its knots: from any knot to a later one it has the
-    same impulse, so a mass cannot tell the two apart, and an integrator need not stop at every knot. That integral is
-    bent at every knot, which smoothed counts as a twelfth of its second difference.
+    The derivative of a cubic spline through the command's integral at its knots: it has the same impulse, so a mass cannot
+    tell the two apart, and an integrator need not stop at every knot. The integral is bent at every knot; what the bends
+    hold of low frequencies is a twelfth of its second difference, which is added.
     """
     knots, values = held.x[:-1], held.c[-1]
     step = float(np.median(np.diff(knots)))
@@ -85,6 +86,11 @@ def impulse_preserving(held: PPoly) -> PPoly:
     impulse[1:-1] += step / 12.0 * np.diff(level)
     slopes = CubicSpline(grid, impulse, bc_type=((1, 0.0), (1, float(values[-1])))).derivative()  # pyright: ignore[reportArgumentType]
     return PPoly(slopes.c, slopes.x, extrapolate=True)
+
+
+def fast_length(least: int) -> int:
+    """Length of a Fourier transform that is quick, at least `least`."""
+    return next_fast_len(least, True) or least
 
 
 def pieces(signal: PPoly | None) -> tuple[Array, Array]:

@@ -87,9 +87,8 @@ def start_states(
     index = {name: i for i, name in enumerate(compiled.layout.states)}
     for term in model.terms:
         if term.element.own and term.element.initial is not None:
-            arguments = {n: v.value for n, v in term.values.items()}
-            for name, (source, default) in term.element.borrows.items():
-                arguments[name] = model.borrowed(source, default)  # type: ignore[assignment]
+            borrowed = {n: model.borrowed(source, default) for n, (source, default) in term.element.borrows.items()}
+            arguments = {n: v.value for n, v in term.values.items()} | borrowed
             signal = command if term.element.slot == "command" else command + forcing
             for state, value in zip(term.element.own, term.element.initial(position, velocity, signal, **arguments)):
                 start[index[f"{term.label}.{state}"]] = value

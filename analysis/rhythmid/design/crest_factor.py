@@ -9,7 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
+
+from rhythmid.signal import fast_length
 
 Array = NDArray[np.float64]
 Lines = NDArray[np.int64]
@@ -37,7 +38,7 @@ def schroeder_phases(weights: Array) -> Array:
 
 def one_period(lines: Lines, weights: Array, phases: Array) -> Array:
     """Σ_k a_k cos(2π k t + φ_k) over one period, oversampled."""
-    count = int(next_fast_len(OVERSAMPLING * int(lines.max()), real=True))  # type: ignore[arg-type]
+    count = fast_length(OVERSAMPLING * int(lines.max()))
     spectrum = np.zeros(count // 2 + 1, dtype=complex)
     spectrum[lines] = weights * np.exp(1j * phases)
     return np.fft.irfft(spectrum, count) * count / 2.0

@@ -11,12 +11,12 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
 from scipy.interpolate import CubicSpline
 from scipy.optimize import fminbound
 
 from rhythmid.ltp.pumping import active_pumping
 from rhythmid.record.record import Channel, Record
+from rhythmid.signal import fast_length
 
 Array = NDArray[np.float64]
 Clock = Literal["command", "forcing", "output"]
@@ -81,7 +81,7 @@ def align(simulation: Record, recording: Record) -> Alignment:
 def _correlation(recording: Array, simulation: Array) -> tuple[Array, NDArray[np.int64]]:
     """Normalised correlation of two signals on one grid and its lags; what hardly overlaps counts for little."""
     n, m = len(recording), len(simulation)
-    size = int(next_fast_len(n + m - 1) or n + m - 1)
+    size = fast_length(n + m - 1)
 
     def correlate(a: Array, b: Array) -> Array:
         return np.fft.irfft(np.fft.rfft(a, size) * np.conj(np.fft.rfft(b, size)), size)

@@ -30,7 +30,7 @@ from rhythmid.diagnose.result import (
     MissingEffect,
     Remainder,
 )
-from rhythmid.diagnose.scoring import settle, whole_of
+from rhythmid.diagnose.scoring import settle
 from rhythmid.diagnose.screen import trajectories
 from rhythmid.diagnose.search import WORTH, Search, search
 from rhythmid.diagnose.sufficiency import check_driven, tempered, without_clipped
@@ -236,7 +236,7 @@ def _conclude(
     )
     return Diagnosis(
         verdict=verdict,
-        summary=summary_of(verdict, reason, missing, plain, augmented, twins, whole_of(series)),
+        summary=summary_of(verdict, reason, missing, plain, augmented, twins, series[0].whole),
         detection=detection,
         location=location,
         missing=tuple(missing),

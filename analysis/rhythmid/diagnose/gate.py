@@ -60,7 +60,7 @@ def admitted(
 def _faint(found: Search, label: str) -> bool:
     """Whether the size of an effect of the chosen model cannot be told from its absence."""
     element = found.best.element(label)
-    if not element.size or math.isinf(element.absent):
+    if not element.size:
         return False
     name = f"{label}.{element.size}"
     distance = abs(found.fit.model.value(name) - element.absent)

@@ -3,13 +3,11 @@
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from rhythmid.diagnose.refit import Trial, fine_enough
 from rhythmid.diagnose.search import Search
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import prepare_run
-from rhythmid.identify.output_error import Fit, start_only
+from rhythmid.identify.output_error import Fit, normalised_error, start_only
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 
@@ -50,8 +48,5 @@ def tail_error(found: Search, trial: Trial) -> float | None:
     outputs = run.outputs(trial.model, trial.starts)
     if outputs is None:
         return None
-    error, spread = 0.0, 0.0
-    for output, one in zip(outputs, run.series):
-        error += float(np.sum((output - one.averaged)[~one.used] ** 2))
-        spread += one.power(~one.used)
-    return math.sqrt(error / spread) if spread > 0 else None
+    value = normalised_error([output - one.averaged for output, one in zip(outputs, run.series)], run.series, True)
+    return None if math.isnan(value) else value

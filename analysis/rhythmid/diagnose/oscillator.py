@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
+
+from rhythmid.signal import fast_length
 
 Array = NDArray[np.float64]
 FEWEST = 8  # frequencies that a force has to hold; a single line takes three
@@ -22,7 +23,7 @@ class Oscillator:
     def response(self, forces: Array, step: float) -> Array:
         """Motion (n, …) from rest under forces (n, …)."""
         n = len(forces)
-        size = int(next_fast_len(2 * n) or 2 * n)
+        size = fast_length(2 * n)
         s = 2j * np.pi * np.arange(size // 2 + 1) / (size * step)
         transfer = self.gain / (s * s + self.damping * s + self.omega**2)
         shape = (-1,) + (1,) * (forces.ndim - 1)

@@ -157,6 +157,7 @@ def _runs(
                 heldout=heldout,
                 quiet=_quiet(one),
                 size=None if one.observer is None else one.observer.size,
+                whole=one.whole,
             )
         )
     return found

@@ -55,11 +55,6 @@ class Scoring:
         return _error(self.calibration.fit)
 
 
-def whole_of(series: Sequence[Series]) -> str:
-    """What errors over these series are a share of, in words."""
-    return "motion" if series[0].observer is None else "driving force"
-
-
 def settle(
     model: Model,
     series: Sequence[Series],

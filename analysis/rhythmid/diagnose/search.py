@@ -240,8 +240,8 @@ def search(
             noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
     ranked = near_under_noise(_contenders(trials, best), series, noise, step, NEAR)
     best = next(t for t in ranked if set(t.added) == set(best.added))
-    richer = ranked[0].free > best.free
-    if ranked[0].bic() < best.bic() - (max(WORTH, SHARE * gained) if richer else WORTH) and ranked[0].added:
+    ahead = max(WORTH, SHARE * gained) if ranked[0].free > best.free else WORTH
+    if ranked[0].bic() < best.bic() - ahead and ranked[0].added:
         best = ranked[0]  # a model set aside under an earlier noise model has overtaken the chosen one
         noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
         ranked = near_under_noise(ranked, series, noise, step, NEAR)
@@ -336,7 +336,8 @@ def _defend(
             swaps.append(propose(slim, catalogue[name], starts, rest))
     found = run(swaps)
     earlier = [t for t in trials.values() if t.added and _stands_for(t, best)]
-    simpler = [t for t in [*found, *under_noise(earlier, series, noise, step)] if _stands_for(t, best) and t.bic() < best.bic() + margin]
+    plainer = [t for t in [*found, *under_noise(earlier, series, noise, step)] if _stands_for(t, best)]
+    simpler = [t for t in plainer if t.bic() < best.bic() + margin]
     better = [t for t in found if t.bic() < best.bic()]
     if better:
         best = min(better, key=lambda t: t.bic())

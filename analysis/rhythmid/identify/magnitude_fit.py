@@ -139,7 +139,7 @@ def _descend(comparison: _Comparison, start: Array) -> tuple[Array, Array]:
     low, high = np.array([b[0] for b in bounds]), np.array([b[1] for b in bounds])
     inside = np.clip(start, low, high)
     found = least_squares(
-        comparison.residual, inside, comparison.jacobian,  # type: ignore[arg-type]
+        comparison.residual, inside, comparison.jacobian,  # pyright: ignore[reportArgumentType] — its stub knows only names
         bounds=(low, high), x_scale="jac", xtol=1e-7, ftol=1e-9, gtol=1e-12, max_nfev=40,
     )  # fmt: skip
     return found.x, found.fun

@@ -216,9 +216,8 @@ def descend(
     """Levenberg-Marquardt from the model's own values.
 
     Stops when a further step lowers chi2, or promises to lower it, by less than `tolerance` (less where the noise model turns
-    out to be too wide) or 1e-7 of itself. `differences`
-    are steps known from another descent of the same structure; without them they are sought. Raises InputError when
-    the model diverges at its initial values.
+    out to be too wide) or 1e-7 of itself. `differences` are steps known from another descent of the same structure; without
+    them they are sought. Raises InputError when the model diverges at its initial values.
     """
     problem = Problem(run, names, noise, pool)
     current = [np.array(s) for s in (starts if starts is not None else first_guess(model, run))]

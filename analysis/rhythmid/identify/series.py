@@ -10,7 +10,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import PPoly
 
@@ -20,7 +19,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.observer import Observer
 from rhythmid.model import Model
 from rhythmid.record.record import Record
-from rhythmid.signal import continuous, spline
+from rhythmid.signal import continuous, fast_length, spline
 
 FAINT = 1e-4  # of the inertia's own stiffness m ω², below which a spring sets no scale
 Array = NDArray[np.float64]
@@ -85,6 +84,11 @@ class Series:
         """Block averages of the measurement."""
         return self.average(self.value)
 
+    @property
+    def whole(self) -> str:
+        """What an error is a share of, in words; in figures, see `power`."""
+        return "motion" if self.observer is None else "driving force"
+
     def power(self, chosen: Mask) -> float:
         """Sum of squares over the chosen averages that an error is a share of: of the motion, or where an observer holds the
         simulation, of what the driving force would stretch it by."""
@@ -106,7 +110,7 @@ def bandwidth(value: Array, period: float, share: float = 0.9999) -> float:
     """Frequency [Hz] below which `share` of the motion's power lies (its mean and trend left out)."""
     n = len(value)
     detrended = value - np.linspace(value[: max(1, n // 50)].mean(), value[-max(1, n // 50) :].mean(), n)
-    length = _fast_length(n)
+    length = fast_length(n)
     power = np.abs(np.fft.rfft(detrended * np.hanning(n), length)) ** 2
     floor = np.median(power[len(power) // 2 :])  # measurement noise, as the upper half of the band shows it
     power = np.maximum(power - 4.0 * floor, 0.0)
@@ -199,15 +203,10 @@ def hold_out_tail(series: Sequence[Series], share: float = 0.2) -> tuple[list[Se
 def dominant_frequency(series: Series) -> float:
     """Frequency [Hz] of the strongest line of the motion."""
     value = series.averaged - series.averaged.mean()
-    length = _fast_length(len(value))
+    length = fast_length(len(value))
     power = np.abs(np.fft.rfft(value * np.hanning(len(value)), length)) ** 2
     power[0] = 0.0
     return float(max(1, int(np.argmax(power))) / (length * series.period * series.block))
-
-
-def _fast_length(least: int) -> int:
-    """Length of a Fourier transform that is quick, at least `least`."""
-    return int(next_fast_len(least, real=True))  # type: ignore[arg-type]
 
 
 def scales(series: Sequence[Series], model: Model) -> Scales:

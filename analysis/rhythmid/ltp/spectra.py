@@ -9,13 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
 from scipy.interpolate import CubicSpline
 
 from rhythmid.errors import InputError
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.record.record import Channel, Record
-from rhythmid.signal import continuous
+from rhythmid.signal import continuous, fast_length
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -137,7 +136,7 @@ def _input_integral(record: Record, window: Window, period: float, bins: int) ->
         return np.zeros(bins + 1, dtype=complex)
     length = window.periods * period
     highest = 2.0 * np.pi * bins / length
-    cells = _fast_length(max(2 * bins + 2, int(np.ceil(length * highest / FINE))))
+    cells = fast_length(max(2 * bins + 2, int(np.ceil(length * highest / FINE))))
     edges = window.start + np.linspace(0.0, length, cells + 1)
     if record.hold == "zero":  # the integral of a held signal is a broken line
         total = np.concatenate([[0.0], np.cumsum(command.value[:-1] * np.diff(command.time))])
@@ -150,16 +149,12 @@ def _input_integral(record: Record, window: Window, period: float, bins: int) ->
     return spectrum * np.exp(-1j * np.pi * np.arange(bins + 1) / cells)  # a cell stands for its middle
 
 
-def _fast_length(least: int) -> int:
-    return int(next_fast_len(least, real=True))  # type: ignore[arg-type]
-
-
 def highest_input(record: Record) -> float:
     """Frequency [Hz] up to which the input has power (1e-6 of its greatest density is neglected); 0 for no input."""
     command = record.input
     if command is None or len(command) < 8 or not np.any(command.value):
         return 0.0
-    length = _fast_length(len(command))
+    length = fast_length(len(command))
     power = np.abs(np.fft.rfft(command.value - command.value.mean(), length)) ** 2
     width = 1.0 / (length * command.period)
     wide = max(1, round(0.1 / width))

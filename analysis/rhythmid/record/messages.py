@@ -117,10 +117,12 @@ def _joint_state_layout(
             body.extend(bytes(8))
     template = np.frombuffer(b"\x00\x01\x00\x00" + bytes(body), dtype=np.uint8)  # CDR, little-endian
     names = list(at)
-    layout = {
-        "names": names,
-        "formats": [at[name][0] for name in names],
-        "offsets": [at[name][1] for name in names],
-        "itemsize": len(template),
-    }
-    return np.dtype(layout), template  # type: ignore[call-overload]
+    layout = np.dtype(
+        {
+            "names": names,
+            "formats": [at[name][0] for name in names],
+            "offsets": [at[name][1] for name in names],
+            "itemsize": len(template),
+        }
+    )
+    return layout, template

@@ -4,6 +4,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 
 DOTS = 150  # of an estimate that are drawn
-STYLES = {
+STYLES: dict[str, dict[str, Any]] = {
     "theory": {"color": "tab:red", "linestyle": "-"},
     "estimate": {"color": "black", "linestyle": "none", "marker": ".", "markersize": 3},
     "parametric fit": {"color": "tab:blue", "linestyle": "--"},
@@ -57,7 +58,7 @@ def _panels(panels: Panels, title: str) -> tuple[Figure, dict[int, Axes]]:
 def _draw(axis: Axes, curve: Curve, value: NDArray[np.float64]) -> None:
     dotted = STYLES[curve.kind]["linestyle"] == "none"
     thin = max(1, len(value) // DOTS) if dotted else 1
-    axis.plot(curve.frequency[::thin], value[::thin], label=curve.kind, **STYLES[curve.kind])  # type: ignore[arg-type]
+    axis.plot(curve.frequency[::thin], value[::thin], label=curve.kind, **STYLES[curve.kind])
 
 
 def magnitude_figure(panels: Panels, unit: str = "m/N") -> Figure:

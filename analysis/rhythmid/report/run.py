@@ -34,7 +34,7 @@ class Run:
     hidden : bool[n] samples of a record that the fit was not shown although it saw the rest.
     heldout : whether no fit has seen this record.
     quiet : whether nothing but the forcing drove the machine.
-    size : what an error is a share of, where that is not the measured motion [the output's unit].
+    size : what an error is a share of, where that is not the measured motion [the output's unit]; `whole` names it.
     labels : what `before` and `after` are called in figures.
     """
 
@@ -51,17 +51,13 @@ class Run:
     heldout: bool = False
     quiet: bool = False
     size: float | None = None
+    whole: str = "motion"
     labels: tuple[str, str] = ("refitted nominal model", "with the added effect")
 
     def residual(self, which: Which) -> Array:
         """Measured minus simulated, float64[n]."""
         simulated = self.after if which == "after" and self.after is not None else self.before
         return self.measured - simulated
-
-    @property
-    def whole(self) -> str:
-        """What an error is a share of, in words."""
-        return "motion" if self.size is None else "driving force"
 
     @property
     def step(self) -> float:
@@ -71,8 +67,8 @@ class Run:
 
 @dataclass(frozen=True)
 class Error:
-    """rms of a residual, the same as a share of the motion's standard deviation (or of the run's `size`), and the half-width of the 95 % interval
-    of that ratio: how much it would differ in another stretch of the same kind."""
+    """rms of a residual, the same as a share of the motion's standard deviation (or of the run's `size`), and the half-width
+    of the 95 % interval of that ratio: how much it would differ in another stretch of the same kind."""
 
     rms: float
     ratio: float
