@@ -40,6 +40,7 @@ test: lint ## Run the linters and all tests, fast ones first
 
 lint: $(VENV)/.packages ## Run ruff and pyright
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check --quiet .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
 format: install ## Format the code

@@ -42,7 +42,9 @@ DELAYS = (0.04, 0.05)
 NOISE = (0.0, 5e-6, 2e-5)
 BAND = (0.5, 5.0)  # Hz, of the phase slope
 COARSE = 0.08  # s, a guess of the sum that keeps the phase slope's phases from wrapping
-Estimator = Callable[[Record], tuple[float, float, float]]  # input delay, measurement delay (NaN where unseen), sum [s]
+Estimator = Callable[
+    [Record], tuple[float, float, float]
+]  # input delay, measurement delay (NaN where unseen), sum [s]
 
 
 def record_of(delays: tuple[float, float]) -> Record:
@@ -170,9 +172,13 @@ def _cell(values: Array, truth: float) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--runs", type=int, default=5, help="records of each noise")
-    parser.add_argument("--grey-box", type=float, default=15.0, help="seconds that the grey box sees; 0 leaves it out")
+    parser.add_argument(
+        "--grey-box", type=float, default=15.0, help="seconds that the grey box sees; 0 leaves it out"
+    )
     given = parser.parse_args()
     quiet = record_of(DELAYS)
     undelayed = response(record_of((0.0, 0.0)))
@@ -186,12 +192,17 @@ def main() -> None:
         contenders.append((f"grey box, {given.grey_box:g} s", grey_box(given.grey_box), 1))
     joint(quiet)  # compiles
     for noise in NOISE:
-        print(f"\nnoise {1e6 * noise:g} µm: mean error ± spread [ms] of input delay, measurement delay, sum; CPU seconds")
+        print(
+            f"\nnoise {1e6 * noise:g} µm: mean error ± spread [ms] of input delay, measurement delay, sum; CPU seconds"
+        )
         for name, estimator, runs in contenders:
             records = [noisy(quiet, noise, seed) for seed in range(runs)] if noise else [quiet]
             found = measure(estimator, records)
             cells = [_cell(found.estimates[:, i], truth) for i, truth in enumerate((*DELAYS, sum(DELAYS)))]
-            print(f"{name:18}" + "".join(f"{cell:>22}" for cell in cells) + f"{found.seconds:9.2f} s", flush=True)
+            print(
+                f"{name:18}" + "".join(f"{cell:>22}" for cell in cells) + f"{found.seconds:9.2f} s",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

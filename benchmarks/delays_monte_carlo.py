@@ -71,7 +71,9 @@ def print_scatter(seeds: range, record: Record, noise: float, cycle: bool, worke
             lost.append(found)
         else:
             drawn.append(found)
-    print(f"\nnoise {1e6 * noise:g} µm, {'with' if cycle else 'without'} the limit cycle: {len(seeds)} runs, {len(lost)} without an answer")
+    print(
+        f"\nnoise {1e6 * noise:g} µm, {'with' if cycle else 'without'} the limit cycle: {len(seeds)} runs, {len(lost)} without an answer"
+    )
     if lost:
         print(f"the first of them: {lost[0]}")
     print(f"{'parameter':28}{'bound':>11}{'std':>11}{'std/bound':>11}{'bias/std':>10}{'95 % covers':>13}")
@@ -115,12 +117,18 @@ def print_starts(runs: int, chirps: int, workers: int | None) -> None:
 
     results = [found for _, found in fork_map(one, cases, workers) if not isinstance(found, Exception)]
     seconds = np.array([spent for _, spent in results])
-    told = ", ".join(f"{sum(kind == k for kind, _ in results)} {k}" for k in ("reached", "reported as stuck", "wrong"))
-    print(f"\n{runs} starts, {chirps} chirps: {told}; {np.median(seconds):.2f} s of CPU time each (largest {seconds.max():.2f})")
+    told = ", ".join(
+        f"{sum(kind == k for kind, _ in results)} {k}" for k in ("reached", "reported as stuck", "wrong")
+    )
+    print(
+        f"\n{runs} starts, {chirps} chirps: {told}; {np.median(seconds):.2f} s of CPU time each (largest {seconds.max():.2f})"
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--runs", type=int, help="runs of each case (300), and starts (200)")
     parser.add_argument("--chirps", type=int, default=2, help="chirps of 30 s after the warm-up")
     parser.add_argument("--only", choices=("scatter", "starts"))

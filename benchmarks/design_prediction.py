@@ -26,7 +26,12 @@ from rhythmid.identify.monte_carlo import Drawn, noisy, scatter
 from rhythmid.parallel import fork_map
 
 DELAYS = (0.0403, 0.0551)
-OFF = {"linear_spring.stiffness": 190.0, "switched_damper.stance": 2.3, INPUT_DELAY: 0.02, MEASUREMENT_DELAY: 0.03}
+OFF = {
+    "linear_spring.stiffness": 190.0,
+    "switched_damper.stance": 2.3,
+    INPUT_DELAY: 0.02,
+    MEASUREMENT_DELAY: 0.03,
+}
 
 
 def compare(wanted: Requirements, runs: int, workers: int | None) -> None:
@@ -62,7 +67,9 @@ def compare(wanted: Requirements, runs: int, workers: int | None) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--kind", choices=KINDS, default=None, help="both by default")
     parser.add_argument("--duration", type=float, default=270.0, help="[s]")

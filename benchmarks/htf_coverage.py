@@ -71,7 +71,9 @@ def coverage(name: str, noise: float, seeds: range, workers: int | None) -> None
     ring_down = machine.cycle.ring_down
 
     def one(seed: int) -> Found:
-        found = harmonic_transfer_functions(spectra(noisy(record, noise, seed), pumping, ring_down), ring_down)
+        found = harmonic_transfer_functions(
+            spectra(noisy(record, noise, seed), pumping, ring_down), ring_down
+        )
         points, covered = {}, {}
         for each in found.functions:
             omega = 2 * np.pi * each.frequency
@@ -91,7 +93,10 @@ def coverage(name: str, noise: float, seeds: range, workers: int | None) -> None
     share = sum(sum(run.covered.values()) for run in runs) / total
     highest = np.bincount([run.highest for run in runs])
     print(f"\n{name}, noise {1e6 * noise:g} µm: {len(runs)} records, {runs[0].method.replace('_', ' ')}")
-    print(f"  95 % bands cover {share:.1%} of {total} points; M: " + ", ".join(f"{m} in {n}" for m, n in enumerate(highest) if n))
+    print(
+        f"  95 % bands cover {share:.1%} of {total} points; M: "
+        + ", ".join(f"{m} in {n}" for m, n in enumerate(highest) if n)
+    )
     print("  " + "  ".join(by_harmonic), flush=True)
 
 
@@ -107,15 +112,23 @@ def false_alarms(runs: int) -> None:
     wrong = 0
     for _ in range(runs):
         real, imaginary = 2e-6 * rng.standard_normal((2, len(plain)))
-        found = harmonic_transfer_functions(replace(made, output=plain + real + 1j * imaginary), machine.cycle.ring_down)
+        found = harmonic_transfer_functions(
+            replace(made, output=plain + real + 1j * imaginary), machine.cycle.ring_down
+        )
         wrong += max(found.harmonics) > 0
-    print(f"\nrecords of G_0 and noise: harmonics found in {wrong} of {runs}, promised {FALSE_ALARM:.0%} at most")
+    print(
+        f"\nrecords of G_0 and noise: harmonics found in {wrong} of {runs}, promised {FALSE_ALARM:.0%} at most"
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--noise", type=float, nargs="+", default=[5e-6, 2e-5], help="standard deviations [m]")
+    parser.add_argument(
+        "--noise", type=float, nargs="+", default=[5e-6, 2e-5], help="standard deviations [m]"
+    )
     parser.add_argument("--workers", type=int, help="processes; as many as there are processors if not told")
     given = parser.parse_args()
     for name in EXCITATIONS:

@@ -44,7 +44,11 @@ REST = 0.2  # [m] about which the stiffness terms are taken, given to all
 TURN = 0.002  # [m/s] within which friction turns, given to the others
 KNOWN = 4  # terms that belong to the nominal model: offset, spring, stance damper, force
 TERMS = ("quadratic_stiffness", "cubic_stiffness", "coulomb_friction", "quadratic_drag")
-LAGS = ("command_lag", "actuator_lag", "sensor_lag")  # no function of the present state: only rhythmid can say them
+LAGS = (
+    "command_lag",
+    "actuator_lag",
+    "sensor_lag",
+)  # no function of the present state: only rhythmid can say them
 CASES: dict[str, dict[str, float]] = {
     "cubic_stiffness": {"coefficient": 1000.0},
     "quadratic_stiffness": {"coefficient": 150.0},
@@ -138,7 +142,11 @@ def _acceleration(x, v, f, c, alpha, points, scale):  # pragma: no cover
     total = c[0] + c[1] * e + c[2] * max(v, 0.0) + c[3] * f + c[4] * e * e + c[5] * e * e * e
     total += c[6] * np.tanh(v / 0.002) + c[7] * v * abs(v)
     for i in range(len(alpha)):
-        d = ((x - points[i, 0]) / scale[0]) ** 2 + ((v - points[i, 1]) / scale[1]) ** 2 + ((f - points[i, 2]) / scale[2]) ** 2
+        d = (
+            ((x - points[i, 0]) / scale[0]) ** 2
+            + ((v - points[i, 1]) / scale[1]) ** 2
+            + ((f - points[i, 2]) / scale[2]) ** 2
+        )
         total += alpha[i] * np.exp(-0.5 * d)
     return total
 
@@ -156,7 +164,9 @@ def _run(start, f, step, c, alpha, points, scale):  # pragma: no cover
         middle = 0.5 * (f[i] + f[i + 1])
         a1 = _acceleration(x, v, f[i], c, alpha, points, scale)
         a2 = _acceleration(x + 0.5 * step * v, v + 0.5 * step * a1, middle, c, alpha, points, scale)
-        a3 = _acceleration(x + 0.5 * step * (v + 0.5 * step * a1), v + 0.5 * step * a2, middle, c, alpha, points, scale)
+        a3 = _acceleration(
+            x + 0.5 * step * (v + 0.5 * step * a1), v + 0.5 * step * a2, middle, c, alpha, points, scale
+        )
         a4 = _acceleration(x + step * (v + 0.5 * step * a2), v + step * a3, f[i + 1], c, alpha, points, scale)
         x += step * v + step * step / 6.0 * (a1 + a2 + a3)
         v += step / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
@@ -229,15 +239,23 @@ class Regression:
         terms, target = [], []
         for one in learn:
             thin = 4 if weak else 20  # the filter has made neighbours alike
-            states = ps.AxesArray(np.column_stack([one.x, one.v, one.f])[::thin], {"ax_time": 0, "ax_coord": 1})
+            states = ps.AxesArray(
+                np.column_stack([one.x, one.v, one.f])[::thin], {"ax_time": 0, "ax_coord": 1}
+            )
             library = _library(scales)
             if weak:
                 np.random.seed(0)  # noqa: NPY002  (PySINDy places its windows by the global generator)
                 times = (one.time - one.time[0])[::thin]
-                library = ps.WeakPDELibrary(library, spatiotemporal_grid=times, is_uniform=True, K=100, H_xt=[0.15])
+                library = ps.WeakPDELibrary(
+                    library, spatiotemporal_grid=times, is_uniform=True, K=100, H_xt=[0.15]
+                )
             library.fit([states])
             terms.append(np.asarray(library.transform([states])[0]))
-            rates = library.convert_u_dot_integral(states)[:, 1] if isinstance(library, ps.WeakPDELibrary) else one.a[::thin]
+            rates = (
+                library.convert_u_dot_integral(states)[:, 1]
+                if isinstance(library, ps.WeakPDELibrary)
+                else one.a[::thin]
+            )
             target.append(np.asarray(rates)[:, None])
         return cls(np.vstack(terms), np.vstack(target), scales, weak)
 
@@ -262,7 +280,9 @@ def gaussian_process(learn: Sequence[Smooth]) -> Law:
     left, spread = target - design @ known, inputs.std(axis=0)
     size = float(left.std())
     kernel = ConstantKernel(1.0, (1e-4, 1e3)) * RBF(np.ones(3), (0.1, 100.0)) + WhiteKernel(0.1, (1e-6, 10.0))
-    process = GaussianProcessRegressor(kernel, random_state=0).fit(inputs[picked] / spread, left[picked] / size)
+    process = GaussianProcessRegressor(kernel, random_state=0).fit(
+        inputs[picked] / spread, left[picked] / size
+    )
     product = process.kernel_.k1
     coefficients = np.concatenate([known, np.zeros(len(TERMS))])
     alpha = size * product.k1.constant_value * np.ravel(process.alpha_)
@@ -284,7 +304,9 @@ def others(case: str, records: Sequence[Record], block: int) -> list[Row]:
                     used = tuple(name for name, c in zip(TERMS, law.coefficients[KNOWN:]) if c != 0.0)
                     tried.append((law.error(held, block), used))
             best = min(error for error, _ in tried)
-            error, used = min((t for t in tried if t[0] <= 1.05 * best or t[0] == best), key=lambda t: len(t[1]))
+            error, used = min(
+                (t for t in tried if t[0] <= 1.05 * best or t[0] == best), key=lambda t: len(t[1])
+            )
             seconds = processor_time() - begin
             found.append(Row(case, method + label, used, used == _truth(case), error, seconds))
         begin = processor_time()
@@ -311,18 +333,28 @@ def ours(case: str, records: Sequence[Record], nominal: Model, full: bool) -> tu
     right = named == _truth(case) and result.verdict == ("missing_physics" if named else "consistent")
     plain, after = result.refitted_nominal.heldout_nrmse, result.augmented.heldout_nrmse
     assert plain is not None and after is not None
-    rows = [Row(case, "nominal model, refitted", (), None, plain, 0.0), Row(case, "rhythmid", named, right, after, seconds)]
+    rows = [
+        Row(case, "nominal model, refitted", (), None, plain, 0.0),
+        Row(case, "rhythmid", named, right, after, seconds),
+    ]
     return rows, answer.evidence.unseen[0].block
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--full", action="store_true", help="rhythmid searches its whole catalogue")
     parser.add_argument("--json", type=Path, help="write the rows")
     chosen = parser.parse_args()
     warnings.simplefilter("ignore")
     nominal = paper_hopper().with_values({"linear_spring.stiffness": 215.0, "switched_damper.stance": 1.7})
-    nominal = nominal.with_parameters({n: replace(v, fixed=v.fixed and n != "linear_spring.rest_length") for n, v in nominal.parameters.items()})
+    nominal = nominal.with_parameters(
+        {
+            n: replace(v, fixed=v.fixed and n != "linear_spring.rest_length")
+            for n, v in nominal.parameters.items()
+        }
+    )
     rows: list[Row] = []
     for case in CASES:
         with tempfile.TemporaryDirectory() as folder:
@@ -332,7 +364,10 @@ def main() -> None:
         print(f"\n{case}")
         for row in (r for r in rows if r.case == case):
             name = "" if row.right is None else ", ".join(row.named) or "nothing"
-            print(f"  {row.method:32s} {WORDS[row.right]:6s} {100 * row.heldout_nrmse:8.2f} %  {row.seconds:6.1f} s  {name}", flush=True)
+            print(
+                f"  {row.method:32s} {WORDS[row.right]:6s} {100 * row.heldout_nrmse:8.2f} %  {row.seconds:6.1f} s  {name}",
+                flush=True,
+            )
     print("\nover all cases: right names, median error, mean processor seconds")
     for method in dict.fromkeys(row.method for row in rows):
         own = [row for row in rows if row.method == method]

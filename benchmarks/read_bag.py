@@ -1,6 +1,6 @@
 """Reading a bag into arrays, by layout and by rosbags' deserialiser, side by side: messages per second of CPU time.
 
-    python benchmarks/read_bag.py
+python benchmarks/read_bag.py
 """
 
 import tempfile

@@ -69,7 +69,9 @@ def bounds() -> dict[float, tuple[float, float]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--runs", type=int, default=8, help="records of each noise")
     runs = parser.parse_args().runs
     found, bound = errors(runs), bounds()
@@ -77,9 +79,19 @@ def main() -> None:
     figure = Figure(figsize=(8.0, 3.2), layout="constrained")
     microns = 1e6 * np.array(NOISE)
     for place, axis in enumerate(figure.subplots(1, 2, sharey=True)):
-        axis.loglog(microns, 1e3 * scatter[:, 1, place], "o-", color="tab:orange", label="the paper's method (G₋₁)")
-        axis.loglog(microns, 1e3 * scatter[:, 0, place], "o", color="tab:blue", label="joint maximum likelihood")
-        axis.loglog(microns, [1e3 * bound[noise][place] for noise in NOISE], "k--", linewidth=1, label="Cramér-Rao bound")
+        axis.loglog(
+            microns, 1e3 * scatter[:, 1, place], "o-", color="tab:orange", label="the paper's method (G₋₁)"
+        )
+        axis.loglog(
+            microns, 1e3 * scatter[:, 0, place], "o", color="tab:blue", label="joint maximum likelihood"
+        )
+        axis.loglog(
+            microns,
+            [1e3 * bound[noise][place] for noise in NOISE],
+            "k--",
+            linewidth=1,
+            label="Cramér-Rao bound",
+        )
         axis.set_title(("input delay", "measurement delay")[place])
         axis.set_xlabel("noise of a sample [µm]")
         axis.set_xticks(microns, [f"{value:g}" for value in microns])

@@ -59,7 +59,10 @@ def conceal(folder: Path, seed: int) -> tuple[Path, Path]:
     rng = np.random.default_rng(seed)
     catalogue = load_catalogue()
     name = list(EFFECTS)[rng.integers(len(EFFECTS))]
-    values = {key: float(np.exp(rng.uniform(np.log(low), np.log(high)))) for key, (low, high) in EFFECTS[name].items()}
+    values = {
+        key: float(np.exp(rng.uniform(np.log(low), np.log(high))))
+        for key, (low, high) in EFFECTS[name].items()
+    }
     delays = {"input": float(rng.uniform(0.005, 0.06)), "measurement": float(rng.uniform(0.005, 0.06))}
     machine = Model.load(NOMINAL, catalogue).with_values(
         {
@@ -104,11 +107,18 @@ def main() -> None:
     for record in RECORDS:
         rhythmid("run", folder / f"{record}.yaml", "--out", folder / record)
     seen = [folder / record for record in RECORDS if record != "unseen"]
-    answer, report, augmented = folder / "diagnosis.json", folder / "diagnosis.html", folder / "augmented.yaml"
+    answer, report, augmented = (
+        folder / "diagnosis.json",
+        folder / "diagnosis.html",
+        folder / "augmented.yaml",
+    )
     rhythmid("diagnose", *seen, "--model", NOMINAL, "--holdout", folder / "unseen", "--json", answer,
              "--report", report, "--save-model", augmented)  # fmt: skip
     assert hashlib.sha256(sealed.read_bytes()).hexdigest() == digest
-    truth, found = json.loads(sealed.read_text(encoding="utf-8")), json.loads(answer.read_text(encoding="utf-8"))
+    truth, found = (
+        json.loads(sealed.read_text(encoding="utf-8")),
+        json.loads(answer.read_text(encoding="utf-8")),
+    )
     named = [effect["element"] for effect in found["missing"]]
     console.print(f"\nThe seal is opened. Concealed: [bold]{truth['element']}[/] {truth['values']}")
     console.print(f"Diagnosis: [bold]{found['verdict']}[/], {', '.join(named) or 'nothing named'}")
@@ -116,10 +126,14 @@ def main() -> None:
         for name, value in effect["parameters"].items():
             true = truth["values"].get(name) if effect["element"] == truth["element"] else None
             beside = "" if true is None else f"   (true {true:.4g})"
-            console.print(f"  {effect['element']}.{name} = {value['value']:.4g} ± {value['std'] or 0:.2g}{beside}")
+            console.print(
+                f"  {effect['element']}.{name} = {value['value']:.4g} ± {value['std'] or 0:.2g}{beside}"
+            )
     for name in ("input", "measurement"):
         delay = found["delays"][name]
-        console.print(f"  {name} delay = {1e3 * delay['value']:.3f} ms   (true {1e3 * truth['delays'][name]:.3f} ms)")
+        console.print(
+            f"  {name} delay = {1e3 * delay['value']:.3f} ms   (true {1e3 * truth['delays'][name]:.3f} ms)"
+        )
     console.print(f"report: {report}\naugmented model: {augmented}")
 
 

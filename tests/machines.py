@@ -30,7 +30,15 @@ def hopper() -> Model:
     return Model.from_text(HOPPER, catalogue=CATALOGUE)
 
 
-def record(machine: Model, excitation: dict, forcing: float = 1.0, delays=(0.0203, 0.0151), std=1e-4, correlation=0.0, seed=0):
+def record(
+    machine: Model,
+    excitation: dict,
+    forcing: float = 1.0,
+    delays=(0.0203, 0.0151),
+    std=1e-4,
+    correlation=0.0,
+    seed=0,
+):
     """A record of the machine at 1 kHz; delays [s] and noise [m] as given."""
     made = build(excitation)
     run = Experiment(
@@ -50,5 +58,6 @@ def record(machine: Model, excitation: dict, forcing: float = 1.0, delays=(0.020
 def records(machine: Model, protocol=SHORT, seed: int = 0, **options) -> list[Record]:
     """One record of the machine for each (excitation, forcing amplitude) of the protocol."""
     return [
-        record(machine, spec, forcing, seed=10 * seed + i, **options) for i, (spec, forcing) in enumerate(protocol)
+        record(machine, spec, forcing, seed=10 * seed + i, **options)
+        for i, (spec, forcing) in enumerate(protocol)
     ]

@@ -58,7 +58,9 @@ def moves(rng: np.random.Generator, travel: float, duration: float, dwell: float
     return at
 
 
-def integrate(rates: Callable[[float, Array], list[float]], start: list[float], time: Array, step: float) -> Array:
+def integrate(
+    rates: Callable[[float, Array], list[float]], start: list[float], time: Array, step: float
+) -> Array:
     """States (n, q) at the times; `step` [s] is the longest that the integrator may take."""
     done = solve_ivp(
         rates, (time[0], time[-1]), start, t_eval=time, method="LSODA", rtol=1e-7, atol=1e-10, max_step=step
@@ -78,7 +80,9 @@ def rounded(value: Array, step: float) -> Array:
     return step * np.round(value / step)
 
 
-def axis(friction: float = 3.0, seed: int = 0, count: int = 2, duration: float = 12.0, known: str = "effort") -> Twin:
+def axis(
+    friction: float = 3.0, seed: int = 0, count: int = 2, duration: float = 12.0, known: str = "effort"
+) -> Twin:
     """Linear axis under PD position control, Coulomb friction [N] missing; encoder of 1 µm, records at 1 kHz.
 
     `known` is what was recorded beside the position: the motor's `effort`, of a controller at 1 kHz, or the `reference` of
@@ -115,14 +119,24 @@ def axis(friction: float = 3.0, seed: int = 0, count: int = 2, duration: float =
         reference = Channel(time, sampled(way, time), "m")
         return Record(f"axis {index}", measured, reference, hold="linear", input_kind="reference")
 
-    loop = "" if known == "effort" else (
-        "command: [{position_control: {proportional: {value: 2000.0, fixed: true}, derivative: {value: 60.0, fixed: true}}}]\n"
+    loop = (
+        ""
+        if known == "effort"
+        else (
+            "command: [{position_control: {proportional: {value: 2000.0, fixed: true}, derivative: {value: 60.0, fixed: true}}}]\n"
+        )
     )
     nominal = (
-        "inertia: {mass: {value: 1.7, unit: kg}}\n" + loop
+        "inertia: {mass: {value: 1.7, unit: kg}}\n"
+        + loop
         + "force: [{viscous_damper: {damping: {value: 12.0, unit: N*s/m}}}]\n"
     )
-    return Twin([record(i) for i in range(count)], nominal, "coulomb_friction" if friction else "", {"force": friction})
+    return Twin(
+        [record(i) for i in range(count)],
+        nominal,
+        "coulomb_friction" if friction else "",
+        {"force": friction},
+    )
 
 
 def joint(friction: float = 0.4, seed: int = 0, count: int = 2, duration: float = 15.0) -> Twin:
@@ -160,7 +174,9 @@ force: [{viscous_damper: {damping: {value: 0.1}}}]
     return Twin(records, nominal, "coulomb_friction" if friction else "", truth)
 
 
-def pendulum(large: bool = True, seed: int = 0, count: int = 2, duration: float = 20.0, driven: bool = True) -> Twin:
+def pendulum(
+    large: bool = True, seed: int = 0, count: int = 2, duration: float = 20.0, driven: bool = True
+) -> Twin:
     """Pendulum at 200 Hz with large swings (or a linear torsional spring), a linear nominal model."""
     rng = np.random.default_rng([3, seed])
     inertia, c, moment, period = 0.02, 0.02, 0.9, 5e-3
@@ -191,7 +207,9 @@ force:
     return Twin(records, nominal, "pendulum_gravity" if large else "", {"moment": moment})
 
 
-def rig(cubic: float = 4e7, seed: int = 0, count: int = 2, duration: float = 12.0, kind: str = "base_displacement") -> Twin:
+def rig(
+    cubic: float = 4e7, seed: int = 0, count: int = 2, duration: float = 12.0, kind: str = "base_displacement"
+) -> Twin:
     """Mass on a shaken base at 500 Hz; the input is the base's displacement or its acceleration, the cubic is missing.
 
     The output is the mass's position, absolute where the base's displacement is known, else relative to the base.
@@ -218,7 +236,11 @@ def rig(cubic: float = 4e7, seed: int = 0, count: int = 2, duration: float = 12.
         if kind == "base_displacement":
             output, given, unit = states[:, 0], noisy(rng, displacement, 1e-7), "m"
         else:
-            output, given, unit = states[:, 0] - displacement, noisy(rng, np.array([base(t, 2) for t in time]), 2e-3), "m/s^2"
+            output, given, unit = (
+                states[:, 0] - displacement,
+                noisy(rng, np.array([base(t, 2) for t in time]), 2e-3),
+                "m/s^2",
+            )
         return (
             Record(
                 f"rig {index}", Channel(time, noisy(rng, output, 3e-6), "m"), Channel(time, given, unit),
@@ -269,8 +291,11 @@ def servo(effect: str = "actuator_saturation", seed: int = 0, count: int = 2, du
 
         states = integrate(rates, [command[0], 0.0, command[0]], time, 2e-3)
         angle = noisy(rng, states[:, 0], 0.05)
-        return (
-            Record(f"servo {index}", Channel(time, angle, "deg"), Channel(time, command, "deg"), input_kind="reference")
+        return Record(
+            f"servo {index}",
+            Channel(time, angle, "deg"),
+            Channel(time, command, "deg"),
+            input_kind="reference",
         )
 
     records = [record(index) for index in range(count)]
@@ -304,7 +329,7 @@ def decay(effect: str = "quadratic_drag", seed: int = 0, count: int = 3, duratio
             return [s[1], force / m]
 
         states = integrate(rates, [0.02 + (0.1, -0.06, 0.03)[index % 3], 0.0], time, 4e-3)
-        return (Record(f"decay {index}", Channel(time, noisy(rng, states[:, 0], 5e-5), "m")))
+        return Record(f"decay {index}", Channel(time, noisy(rng, states[:, 0], 5e-5), "m"))
 
     records = [record(index) for index in range(count)]
     nominal = """
@@ -329,7 +354,7 @@ def camera(effect: str = "coulomb_friction", seed: int = 0, count: int = 3, dura
             lambda t, s: [s[1], -(omega**2) * (s[0] - 640.0) - 2.0 * zeta * omega * s[1] - rub * sign(s[1], 1.0)],
             [640.0 + (400.0, -250.0, 120.0)[index % 3], 0.0], time, 0.01,
         )  # fmt: skip
-        return (Record(f"film {index}", Channel(time, noisy(rng, states[:, 0], 0.5), "px")))
+        return Record(f"film {index}", Channel(time, noisy(rng, states[:, 0], 0.5), "px"))
 
     records = [record(index) for index in range(count)]
     nominal = """

@@ -24,6 +24,7 @@ COMMAND_GROUP = "rhythmid.commands"
 SEVERAL = ("--holdout", "--elements")  # options that may be followed by several values
 console = Console(stderr=True)
 
+
 def _version(show: bool) -> None:
     if show:
         typer.echo(f"rhythmid {__version__}")
@@ -81,7 +82,9 @@ def spread(arguments: list[str]) -> list[str]:
 
 def _refuse(problem: str) -> NoReturn:
     if problem:  # there is none when the command is called with nothing and shows its help
-        console.print("[bold red]error:[/]", escape(" ".join(problem.split())), highlight=False, soft_wrap=True)
+        console.print(
+            "[bold red]error:[/]", escape(" ".join(problem.split())), highlight=False, soft_wrap=True
+        )
     sys.exit(2)
 
 

@@ -46,7 +46,8 @@ class Layout:
         """Parameter vector of a model with this structure."""
         known = model.parameters
         return np.array(
-            [known[name].value if name in known else default for name, default in self.parameters], dtype=float
+            [known[name].value if name in known else default for name, default in self.parameters],
+            dtype=float,
         )
 
 
@@ -75,7 +76,9 @@ def kernel_source(element: Element, name: str) -> str:
     try:
         source = _text_of(element.kernel)
     except (OSError, TypeError) as error:
-        raise InputError(f"element {element.name!r}: its kernel's source text cannot be read ({error})") from None
+        raise InputError(
+            f"element {element.name!r}: its kernel's source text cannot be read ({error})"
+        ) from None
     if not source.lstrip().startswith("def "):
         raise InputError(f"element {element.name!r}: its kernel must be a plain function written with def")
     return source.replace(f"def {element.kernel.__name__}(", f"def {name}(", 1)
@@ -121,7 +124,9 @@ def _right_hand_side(
     force = [term for term in kernels if term.element.slot == "force"]
     writer.lines.append("f = u" if excited in DRIVES else "f = 0.0")
     command = [term for term in kernels if term.element.slot == "command" and excited in DRIVES]
-    for term in sorted(command, key=lambda term: term.element.acts == "feedback"):  # the controller gets what is left of u
+    for term in sorted(
+        command, key=lambda term: term.element.acts == "feedback"
+    ):  # the controller gets what is left of u
         writer.call(term, ["f", "s0", "s1", "t"] if term.element.acts == "feedback" else ["f", "t"], "f")
     writer.lines.append("f = f + w")
     for term in (term for term in force if term.element.acts == "drive"):
@@ -141,8 +146,12 @@ def _right_hand_side(
     for term in (term for term in force if term.element.acts == "modifier"):
         at = ["s0 - u", "s1 - du"] if excited == "base_displacement" else ["s0", "s1"]
         writer.call(term, ["leg", *at, "t", "f"], "leg")
-    writer.lines.append("absolute = (f + leg + body + d) / p0" if disturbed else "absolute = (f + leg + body) / p0")
-    writer.lines.append({"position": "y = s0", "velocity": "y = s1", "acceleration": "y = absolute"}[measured])
+    writer.lines.append(
+        "absolute = (f + leg + body + d) / p0" if disturbed else "absolute = (f + leg + body) / p0"
+    )
+    writer.lines.append(
+        {"position": "y = s0", "velocity": "y = s1", "acceleration": "y = absolute"}[measured]
+    )
     for term in (term for term in kernels if term.element.slot == "sensor"):
         writer.call(term, ["y", "t"], "y")
     return writer
@@ -171,12 +180,16 @@ def generate(
     p = ", ".join(f"p{i}" for i in range(len(writer.parameters)))
     s = ", ".join(f"s{i}" for i in range(n))
     total = "absolute - u" if excited == "base_acceleration" else "absolute"
-    known = ", ".join(["t, u, w", *(["du"] if excited == "base_displacement" else []), *(["d"] if disturbed else [])])
+    known = ", ".join(
+        ["t, u, w", *(["du"] if excited == "base_displacement" else []), *(["d"] if disturbed else [])]
+    )
     rates = ", ".join(["s1", total, *(f"d{i}" for i in range(2, n))])
     sources: dict[str, str] = {}
     for term in terms:
         if term.element.kernel is not None:
-            sources[term.element.name] = "@njit(error_model='numpy')\n" + kernel_source(term.element, term.element.name)
+            sources[term.element.name] = "@njit(error_model='numpy')\n" + kernel_source(
+                term.element, term.element.name
+            )
 
     def inputs(at: str) -> list[str]:
         """Command u and forcing w at time `at`, within the pieces found before."""
@@ -189,7 +202,10 @@ def generate(
         ]
 
     def stage(number: int, time: str, weight: str, elapsed: str) -> str:
-        at = [f"s{i} + {weight} * a{number - 1}_{i}" if weight and i not in memories else f"s{i}" for i in range(n)]
+        at = [
+            f"s{i} + {weight} * a{number - 1}_{i}" if weight and i not in memories else f"s{i}"
+            for i in range(n)
+        ]
         targets = ", ".join([*(f"a{number}_{i}" for i in range(n)), "y", "f"])
         arguments = ", ".join([time, *known.split(", ")[1:], *at])
         given = ", ".join(elapsed if name == ELAPSED else f"p{i}" for i, name in enumerate(writer.parameters))
@@ -199,7 +215,11 @@ def generate(
     piece_u = "tu = ku[i]; c0 = cu[0, i]; c1 = cu[1, i]; c2 = cu[2, i]; c3 = cu[3, i]"
     piece_w = "tw = kw[j]; e0 = cw[0, j]; e1 = cw[1, j]; e2 = cw[2, j]; e3 = cw[3, j]"
     piece_d = "td = kd[l]; g0 = cd[0, l]; g1 = cd[1, l]; g2 = cd[2, l]; g3 = cd[3, l]"
-    following = ["while kw[j + 1] <= t:", "    j += 1", piece_w]  # smooth signals: no step ends at their knots
+    following = [
+        "while kw[j + 1] <= t:",
+        "    j += 1",
+        piece_w,
+    ]  # smooth signals: no step ends at their knots
     if smooth:
         following += ["while ku[i + 1] <= t:", "    i += 1", piece_u]
     if disturbed:
@@ -215,7 +235,11 @@ def generate(
         *following,
         *inputs("t"),
         stage(4, "t", "h", "h"),
-        *(f"s{i} = s{i} + h / 6.0 * (a1_{i} + 2.0 * (a2_{i} + a3_{i}) + a4_{i})" for i in range(n) if i not in memories),
+        *(
+            f"s{i} = s{i} + h / 6.0 * (a1_{i} + 2.0 * (a2_{i} + a3_{i}) + a4_{i})"
+            for i in range(n)
+            if i not in memories
+        ),
         *([stage(1, "t", "", "h"), *remember] if memories else []),
     ]
     record = [
@@ -226,7 +250,10 @@ def generate(
         f"out[k, {n}] = y",
         f"out[k, {n + 1}] = f",
     ]
-    values = [f"p{i} = {'max_step' if name == STEP else f'parameters[{i}]'}" for i, name in enumerate(writer.parameters)]
+    values = [
+        f"p{i} = {'max_step' if name == STEP else f'parameters[{i}]'}"
+        for i, name in enumerate(writer.parameters)
+    ]
     text = f'''"""Generated by rhythmid: the right-hand side of one model structure and its Runge-Kutta loop."""
 import math
 
@@ -334,12 +361,15 @@ def generate_rates(terms: tuple[Term, ...], excited: InputKind = "force") -> tup
     n, p = len(layout.states), len(layout.parameters)
     targets = ", ".join(f"out[k, {i}]" for i in range(n + 2))
     known = "t, u, w, 0.0" if excited == "base_displacement" else "t, u, w"
-    arguments = ", ".join([known, *(f"states[k, {i}]" for i in range(n)), *(f"parameters[{i}]" for i in range(p))])
+    arguments = ", ".join(
+        [known, *(f"states[k, {i}]" for i in range(n)), *(f"parameters[{i}]" for i in range(p))]
+    )
     values = [f"p{i} = parameters[{i}]" for i in range(p)]
     elapsed = [name for name, _ in layout.parameters].index(ELAPSED) if layout.memories else -1
     follow = [f"out[k, {i}] = (out[k, {i}] - states[k, {i}]) / p{elapsed}" for i in layout.memories]
     right_hand_side = text.split("@njit(\n", 1)[0]
-    return f'''{right_hand_side}@njit(
+    return (
+        f"""{right_hand_side}@njit(
     "int64(float64[::1], float64[::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1])",
     cache=True, nogil=True, error_model="numpy",
 )
@@ -352,7 +382,9 @@ def run(times, command, forcing, states, parameters, out):
 {_indent(writer.drive, 2)}
 {_indent([f"{targets} = rhs({arguments})", *follow], 2)}
     return times.shape[0]
-''', layout
+""",
+        layout,
+    )
 
 
 @lru_cache(maxsize=256)

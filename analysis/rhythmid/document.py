@@ -42,7 +42,9 @@ class Node:
             for key, node in self.value.items():
                 if key not in known:
                     near = get_close_matches(str(key), known, 1)
-                    node.fail(f"unknown key; {f'did you mean {near[0]!r}?' if near else 'known: ' + ', '.join(known)}")
+                    node.fail(
+                        f"unknown key; {f'did you mean {near[0]!r}?' if near else 'known: ' + ', '.join(known)}"
+                    )
         return self.value
 
     def items(self) -> "list[Node]":
@@ -89,7 +91,9 @@ class Node:
         return self.value
 
 
-def _node(raw: yaml.Node | None, name: str, path: str, loader: yaml.SafeLoader, line: int | None = None) -> Node:
+def _node(
+    raw: yaml.Node | None, name: str, path: str, loader: yaml.SafeLoader, line: int | None = None
+) -> Node:
     """`line` is where the key of this value stands: the value itself may begin further down."""
     if raw is None:
         return Node(None, name, path)
@@ -100,13 +104,17 @@ def _node(raw: yaml.Node | None, name: str, path: str, loader: yaml.SafeLoader, 
             if not isinstance(key_node, yaml.ScalarNode):
                 raise InputError(f"{name}:{key_node.start_mark.line + 1}: a key is a single word")
             key = str(key_node.value)
-            inner = _node(value_node, name, f"{path}.{key}" if path else key, loader, key_node.start_mark.line)
+            inner = _node(
+                value_node, name, f"{path}.{key}" if path else key, loader, key_node.start_mark.line
+            )
             if key in found:
                 inner.fail("is given twice")
             found[key] = inner
         return Node(found, place, path)
     if isinstance(raw, yaml.SequenceNode):
-        return Node([_node(item, name, f"{path}[{i}]", loader) for i, item in enumerate(raw.value)], place, path)
+        return Node(
+            [_node(item, name, f"{path}[{i}]", loader) for i, item in enumerate(raw.value)], place, path
+        )
     try:
         return Node(loader.construct_object(raw), place, path)
     except ValueError as error:  # a date that does not exist, say

@@ -38,7 +38,10 @@ def _source(element: Element) -> str:
     p = [f"p{i}" for i in range(len(element.parameters) + len(element.borrows))]
     s = [f"s{i}" for i in range(len(element.own))]
     flowing = len(element.states)  # the first of `s`; the others are remembered
-    sources = [*(parameter.name for parameter in element.parameters), *(source for source, _ in element.borrows.values())]
+    sources = [
+        *(parameter.name for parameter in element.parameters),
+        *(source for source, _ in element.borrows.values()),
+    ]
     if element.slot == "force":
         leading = ["leg"] if element.acts == "modifier" else []
         arguments = ["t"] if element.acts == "drive" else [*leading, "x", "v", "t", "f"]
@@ -72,7 +75,9 @@ def _source(element: Element) -> str:
         if element.memories:
             inner += [*call("at", 1, s, "h"), *(f"s{i} = a1_{i}" for i in range(flowing, len(s)))]
         body = [
-            "substeps = max(1, int(math.ceil(width / max_step * (1.0 - 1e-9))))" if flowing else "substeps = 1",
+            "substeps = max(1, int(math.ceil(width / max_step * (1.0 - 1e-9))))"
+            if flowing
+            else "substeps = 1",
             "h = width / substeps",
             "for substep in range(substeps):",
             *(f"    {line}" for line in inner),

@@ -63,5 +63,9 @@ def _complaint(text: str, complaint: str) -> str:
     kernels = set(re.findall(r"^def (\w+)\(", text, re.MULTILINE)) - {"rhs", "run"}
     named = sorted(kernel for kernel in kernels if re.search(rf"\b{kernel}\(", complaint))
     lines = [line.strip() for line in complaint.splitlines()]
-    lines = [line for line in lines if line and not line.startswith(("Failed in", "There are", "- Of which", "During"))]
+    lines = [
+        line
+        for line in lines
+        if line and not line.startswith(("Failed in", "There are", "- Of which", "During"))
+    ]
     return f"element {' or '.join(named) or '?'}: its kernel does not compile: {' '.join(lines[:2])[:200]}"

@@ -93,7 +93,9 @@ class Model:
         terms = tuple(
             replace(
                 term,
-                values={name: changes.get(f"{term.label}.{name}", value) for name, value in term.values.items()},
+                values={
+                    name: changes.get(f"{term.label}.{name}", value) for name, value in term.values.items()
+                },
             )
             for term in self.terms
         )
@@ -161,7 +163,11 @@ class Model:
         """The model as YAML text that `load` reads back."""
         content: dict[str, Any] = {}
         if self.units not in (TRANSLATIONAL, ROTATIONAL):
-            content["units"] = {"force": self.units.force, "position": self.units.position, "mass": self.units.mass}
+            content["units"] = {
+                "force": self.units.force,
+                "position": self.units.position,
+                "mass": self.units.mass,
+            }
         content["inertia"] = {"mass": _entry(self.mass, MASS)}
         for slot in SLOTS:
             terms = [term for term in self.terms if term.element.slot == slot]
@@ -244,10 +250,15 @@ def _units(document: dict[str, Node], mass: Node | None) -> Units:
     unit = ""
     if mass is not None and isinstance(mass.value, dict) and "unit" in mass.value:
         unit = str(mass.value["unit"].value)
-    return ROTATIONAL if re.sub(r"[ ·]", "", unit.replace("**", "^").replace("²", "^2")) in (
-        "kg*m^2",
-        "kgm^2",
-    ) else TRANSLATIONAL
+    return (
+        ROTATIONAL
+        if re.sub(r"[ ·]", "", unit.replace("**", "^").replace("²", "^2"))
+        in (
+            "kg*m^2",
+            "kgm^2",
+        )
+        else TRANSLATIONAL
+    )
 
 
 def _term(item: Node, slot: str, catalogue: Catalogue, units: Units, taken: set[str]) -> Term:
@@ -267,7 +278,9 @@ def _term(item: Node, slot: str, catalogue: Catalogue, units: Units, taken: set[
         if parameter.name in given:
             values[parameter.name] = _value(given[parameter.name], parameter, units)
         elif parameter.default is None:
-            body.fail(f"parameter {parameter.name!r} is missing ({parameter.description}, {units.of(parameter.unit)})")
+            body.fail(
+                f"parameter {parameter.name!r} is missing ({parameter.description}, {units.of(parameter.unit)})"
+            )
         else:
             values[parameter.name] = Value(
                 parameter.default, units.of(parameter.unit), True, parameter.bounds
@@ -282,7 +295,9 @@ def _model(document: Node, catalogue: Catalogue) -> Model:
         raise InputError(f"{document.place}: the model file is empty")
     sections = document.mapping(["units", "inertia", *SLOTS])
     if "inertia" not in sections:
-        document.fail("the model has no 'inertia:'; write inertia: {mass: {value: 1.0, unit: kg, fixed: true}}")
+        document.fail(
+            "the model has no 'inertia:'; write inertia: {mass: {value: 1.0, unit: kg, fixed: true}}"
+        )
     inertia = sections["inertia"].mapping(["mass"])
     if "mass" not in inertia:
         sections["inertia"].fail("'mass' is missing")

@@ -60,7 +60,9 @@ def settled_state(model: Model, periods: int = 120, tolerance: float = 1e-12) ->
         times = np.array([-count * period, -(count - 1) * period])
         out = np.empty((2, len(state) + 2))
         if compiled.run(times, knots, zero, knots, zero, knots, zero, parameters, state, MAX_STEP, out) < 2:
-            raise InputError("the model diverges under its forcing; check its parameters or give an initial state")
+            raise InputError(
+                "the model diverges under its forcing; check its parameters or give an initial state"
+            )
         before, state = state, np.ascontiguousarray(out[-1, : len(state)])
         if np.allclose(before, state, rtol=tolerance, atol=tolerance):
             break
@@ -142,10 +144,22 @@ class Plant:
         n = len(self._state)
         out = np.empty((len(times), n + 2))
         done = self._compiled.run(
-            times, knots, coefficients, no_knots, zero, no_knots, zero, self._parameters, self._state, MAX_STEP, out
+            times,
+            knots,
+            coefficients,
+            no_knots,
+            zero,
+            no_knots,
+            zero,
+            self._parameters,
+            self._state,
+            MAX_STEP,
+            out,
         )
         if done < len(times) or not np.isfinite(out[-1]).all():
-            raise InputError(f"the plant diverges at t = {times[min(done, len(times) - 1)]:.3f} s; check its parameters")
+            raise InputError(
+                f"the plant diverges at t = {times[min(done, len(times) - 1)]:.3f} s; check its parameters"
+            )
         rows = out if first else out[1:]
         self._next = int(last) + 1
         self._time = float(times[-1])
@@ -157,4 +171,6 @@ class Plant:
         position = rows[:, n].copy()
         for sample in self._samplers:
             position = sample(grid, position)
-        return Samples(stamps, position, rows[:, 1].copy(), rows[:, n + 1].copy(), forcing_at(self._model, physical))
+        return Samples(
+            stamps, position, rows[:, 1].copy(), rows[:, n + 1].copy(), forcing_at(self._model, physical)
+        )

@@ -67,7 +67,9 @@ def band_limited(time: Array, value: Array, oversampling: int = 4) -> PPoly:
 
 def continuous(time: Array, value: Array, hold: Hold) -> PPoly:
     """Signal from samples by the named hold."""
-    return {"zero": zero_order_hold, "linear": first_order_hold, "band_limited": band_limited}[hold](time, value)
+    return {"zero": zero_order_hold, "linear": first_order_hold, "band_limited": band_limited}[hold](
+        time, value
+    )
 
 
 def impulse_preserving(held: PPoly) -> PPoly:

@@ -87,10 +87,14 @@ def start_states(
     index = {name: i for i, name in enumerate(compiled.layout.states)}
     for term in model.terms:
         if term.element.own and term.element.initial is not None:
-            borrowed = {n: model.borrowed(source, default) for n, (source, default) in term.element.borrows.items()}
+            borrowed = {
+                n: model.borrowed(source, default) for n, (source, default) in term.element.borrows.items()
+            }
             arguments = {n: v.value for n, v in term.values.items()} | borrowed
             signal = command if term.element.slot == "command" else command + forcing
-            for state, value in zip(term.element.own, term.element.initial(position, velocity, signal, **arguments)):
+            for state, value in zip(
+                term.element.own, term.element.initial(position, velocity, signal, **arguments)
+            ):
                 start[index[f"{term.label}.{state}"]] = value
     return start
 
@@ -128,7 +132,9 @@ def simulate(
         compiled.layout.vector(model), np.ascontiguousarray(start), max_step, out,
     )  # fmt: skip
     if done < len(times) or not np.isfinite(out[-1]).all():
-        raise InputError(f"the simulation diverges at t = {times[min(done, len(times) - 1)]:.4g} s; check the parameters")
+        raise InputError(
+            f"the simulation diverges at t = {times[min(done, len(times) - 1)]:.4g} s; check the parameters"
+        )
     output = out[:, n]
     if seed is not None:
         for sample in samplers(model, seed):
@@ -139,7 +145,9 @@ def simulate(
 def samplers(model: Model, seed: int) -> list:
     """What happens to sampled outputs, in order: one function (stamps, samples) -> samples for each noise or rounding."""
     return [
-        term.element.sampler(np.random.default_rng([seed, index]), **{n: v.value for n, v in term.values.items()})
+        term.element.sampler(
+            np.random.default_rng([seed, index]), **{n: v.value for n, v in term.values.items()}
+        )
         for index, term in enumerate(model.terms)
         if term.element.slot in ("sensor", "timing") and term.element.sampler is not None
     ]

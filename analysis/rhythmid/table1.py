@@ -44,7 +44,13 @@ class Case:
     plus: tuple[float, float]
 
 
-def _case(number: int, actual: tuple[float, float], total: float, minus: tuple[float, float], plus: tuple[float, float]) -> Case:
+def _case(
+    number: int,
+    actual: tuple[float, float],
+    total: float,
+    minus: tuple[float, float],
+    plus: tuple[float, float],
+) -> Case:
     def seconds(pair: tuple[float, float]) -> tuple[float, float]:
         return pair[0] / 1000.0, pair[1] / 1000.0
 
@@ -99,7 +105,9 @@ def curves(found: Identification) -> tuple[dict[int, list[Curve]], dict[int, lis
     fit = paper.fit.linearised.htf(htf.harmonics, htf.frequency)
     undone = htf
     if found.delays.input.value is not None and found.delays.measurement.value is not None:
-        undone = htf.delayed(-found.delays.input.value, -found.delays.measurement.value, paper.pumping.frequency)
+        undone = htf.delayed(
+            -found.delays.input.value, -found.delays.measurement.value, paper.pumping.frequency
+        )
     magnitude, phase = {}, {}
     for m in (0, -1, 1):
         row = htf.row(m)
@@ -125,7 +133,10 @@ def run_case(case: Case, folder: Path) -> Row:
 
 
 def table1(
-    folder: Path, cases: Sequence[Case] = CASES, workers: int | None = None, tell: Callable[[str], None] | None = None
+    folder: Path,
+    cases: Sequence[Case] = CASES,
+    workers: int | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> list[Row]:
     """All experiments, on all cores; bags and figures go to `folder`. Raises InputError when one of them fails."""
     folder.mkdir(parents=True, exist_ok=True)

@@ -16,7 +16,9 @@ def read_time_table(path: str | Path, meaning: str) -> tuple[NDArray[np.float64]
     try:
         lines = Path(path).read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or 'is not text'}") from None
+        raise InputError(
+            f"{path}: cannot be read: {getattr(error, 'strerror', None) or 'is not text'}"
+        ) from None
     rows: list[tuple[float, ...]] = []
     header = False
     for number, line in enumerate(lines, start=1):

@@ -90,7 +90,9 @@ def ring_down(machine: Model, controller: DelayCompensator, delay: float, durati
 def main(path: str) -> tuple[float, float]:
     """Largest late speed without and with compensation."""
     latency = Latency.load(path)
-    target = latency.model.value("linear_spring.rest_length") - 9.81 / latency.model.value("linear_spring.stiffness")
+    target = latency.model.value("linear_spring.rest_length") - 9.81 / latency.model.value(
+        "linear_spring.stiffness"
+    )
     gain = (0.0, 40.0)  # damping injection: stable without delay, unstable with it
     plain = DelayCompensator(latency.model, 0.0, gain, target)
     ahead = DelayCompensator(latency.model, latency.sum, gain, target)

@@ -124,8 +124,14 @@ NO_RECORDINGS = {
     "bag/": (empty_folder, "holds no recording (no .mcap or .db3 file)"),
     "bag.mcap": (lambda folder: (folder / "bag.mcap").touch(), "is not an MCAP file"),
     "bag.db3": (lambda folder: (folder / "bag.db3").touch(), "is not an sqlite3 bag"),
-    "noise.mcap": (lambda folder: (folder / "noise.mcap").write_bytes(bytes(range(256))), "is not an MCAP file"),
-    "noise.db3": (lambda folder: (folder / "noise.db3").write_bytes(bytes(range(256))), "is not an sqlite3 bag"),
+    "noise.mcap": (
+        lambda folder: (folder / "noise.mcap").write_bytes(bytes(range(256))),
+        "is not an MCAP file",
+    ),
+    "noise.db3": (
+        lambda folder: (folder / "noise.db3").write_bytes(bytes(range(256))),
+        "is not an sqlite3 bag",
+    ),
     "notes.txt": (lambda folder: (folder / "notes.txt").write_text("u, y"), "is neither a bag"),
     "bag.": (unused, "topic /hopper/excitation is not in"),
     "./bag": (texts, "topic /hopper/excitation: field 'effort[leg]': std_msgs/msg/String has no field"),
@@ -176,10 +182,22 @@ def test_a_wrong_signals_file_is_refused_with_one_line(reader, text, topics, bag
 
 
 WRONG_MODELS = {
-    "unknown element": ("linear_spring:", "linear_sprong:", "unknown element 'linear_sprong'; did you mean 'linear_spring'?"),
-    "out of range": ("stance: {value: 2.0", "stance: {value: -2.0", "switched_damper.stance: -2 N*s/m is outside [0, inf]"),
+    "unknown element": (
+        "linear_spring:",
+        "linear_sprong:",
+        "unknown element 'linear_sprong'; did you mean 'linear_spring'?",
+    ),
+    "out of range": (
+        "stance: {value: 2.0",
+        "stance: {value: -2.0",
+        "switched_damper.stance: -2 N*s/m is outside [0, inf]",
+    ),
     "not SI": ("unit: N/m}", "unit: N/mm}", "write the value in N/m (multiply it by 1000)"),
-    "negative delay": ("{delay: {value: 0.0", "{delay: {value: -0.1", "input_delay.delay: -0.1 s is outside [0, inf]"),
+    "negative delay": (
+        "{delay: {value: 0.0",
+        "{delay: {value: -0.1",
+        "input_delay.delay: -0.1 s is outside [0, inf]",
+    ),
     "massless": ("mass: {value: 1.0", "mass: {value: 0.0", "inertia.mass: must be greater than 0"),
 }
 
@@ -281,7 +299,10 @@ def test_a_missing_experiment_is_refused_with_one_line(starts):
 WRITERS = [
     ("check", "bag", "--json"),
     *(("identify", "bag", option) for option in ("--json", "--report", "--save-model", "--save")),
-    *(("diagnose", "bag", "--model", str(MODEL), option) for option in ("--json", "--report", "--save-model")),
+    *(
+        ("diagnose", "bag", "--model", str(MODEL), option)
+        for option in ("--json", "--report", "--save-model")
+    ),
     ("simulate", "hopper.yaml", "--experiment", "experiment.yaml", "--out"),
     ("run", "experiment.yaml", "--out"),
     ("table1", "--json"),
@@ -297,7 +318,9 @@ TARGETS = {
 
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("writer", WRITERS, ids=lambda words: f"{words[0]} {words[-1]}")
-def test_a_result_is_refused_before_any_work_where_it_cannot_be_written(writer, target, tmp_path, refused, bag, topics):
+def test_a_result_is_refused_before_any_work_where_it_cannot_be_written(
+    writer, target, tmp_path, refused, bag, topics
+):
     if writer[0] == "run":
         needs_run()
     bag(topics)

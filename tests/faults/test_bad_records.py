@@ -33,7 +33,11 @@ TOPICS = {
     "/hopper/joint_states": Messages(STAMPS, position=VALUES),
 }
 KINDS = ("chunks", "zstd", "lz4", "no chunks", "db3")
-IN_A_CHUNK = {"zstd": b"zstd", "lz4": b"lz4", "chunks": VALUES[200].tobytes()}  # what stands in one, not far from its end
+IN_A_CHUNK = {
+    "zstd": b"zstd",
+    "lz4": b"lz4",
+    "chunks": VALUES[200].tobytes(),
+}  # what stands in one, not far from its end
 CHECKED = ("chunks", "zstd", "lz4")  # every chunk bears a checksum
 
 
@@ -261,7 +265,9 @@ class TestDirectories:
         np.testing.assert_array_equal(read_record(tmp_path / "packed").output.value, VALUES)
 
 
-@pytest.mark.parametrize(("name", "begin"), [("vast.mcap", b"\x89MCAP0\r\n"), ("vast.db3", b"SQLite format 3\0")])
+@pytest.mark.parametrize(
+    ("name", "begin"), [("vast.mcap", b"\x89MCAP0\r\n"), ("vast.db3", b"SQLite format 3\0")]
+)
 def test_a_vast_file_of_zeros_is_refused_at_once(tmp_path, name, begin):
     path = tmp_path / name
     path.write_bytes(begin)

@@ -23,7 +23,9 @@ CYCLE = ({"type": "silence", "length": 8.0}, 1.0)
 TINY = ({"type": "chirp", "amplitude": 0.004, "sweep": 8.0, "band": [0.0, 7.0]}, 1.0)
 
 
-def run(given: list[Record], model: Model | None = None, catalogue: Catalogue = SMALL, **options) -> Diagnosis:
+def run(
+    given: list[Record], model: Model | None = None, catalogue: Catalogue = SMALL, **options
+) -> Diagnosis:
     return diagnose(given, model or hopper(), catalogue=catalogue, **options).diagnosis
 
 
@@ -35,7 +37,9 @@ def plain() -> list[Record]:
 @pytest.fixture(scope="module")
 def rubbing() -> list[Record]:
     friction = CATALOGUE["coulomb_friction"]
-    return records(hopper().with_element(friction, {"force": 0.03, "transition": 0.002}), (WEAK, STRONG), seed=2)
+    return records(
+        hopper().with_element(friction, {"force": 0.03, "transition": 0.002}), (WEAK, STRONG), seed=2
+    )
 
 
 def scaled(record: Record, role: str, factor: float) -> Record:
@@ -121,7 +125,11 @@ def test_a_unit_that_is_off_by_a_thousand_is_named_with_the_channel_and_the_scal
 
 
 def test_records_in_different_units_are_refused_by_name(plain):
-    refused([plain[0], scaled(plain[1], "output", 1000.0)], "do not look like one machine in one unit", "check units")
+    refused(
+        [plain[0], scaled(plain[1], "output", 1000.0)],
+        "do not look like one machine in one unit",
+        "check units",
+    )
     refused(plain, "do not look like one machine", holdout=[scaled(plain[0], "output", 1000.0)])
 
 

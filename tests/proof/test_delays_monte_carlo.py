@@ -25,7 +25,8 @@ def test_scatter_is_the_bound_and_intervals_cover(cycle):
     machine = hopper().with_values(TRUTH)
     bound = cramer_rao(machine, quiet, NOISE, cycle=cycle)
     fits = [
-        Drawn.of(fit_from(machine, noisy(quiet, NOISE, seed), cycle=cycle), tuple(TRUTH)) for seed in range(RUNS)
+        Drawn.of(fit_from(machine, noisy(quiet, NOISE, seed), cycle=cycle), tuple(TRUTH))
+        for seed in range(RUNS)
     ]
     found = {name: scatter(fits, name, truth) for name, truth in TRUTH.items()}
     ratios = [found[name].std / bound.std[name] for name in TRUTH]

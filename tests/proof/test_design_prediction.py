@@ -22,7 +22,12 @@ WANTED = Requirements(
 )  # fmt: skip
 COMB = replace(WANTED, kind="comb", duration=50.0, harmonics=1, rate=500)
 RUNS = 100  # the scatter of a scatter is 7 % then; the draws are fixed
-OFF = {"linear_spring.stiffness": 202.0, "switched_damper.stance": 2.05, "input_delay.delay": 0.043, "measurement_delay.delay": 0.054}
+OFF = {
+    "linear_spring.stiffness": 202.0,
+    "switched_damper.stance": 2.05,
+    "input_delay.delay": 0.043,
+    "measurement_delay.delay": 0.054,
+}
 
 
 @pytest.mark.parametrize("wanted", [WANTED, COMB], ids=["multisine", "comb"])
@@ -36,7 +41,9 @@ def test_the_predicted_standard_deviations_are_within_a_fifth_of_monte_carlo(wan
         Drawn.of(fit_from(start, noisy(record, wanted.noise_std, seed)), machine.free) for seed in range(RUNS)
     ]
     predicted = made.prediction.parameters | {
-        f"{which}_delay.delay": estimate for which, estimate in made.prediction.delays.items() if which != "sum"
+        f"{which}_delay.delay": estimate
+        for which, estimate in made.prediction.delays.items()
+        if which != "sum"
     }
     assert sorted(predicted) == sorted(machine.free)
     for name, estimate in predicted.items():

@@ -34,7 +34,9 @@ force:
 """
 
 pytestmark = [
-    pytest.mark.skipif(not FOLDER.is_dir(), reason=f"the Silverbox data are not in {FOLDER}; set RHYTHMID_DATA"),
+    pytest.mark.skipif(
+        not FOLDER.is_dir(), reason=f"the Silverbox data are not in {FOLDER}; set RHYTHMID_DATA"
+    ),
     pytest.mark.timeout(900),
 ]
 
@@ -64,7 +66,10 @@ def training(count: int, length: int) -> dict[str, tuple[int, int]]:
 def answer(tmp_path_factory):
     folder = tmp_path_factory.mktemp("silverbox")
     pieces = list(training(5, 2000).items())
-    seen, unseen = dict(pieces[::2]), dict(pieces[1::2])  # the official tests stay out of the diagnosis altogether
+    seen, unseen = (
+        dict(pieces[::2]),
+        dict(pieces[1::2]),
+    )  # the official tests stay out of the diagnosis altogether
     return diagnose(records(folder, seen), Model.from_text(LINEAR), records(folder, unseen))
 
 
@@ -85,7 +90,10 @@ def test_the_hardening_spring_is_named_and_measured(answer):
     result = answer.diagnosis
     assert result.verdict == "missing_physics"
     assert result.missing[0].element == "cubic_stiffness"
-    ratio = result.parameters["cubic_stiffness.coefficient"].value / result.parameters["linear_spring.stiffness"].value
+    ratio = (
+        result.parameters["cubic_stiffness.coefficient"].value
+        / result.parameters["linear_spring.stiffness"].value
+    )
     assert ratio == pytest.approx(3.96, rel=0.05)
     assert result.location.slot == "force"
 
@@ -107,7 +115,9 @@ def test_the_augmented_model_runs_free_over_the_official_tests(answer, tmp_path,
     error = float(np.sqrt(np.mean(fit.residuals[0][START:] ** 2)))
     assert error < limit
     linear = answer.evidence.search.nominal.model
-    assert error < 0.05 * float(np.sqrt(np.mean(start_only(linear, [series], white, 1e-3).residuals[0][START:] ** 2)))
+    assert error < 0.05 * float(
+        np.sqrt(np.mean(start_only(linear, [series], white, 1e-3).residuals[0][START:] ** 2))
+    )
 
 
 def test_the_augmented_model_can_be_saved_and_read_back(answer, tmp_path):

@@ -40,7 +40,11 @@ def figures(summary: str) -> dict[str, dict[str, str]]:
         words = line.split()
         if words and words[0] in ("plant", "command_delay", "measurement_delay", "excitation", "recorder"):
             node, words = words[0], words[1:]
-        if node and len(words) == 2 and line.startswith(("plant", "command", "measurement", "excitation", " ")):
+        if (
+            node
+            and len(words) == 2
+            and line.startswith(("plant", "command", "measurement", "excitation", " "))
+        ):
             found.setdefault(node, {})[words[0]] = words[1]
     return found
 
@@ -77,7 +81,9 @@ def test_delays_of_a_busy_machine_are_those_that_were_applied(recorded, rhythmid
             applied += float(told["plant"]["transport_mean_ms"])
         assert told[node]["dropped"] == "0"
         assert 1e3 * DELAYS[name] <= applied < 1e3 * DELAYS[name] + 20.0  # nothing is released early
-        found = 1e3 * (result["delays"][name]["value"] + 0.5 * SWEEP * drift[name])  # in the middle of the run
+        found = 1e3 * (
+            result["delays"][name]["value"] + 0.5 * SWEEP * drift[name]
+        )  # in the middle of the run
         assert found == pytest.approx(applied, abs=CLOSE), (name, told)
     assert result["parameters"]["linear_spring.stiffness"]["value"] == pytest.approx(200.0, rel=2e-3)
     assert result["parameters"]["switched_damper.stance"]["value"] == pytest.approx(2.0, rel=2e-2)

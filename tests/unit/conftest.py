@@ -115,7 +115,9 @@ def paper_record() -> Callable[..., Record]:
         amplitude: float = 0.004,
         warm_up: int = 1,
     ) -> Record:
-        text = PAPER_EXPERIMENT.format(delays=delays, noise=noise, phase=phase, amplitude=amplitude, warm_up=warm_up)
+        text = PAPER_EXPERIMENT.format(
+            delays=delays, noise=noise, phase=phase, amplitude=amplitude, warm_up=warm_up
+        )
         topics = perform(Experiment.from_text(text, str(files("rhythmid") / "models")))
 
         def channel(topic: str, field: str, unit: str) -> Channel:

@@ -26,12 +26,16 @@ def bags(tmp_path_factory):
     for name, noise, delay in (("sim", 0.0, 0.0), ("real", 1e-4, 0.02)):
         (folder / f"{name}.yaml").write_text(EXPERIMENT.format(noise=noise, delay=delay))
         messages = perform(Experiment.load(folder / f"{name}.yaml"))
-        write_bag(folder / name, {topic: messages[topic] for topic in ("excitation", "forcing", "joint_states")})
+        write_bag(
+            folder / name, {topic: messages[topic] for topic in ("excitation", "forcing", "joint_states")}
+        )
     return folder
 
 
 def test_two_bags_are_enough(rhythmid, bags):
-    done = rhythmid("diagnose", "real", "--sim", "sim", "--json", "out.json", "--report", "out.html", cwd=bags)
+    done = rhythmid(
+        "diagnose", "real", "--sim", "sim", "--json", "out.json", "--report", "out.html", cwd=bags
+    )
     assert done.returncode == 0, done.stderr
     assert "input delay" in " ".join(done.stdout.split())
     found = json.loads((bags / "out.json").read_text())["comparison"]

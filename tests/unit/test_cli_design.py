@@ -24,7 +24,17 @@ def folder(tmp_path_factory) -> Path:
 def made(folder, rhythmid):
     """A design made once by the command, and what it printed."""
     if not (folder / "said").exists():
-        done = rhythmid("design", PAPER, *ARGUMENTS, "--output", "out/plan", "--json", "out/plan.json", cwd=folder, timeout=280.0)
+        done = rhythmid(
+            "design",
+            PAPER,
+            *ARGUMENTS,
+            "--output",
+            "out/plan",
+            "--json",
+            "out/plan.json",
+            cwd=folder,
+            timeout=280.0,
+        )
         assert (done.returncode, done.stderr) == (0, ""), done.stderr
         (folder / "said").write_text(done.stdout, encoding="utf-8")
     return folder / "out" / "plan", (folder / "said").read_text(encoding="utf-8")
@@ -43,14 +53,20 @@ def test_the_folder_holds_all_of_the_experiment(made):
     ]  # fmt: skip
     assert (plan / "model.yaml").read_bytes() == PAPER.read_bytes()
     assert (plan / "design.png").read_bytes().startswith(b"\x89PNG")
-    assert json.loads((plan / "design.json").read_text()) == json.loads((plan.parent / "plan.json").read_text())
+    assert json.loads((plan / "design.json").read_text()) == json.loads(
+        (plan.parent / "plan.json").read_text()
+    )
     assert "predicted standard deviations" in said and "rhythmid run out/plan/experiment.yaml" in said
 
 
 def test_every_free_parameter_and_both_delays_have_a_predicted_standard_deviation(made):
     plan, said = made
     result = json.loads((plan / "design.json").read_text())
-    assert set(result["parameters"]) == {"linear_spring.stiffness", "linear_spring.rest_length", "switched_damper.stance"}
+    assert set(result["parameters"]) == {
+        "linear_spring.stiffness",
+        "linear_spring.rest_length",
+        "switched_damper.stance",
+    }
     assert set(result["delays"]) == {"input", "measurement", "sum"}
     for name, estimate in (result["parameters"] | result["delays"]).items():
         assert 0.0 < estimate["std"] < 0.1 * estimate["value"]
@@ -94,8 +110,13 @@ def test_simulating_and_identifying_the_design_gives_the_predicted_uncertainty(m
     assert done.returncode == 0, done.stderr
     done = rhythmid("identify", "bag", "--model", plan / "model.yaml", "--json", plan.parent / "found.json")
     assert done.returncode == 0, done.stderr
-    predicted, found = (json.loads(path.read_text()) for path in (plan / "design.json", plan.parent / "found.json"))
-    for group, names in (("parameters", predicted["parameters"]), ("delays", ("input", "measurement", "sum"))):
+    predicted, found = (
+        json.loads(path.read_text()) for path in (plan / "design.json", plan.parent / "found.json")
+    )
+    for group, names in (
+        ("parameters", predicted["parameters"]),
+        ("delays", ("input", "measurement", "sum")),
+    ):
         for name in names:
             expected, actual = predicted[group][name], found[group][name]
             assert actual["std"] == pytest.approx(expected["std"], rel=0.1), name

@@ -63,7 +63,9 @@ def test_a_part_of_the_recording_that_began_in_the_middle_is_aligned_too(simulat
 
 def test_of_the_many_offsets_of_a_repeating_command_the_true_one_is_taken():
     one = record(hopper(), MULTISINE, delays=NONE, std=0.0)
-    assert align(one, resampled(record(hopper(), MULTISINE), later=5.0)).offset == pytest.approx(5.0, abs=1e-6)
+    assert align(one, resampled(record(hopper(), MULTISINE), later=5.0)).offset == pytest.approx(
+        5.0, abs=1e-6
+    )
 
 
 def test_without_a_command_the_forcing_s_phase_aligns():
@@ -104,7 +106,11 @@ def test_a_command_that_began_elsewhere_in_the_forcing_s_cycle_is_noticed(simula
 
 
 def test_of_several_recordings_the_one_of_the_same_experiment_is_compared(simulation):
-    others = [record(hopper(), SILENCE, seed=1), record(hopper(), CHIRP, seed=2), record(hopper(), MULTISINE, seed=3)]
+    others = [
+        record(hopper(), SILENCE, seed=1),
+        record(hopper(), CHIRP, seed=2),
+        record(hopper(), MULTISINE, seed=3),
+    ]
     assert compare(simulation, others).recording == "record 2"
 
 
@@ -135,7 +141,12 @@ def test_each_delay_is_found_on_its_side(simulation, delays, expected):
         ("cubic_stiffness", {"coefficient": 20000.0}, "force", "position"),
         ("coulomb_friction", {"force": 0.05, "transition": 0.002}, "force", "velocity"),
         ("stiffness_drift", {"rate": 0.005}, "force", "position, changing with time"),
-        ("periodic_disturbance", {"amplitude": 0.1, "frequency": 3.3, "phase": 0.3}, "force", "periodic_disturbance"),
+        (
+            "periodic_disturbance",
+            {"amplitude": 0.1, "frequency": 3.3, "phase": 0.3},
+            "force",
+            "periodic_disturbance",
+        ),
         ("actuator_saturation", {"limit": 1.5}, "actuator", "actuator force"),
         ("command_lag", {"time_constant": 0.02}, "command", "command_lag"),
         ("sensor_lag", {"time_constant": 0.02}, "sensor", "sensor_lag"),
@@ -184,7 +195,17 @@ def test_another_start_is_not_mistaken_for_physics():
 
 def test_the_comparison_is_plain_json(simulation):
     found = compare(simulation, [record(hopper(), CHIRP)]).to_dict()
-    assert {"slot", "phase", "state", "frequency", "harmonics", "time", "alignment", "explanations", "comparable"} <= set(found)
+    assert {
+        "slot",
+        "phase",
+        "state",
+        "frequency",
+        "harmonics",
+        "time",
+        "alignment",
+        "explanations",
+        "comparable",
+    } <= set(found)
     json.dumps(found, allow_nan=False)
 
 

@@ -44,7 +44,9 @@ def comb() -> Design:
 
 @given(some.floats(40.0, 400.0), some.integers(1, 4), some.floats(0.5, 3.0))
 def test_no_two_responses_of_a_multisine_fall_on_one_another(duration, harmonics, frequency):
-    wanted = replace(WANTED, duration=duration, harmonics=harmonics, forcing=Forcing(1.0, frequency), longest_delay=0.1)
+    wanted = replace(
+        WANTED, duration=duration, harmonics=harmonics, forcing=Forcing(1.0, frequency), longest_delay=0.1
+    )
     made = interleaved(wanted, RING_DOWN)
     seen: dict[int, tuple[int, int]] = {}
     for line in made.lines.tolist():
@@ -69,7 +71,9 @@ def test_harmonic_m_of_a_comb_falls_into_class_m(harmonics):
     count = plan.facts["chirps"]
     assert count == 2 * harmonics + 3
     signed = plan.response.lines[None, :] + plan.response.orders[:, None] * plan.response.periods
-    np.testing.assert_array_equal(signed % count, np.broadcast_to(plan.response.orders[:, None] % count, signed.shape))
+    np.testing.assert_array_equal(
+        signed % count, np.broadcast_to(plan.response.orders[:, None] % count, signed.shape)
+    )
     assert plan.response.separate
 
 
@@ -124,7 +128,10 @@ def test_minimising_the_crest_factor_keeps_the_amplitudes_and_the_seed_decides()
     signal = one_period(lines, weights, phases)
     found = np.abs(np.fft.rfft(signal))[lines] * 2 / len(signal)
     np.testing.assert_allclose(found, weights, rtol=1e-9)
-    assert (crest, phases.tolist()) == (least_crest(lines, weights, seed=3)[0], least_crest(lines, weights, seed=3)[1].tolist())
+    assert (crest, phases.tolist()) == (
+        least_crest(lines, weights, seed=3)[0],
+        least_crest(lines, weights, seed=3)[1].tolist(),
+    )
 
 
 def test_the_crest_factor_of_a_sine_is_the_root_of_two():
@@ -186,7 +193,9 @@ def test_the_bias_that_is_reported_is_what_a_fit_suffers(multisine):
 
 # Refusals
 
-SAME = HOPPER.replace("acceleration: {value: 9.81, unit: m/s^2, fixed: true}", "acceleration: {value: 9.81, unit: m/s^2}")
+SAME = HOPPER.replace(
+    "acceleration: {value: 9.81, unit: m/s^2, fixed: true}", "acceleration: {value: 9.81, unit: m/s^2}"
+)
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,9 @@ def test_the_result_is_plain_json_with_the_contract_s_keys(friction):
 @pytest.mark.parametrize("correlation", [0.0, 0.8])
 def test_nothing_is_found_where_nothing_is_missing(correlation):
     wrong = hopper().with_values({"linear_spring.stiffness": 150.0, "switched_damper.stance": 3.0})
-    result = diagnose(records(hopper(), seed=5, correlation=correlation), wrong, catalogue=CATALOGUE).diagnosis
+    result = diagnose(
+        records(hopper(), seed=5, correlation=correlation), wrong, catalogue=CATALOGUE
+    ).diagnosis
     assert result.verdict == "consistent"
     assert result.missing == ()
 

@@ -43,10 +43,19 @@ def test_an_actuator_s_effect_is_the_change_of_its_signal():
     assert np.abs(got).max() == pytest.approx(0.1, rel=0.05)
 
 
-@pytest.mark.parametrize(("name", "values"), [("backlash", {"width": 0.3}), ("actuator_rate_limit", {"rate": 5.0})])
+@pytest.mark.parametrize(
+    ("name", "values"), [("backlash", {"width": 0.3}), ("actuator_rate_limit", {"rate": 5.0})]
+)
 def test_what_an_actuator_remembers_along_a_path_is_what_it_does_in_the_simulator(name, values):
     model = hopper().with_element(CATALOGUE[name], values)
-    run = simulate(model, T, first_order_hold(T, F), None, start_states(model, compile_model(model), 0.2, 0.0, F[0]), 1e-3)
+    run = simulate(
+        model,
+        T,
+        first_order_hold(T, F),
+        None,
+        start_states(model, compile_model(model), 0.2, 0.0, F[0]),
+        1e-3,
+    )
     got = effect_along(CATALOGUE[name], values, hopper(), PATH)
     assert got == pytest.approx(run.effort - F, abs=1e-12)
     assert np.abs(got).max() > 0.1

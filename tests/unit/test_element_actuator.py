@@ -50,8 +50,12 @@ def test_deadband_has_its_describing_function(rig, ratio):
 
 def test_nonlinearity_compresses_the_first_harmonic_and_adds_the_third(rig):
     values = {"coefficient": 0.05}
-    assert fundamental(rig, "actuator_nonlinearity", values, 2.0) == pytest.approx(1 - 0.75 * 0.05 * 4, abs=1e-6)
-    assert fundamental(rig, "actuator_nonlinearity", values, 2.0, 3) == pytest.approx(0.25 * 0.05 * 4, abs=1e-6)
+    assert fundamental(rig, "actuator_nonlinearity", values, 2.0) == pytest.approx(
+        1 - 0.75 * 0.05 * 4, abs=1e-6
+    )
+    assert fundamental(rig, "actuator_nonlinearity", values, 2.0, 3) == pytest.approx(
+        0.25 * 0.05 * 4, abs=1e-6
+    )
 
 
 def multisine(t):
@@ -108,7 +112,9 @@ def test_a_mass_is_moved_by_what_backlash_and_a_rate_limit_leave_within_a_step(r
 
 @pytest.mark.parametrize("ratio", [0.2, 0.7])
 def test_backlash_has_its_describing_function(rig, ratio):
-    seen = fundamental(rig, "backlash", {"width": 2 * ratio * 1.5}, 1.5)  # play of half width ratio * amplitude
+    seen = fundamental(
+        rig, "backlash", {"width": 2 * ratio * 1.5}, 1.5
+    )  # play of half width ratio * amplitude
     theta = np.linspace(0, 4 * math.pi, 200001)
     played, wave = 0.0, np.empty(len(theta))
     for k, f in enumerate(np.sin(theta)):
@@ -122,7 +128,9 @@ def test_backlash_has_its_describing_function(rig, ratio):
 def test_a_rate_limit_turns_a_fast_sine_into_a_triangle(rig):
     rate, frequency = 4.0, 2.0
     run = rig.run(
-        rig.model("actuator_rate_limit", {"rate": rate}), 8.0, command=lambda t: 5 * np.sin(2 * math.pi * frequency * t)
+        rig.model("actuator_rate_limit", {"rate": rate}),
+        8.0,
+        command=lambda t: 5 * np.sin(2 * math.pi * frequency * t),
     )
     late = run.effort[7000:]
     assert np.abs(np.diff(late)).max() <= rate * 1e-3 * (1.0 + 1e-9)
@@ -132,7 +140,9 @@ def test_a_rate_limit_turns_a_fast_sine_into_a_triangle(rig):
 def test_a_rate_limit_that_is_not_reached_changes_nothing(rig):
     grid = np.arange(1002, dtype=np.float64) * 1e-3
     smooth = spline(grid, np.sin(2 * math.pi * grid))
-    run = rig.run(rig.model("actuator_rate_limit", {"rate": 6.3}), 1.0, command=smooth, max_step=1e-2, period=1e-2)
+    run = rig.run(
+        rig.model("actuator_rate_limit", {"rate": 6.3}), 1.0, command=smooth, max_step=1e-2, period=1e-2
+    )
     assert run.effort == pytest.approx(np.sin(2 * math.pi * run.time), abs=1e-12)
 
 

@@ -86,7 +86,11 @@ def test_says_what_it_is_in_all_its_fields(name):
 def test_first_guesses_are_complete_and_within_bounds(name, scales):
     element = CATALOGUE[name]
     assert element.starts is not None
-    for known in (scales, replace(scales, residual_frequency=3.3), replace(scales, position=1e-5, stiffness=1e6)):
+    for known in (
+        scales,
+        replace(scales, residual_frequency=3.3),
+        replace(scales, position=1e-5, stiffness=1e6),
+    ):
         guesses = element.starts(known)
         assert guesses
         for guess in guesses:
@@ -137,7 +141,9 @@ def test_can_be_differentiated_by_finite_differences(name, rig, scales):
         assert np.linalg.norm(fine - coarse) < 0.25 * np.linalg.norm(coarse), parameter.name
 
 
-@pytest.mark.parametrize(("name", "length"), [("periodic_disturbance", "frequency"), ("position_ripple", "wavelength")])
+@pytest.mark.parametrize(
+    ("name", "length"), [("periodic_disturbance", "frequency"), ("position_ripple", "wavelength")]
+)
 def test_amplitudes_without_sign_are_guessed_in_all_four_quadrants_of_phase(name, length, scales):
     starts = starts_of(name, replace(scales, residual_frequency=3.3))
     for value in {start[length] for start in starts}:

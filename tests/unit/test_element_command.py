@@ -82,13 +82,17 @@ def test_position_control_settles_a_step_as_a_second_order_system(rig):
     damped, t = omega * math.sqrt(1.0 - zeta**2), run.time
     turned = np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t)
     assert run.position == pytest.approx(0.1 * (1.0 - np.exp(-zeta * omega * t) * turned), abs=1e-8)
-    assert run.effort == pytest.approx(proportional * (0.1 - run.position) - derivative * run.velocity, abs=1e-9)
+    assert run.effort == pytest.approx(
+        proportional * (0.1 - run.position) - derivative * run.velocity, abs=1e-9
+    )
     pushed = rig.run(model, 3.0, forcing=spline(np.arange(0.0, 4.0, 0.5), np.full(8, 4.0)))
     assert pushed.position[-1] == pytest.approx(4.0 / proportional, rel=1e-6)
 
 
 def test_velocity_control_approaches_the_reference_speed_exponentially(rig):
-    run = rig.run(rig.model("velocity_control", {"gain": 5.0}, mass=2.0), 1.0, command=lambda t: np.full_like(t, 0.3))
+    run = rig.run(
+        rig.model("velocity_control", {"gain": 5.0}, mass=2.0), 1.0, command=lambda t: np.full_like(t, 0.3)
+    )
     assert run.velocity == pytest.approx(0.3 * (1.0 - np.exp(-2.5 * run.time)), abs=1e-9)
 
 

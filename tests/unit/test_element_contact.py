@@ -31,7 +31,10 @@ def test_a_damped_leg_has_no_force_in_the_air(rig):
 def test_a_partial_loss_leaves_the_rest_of_the_leg_force(rig):
     model = rig.model("ground_contact_loss", {"loss": 0.75}, spring=400.0)
     run = rig.run(model, 0.4, (0.1, 0.0))
-    quarter_up, half_down = math.pi / 2 / 10.0, math.pi / 20.0  # a quarter of the spring above, all of it below
+    quarter_up, half_down = (
+        math.pi / 2 / 10.0,
+        math.pi / 20.0,
+    )  # a quarter of the spring above, all of it below
     bottom = run.time[np.argmin(run.position)]
     assert bottom == pytest.approx(quarter_up + half_down / 2, abs=1e-3)
     assert run.position.min() == pytest.approx(-0.05, rel=1e-3)  # half the amplitude at twice the frequency

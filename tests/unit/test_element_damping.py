@@ -31,7 +31,11 @@ def test_flight_damping_acts_on_the_way_down_only(rig):
 def test_switching_threshold_moves_the_switch_of_the_nominal_damper(rig, threshold):
     stance, flight = 4.0, 1.0
     model = rig.model(
-        "switching_threshold", {"threshold": threshold, "transition": 2e-3}, spring=100.0, stance=stance, flight=flight
+        "switching_threshold",
+        {"threshold": threshold, "transition": 2e-3},
+        spring=100.0,
+        stance=stance,
+        flight=flight,
     )
     run = rig.run(model, 0.9, (0.05, 0.0))
 

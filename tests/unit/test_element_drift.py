@@ -19,7 +19,9 @@ def test_stiffness_drift_swings_as_airys_functions(rig):
 
 def test_stiffness_jump_joins_two_sines(rig):
     change, time, amplitude = 0.5, 0.3333, 0.05
-    run = rig.run(rig.model("stiffness_jump", {"change": change, "time": time}, spring=100.0), 1.0, (amplitude, 0.0))
+    run = rig.run(
+        rig.model("stiffness_jump", {"change": change, "time": time}, spring=100.0), 1.0, (amplitude, 0.0)
+    )
     fast = math.sqrt(150.0)
     x, v = amplitude * math.cos(10 * time), -10 * amplitude * math.sin(10 * time)
     after = run.time - time

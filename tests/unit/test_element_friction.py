@@ -94,4 +94,6 @@ def test_lugre_bristles_are_a_spring_before_sliding(rig):
     run = rig.run(model, 1.0, (0.0, 1e-5))
     stiffness = 0.5 / 1e-3  # sigma_0 = F_c / z_c
     omega = math.sqrt(stiffness)
-    assert run.position[:200] == pytest.approx(1e-5 / omega * np.sin(omega * run.time[:200]), abs=0.02e-5 / omega)
+    assert run.position[:200] == pytest.approx(
+        1e-5 / omega * np.sin(omega * run.time[:200]), abs=0.02e-5 / omega
+    )

@@ -14,7 +14,9 @@ def prescribed(rig, name, values, amplitude, frequency, duration):
     """States of an element at x = amplitude sin(2 pi frequency t)."""
     omega = 2 * math.pi * frequency
     model = rig.model(name, values, mass=HEAVY, spring=HEAVY * omega**2)
-    run = rig.run(model, duration, (0.0, amplitude * omega), period=1e-3 / frequency, max_step=2.5e-4 / frequency)
+    run = rig.run(
+        model, duration, (0.0, amplitude * omega), period=1e-3 / frequency, max_step=2.5e-4 / frequency
+    )
     return run.time, run.position, run.states[:, 2]
 
 
@@ -87,7 +89,9 @@ def test_relaxation_shorter_than_a_step_is_a_viscous_damper(rig):
         rig.model("viscoelastic_relaxation", {"stiffness": stiffness, "time_constant": tau}, spring=100.0),
         1.0, (0.05, 0.0), max_step=1e-3,
     )  # fmt: skip
-    viscous = rig.run(rig.model("viscous_damper", {"damping": stiffness * tau}, spring=100.0), 1.0, (0.05, 0.0))
+    viscous = rig.run(
+        rig.model("viscous_damper", {"damping": stiffness * tau}, spring=100.0), 1.0, (0.05, 0.0)
+    )
     assert fast.position == pytest.approx(viscous.position, abs=1e-3)
     assert np.abs(viscous.position[-100:]).max() < 0.02  # well damped
 
@@ -95,7 +99,10 @@ def test_relaxation_shorter_than_a_step_is_a_viscous_damper(rig):
 def test_second_mode_moves_as_two_coupled_masses(rig):
     mass, frequency, ratio, first, spring = 0.3, 3.0, 0.07, 1.2, 150.0
     model = rig.model(
-        "second_mode", {"mass": mass, "frequency": frequency, "damping_ratio": ratio}, mass=first, spring=spring
+        "second_mode",
+        {"mass": mass, "frequency": frequency, "damping_ratio": ratio},
+        mass=first,
+        spring=spring,
     )
     run = rig.run(model, 2.0, (0.05, -0.3))
     omega = 2 * math.pi * frequency

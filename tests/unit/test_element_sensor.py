@@ -41,13 +41,19 @@ def test_sensor_lag_starts_as_if_the_machine_had_moved_before(seen):
 def test_a_sensor_lag_short_against_the_step_delays_by_its_time_constant(seen, tau):
     run = seen("sensor_lag", {"time_constant": tau}, max_step=1e-3)
     settled = run.time > 0.02
-    assert run.output[settled] == pytest.approx(swing(run.time - tau)[settled], abs=0.01 * AMPLITUDE * OMEGA * tau + 1e-7)
+    assert run.output[settled] == pytest.approx(
+        swing(run.time - tau)[settled], abs=0.01 * AMPLITUDE * OMEGA * tau + 1e-7
+    )
 
 
 @pytest.mark.parametrize(
     ("name", "values", "law"),
     [
-        ("sensor_nonlinearity", {"coefficient": 0.7, "reference": 0.01}, lambda y, t: y + 0.7 * (y - 0.01) ** 2),
+        (
+            "sensor_nonlinearity",
+            {"coefficient": 0.7, "reference": 0.01},
+            lambda y, t: y + 0.7 * (y - 0.01) ** 2,
+        ),
         ("sensor_gain", {"gain": 1.1}, lambda y, t: 1.1 * y),
         ("sensor_offset", {"offset": 0.02}, lambda y, t: y + 0.02),
         ("sensor_drift", {"rate": 0.003}, lambda y, t: y + 0.003 * t),

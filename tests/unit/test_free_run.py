@@ -18,7 +18,9 @@ FORCING = spline(TIME, np.cos(2 * np.pi * TIME))
 DELAYED = {"input_delay.delay": 0.0133, "measurement_delay.delay": 0.0041}
 
 
-def series(block: int = 1, begin: float = 0.0, command: PPoly | None = COMMAND, forcing: PPoly | None = FORCING) -> Series:
+def series(
+    block: int = 1, begin: float = 0.0, command: PPoly | None = COMMAND, forcing: PPoly | None = FORCING
+) -> Series:
     """A measurement of nothing, under the command and the forcing."""
     time = begin + TIME
     return Series("made", time, np.zeros(N), command, forcing, block, np.ones(N // block, bool), PERIOD)
@@ -60,7 +62,11 @@ def test_a_command_never_overtakes_an_earlier_one():
 
 @pytest.mark.parametrize(
     ("name", "values"),
-    [("backlash", {"width": 0.2}), ("actuator_rate_limit", {"rate": 5.0}), ("reference_rate_limit", {"rate": 5.0})],
+    [
+        ("backlash", {"width": 0.2}),
+        ("actuator_rate_limit", {"rate": 5.0}),
+        ("reference_rate_limit", {"rate": 5.0}),
+    ],
 )
 def test_play_and_rate_limits_see_every_step_of_a_held_command(name, values):
     run = prepare_run(machine(**{name: values}), [series(5)])
@@ -68,7 +74,8 @@ def test_play_and_rate_limits_see_every_step_of_a_held_command(name, values):
 
 
 @pytest.mark.parametrize(
-    ("name", "values"), [("actuator_saturation", {"limit": 2.0}), ("coulomb_friction", {"force": 0.1, "transition": 0.01})]
+    ("name", "values"),
+    [("actuator_saturation", {"limit": 2.0}), ("coulomb_friction", {"force": 0.1, "transition": 0.01})],
 )
 def test_what_remembers_no_extreme_is_driven_by_the_smooth_stand_in(name, values):
     run = prepare_run(machine(**{name: values}), [series(5)])

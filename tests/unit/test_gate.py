@@ -22,14 +22,21 @@ def found(name: str, values: dict[str, float], size: str, std: float, gain: floa
     model = hopper().with_element(CATALOGUE[name], values)
     best = Trial((name,), model, (), 100.0, 1000, len(model.free), True, QUIET)
     none = Trial((), hopper(), (), 110.0, 1000, len(hopper().free), True, QUIET)
-    fit = SimpleNamespace(model=model, std={f"{name}.{size}": std}, chi2=100.0, nrmse=lambda unused=False: math.nan)
+    fit = SimpleNamespace(
+        model=model, std={f"{name}.{size}": std}, chi2=100.0, nrmse=lambda unused=False: math.nan
+    )
     nominal = SimpleNamespace(model=hopper(), std={}, chi2=100.0 + gain)
     return Search(cast(Fit, nominal), best, cast(Fit, fit), QUIET, (best, none), (), ())
 
 
 @pytest.mark.parametrize(("std", "faint"), [(0.011, True), (0.2, True), (0.009, False), (1e-4, False)])
 def test_a_size_within_three_standard_deviations_of_absence_is_faint(std, faint):
-    assert _faint(found("coulomb_friction", {"force": 0.03, "transition": 0.01}, "force", std), "coulomb_friction") is faint
+    assert (
+        _faint(
+            found("coulomb_friction", {"force": 0.03, "transition": 0.01}, "force", std), "coulomb_friction"
+        )
+        is faint
+    )
 
 
 @pytest.mark.parametrize(("std", "faint"), [(0.011, True), (0.009, False)])

@@ -56,7 +56,9 @@ def test_the_closure_of_a_right_model_is_near_zero(joint):
 def test_a_wrong_phase_of_the_forcing_breaks_the_closure_or_moves_the_split_only():
     made = record(hopper(), SPEC, delays=DELAYS, std=5e-6)
     assert made.forcing is not None
-    found = delays_of(joint_likelihood(replace(made, forcing=later(made.forcing, -0.01)), hopper()), "on_robot")
+    found = delays_of(
+        joint_likelihood(replace(made, forcing=later(made.forcing, -0.01)), hopper()), "on_robot"
+    )
     assert found.sum.value == pytest.approx(0.095, abs=2e-4)  # the sum does not depend on it
     assert found.measurement.value == pytest.approx(0.065, abs=2e-4)
 

@@ -62,11 +62,15 @@ def synthetic(result: PaperResult, delays: tuple[float, float]) -> HtfEstimate:
     """HTFs without any error: the model's own, delayed by (7)."""
     htf = result.estimate.htf
     turn = delay_phase(htf.harmonics, htf.frequency, *delays, result.pumping.frequency)
-    exact = HarmonicTransferFunctions(htf.harmonics, htf.frequency, result.fit.expected * np.exp(-1j * turn), htf.std)
+    exact = HarmonicTransferFunctions(
+        htf.harmonics, htf.frequency, result.fit.expected * np.exp(-1j * turn), htf.std
+    )
     return HtfEstimate(exact, result.estimate.reached, result.estimate.operator, result.estimate.noise)
 
 
-@pytest.mark.parametrize("delays", [(0.0, 0.0), (0.3, 0.0), (0.0, 0.3), (0.299, 0.3), (0.0403, 0.0517), (0.62, 0.2)])
+@pytest.mark.parametrize(
+    "delays", [(0.0, 0.0), (0.3, 0.0), (0.0, 0.3), (0.299, 0.3), (0.0403, 0.0517), (0.62, 0.2)]
+)
 def test_equation_16_recovers_any_delays_of_exact_htfs(found, delays) -> None:
     result = found[PAIRS[1]]
     exact = synthetic(result, delays)

@@ -16,7 +16,12 @@ from rhythmid.identify.paper import paper_method
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 
-U, Y, K, C = "input_delay.delay", "measurement_delay.delay", "linear_spring.stiffness", "switched_damper.stance"
+U, Y, K, C = (
+    "input_delay.delay",
+    "measurement_delay.delay",
+    "linear_spring.stiffness",
+    "switched_damper.stance",
+)
 DELAYS = (0.0403, 0.0551)
 NOISE = 2e-5
 
@@ -73,7 +78,12 @@ def test_the_limit_cycle_sharpens_the_measurement_delay(quiet):
 
 
 def test_frequency_and_time_domain_agree_within_the_bound():
-    spec = chirps(0.004) | {"sweep": 10.0, "repetitions": 9, "warm_up": 3, "shift": {"period": 1.0, "count": 9}}
+    spec = chirps(0.004) | {
+        "sweep": 10.0,
+        "repetitions": 9,
+        "warm_up": 3,
+        "shift": {"period": 1.0, "count": 9},
+    }
     noisy_record = record(hopper(), spec, delays=DELAYS, std=5e-6)
     machine, pumping = forced_by(hopper(), noisy_record)
     harmonic = harmonic_likelihood(noisy_record, machine, pumping, cycle=False)

@@ -24,7 +24,9 @@ def with_residuals(fit, make):
 def test_a_line_twice_the_noise_is_found_at_its_frequency(fit):
     rng = np.random.default_rng(1)
     line = strongest_line(
-        with_residuals(fit, lambda s: rng.standard_normal(s.blocks) + 2.0 * np.sin(2 * np.pi * 3.7 * s.centres))
+        with_residuals(
+            fit, lambda s: rng.standard_normal(s.blocks) + 2.0 * np.sin(2 * np.pi * 3.7 * s.centres)
+        )
     )
     assert line is not None
     assert line.frequency == pytest.approx(3.7, abs=0.1)

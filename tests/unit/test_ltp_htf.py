@@ -32,11 +32,15 @@ def brute_force(model: Model, frequency: float, amplitude: float = 1e-5) -> np.n
     stamps = np.arange((settling + window) * 1000) * 1e-3
     start = limit_cycle(model, PUMPING).states[0]
     difference = (
-        simulate(model, stamps, command, forcing, start).output - simulate(model, stamps, None, forcing, start).output
+        simulate(model, stamps, command, forcing, start).output
+        - simulate(model, stamps, None, forcing, start).output
     )[settling * 1000 :]
     time = stamps[settling * 1000 :]
     return np.array(
-        [2 * np.mean(difference * np.exp(-2j * np.pi * (frequency + m) * time)) / amplitude for m in SIDEBANDS]
+        [
+            2 * np.mean(difference * np.exp(-2j * np.pi * (frequency + m) * time)) / amplitude
+            for m in SIDEBANDS
+        ]
     )
 
 
@@ -108,7 +112,10 @@ def test_power_of_the_output_is_the_sum_over_sidebands(rig, paper) -> None:
     """Parseval: the mean square response to a sinusoid is Σ_m |G_m|² / 2 at the frequencies ω + mω_p."""
     nu, amplitude = 1.3, 1e-5
     dense = np.arange(-10, 40_010) * 1e-3
-    forcing, command = spline(dense, PUMPING(dense)), spline(dense, amplitude * np.cos(2 * np.pi * nu * dense))
+    forcing, command = (
+        spline(dense, PUMPING(dense)),
+        spline(dense, amplitude * np.cos(2 * np.pi * nu * dense)),
+    )
     stamps = np.arange(40_000) * 1e-3
     start = paper.cycle.states[0]
     moved = simulate(rig.hopper, stamps, command, forcing, start).output
@@ -156,7 +163,9 @@ def brute_force_delayed(model: Model, frequency: float) -> np.ndarray:
     moved = simulate(model, stamps, command, forcing, start).output
     still = simulate(model, stamps, None, forcing, start).output
     time, difference = stamps[30_000:], (moved - still)[30_000:]
-    return np.array([2 * np.mean(difference * np.exp(-2j * np.pi * (frequency + m) * time)) / 1e-5 for m in SIDEBANDS])
+    return np.array(
+        [2 * np.mean(difference * np.exp(-2j * np.pi * (frequency + m) * time)) / 1e-5 for m in SIDEBANDS]
+    )
 
 
 def test_a_harmonic_that_is_not_there_is_named(rig) -> None:

@@ -93,13 +93,19 @@ def test_a_comb_of_nine_chirps_separates_three_harmonics_and_leaves_two_classes_
 def test_distortion_shows_by_its_parity_in_an_interleaved_multisine(quiet):
     """The damper's switching moves with the command: to first order a distortion of even order."""
     small, large = (
-        harmonic_transfer_functions(seen(record(hopper(), EXCITATIONS["interleaved"] | {"rms": rms}, delays=DELAYS, std=0.0)), 2.0)
+        harmonic_transfer_functions(
+            seen(record(hopper(), EXCITATIONS["interleaved"] | {"rms": rms}, delays=DELAYS, std=0.0)), 2.0
+        )
         for rms in (0.003, 0.012)
     )
-    even, odd = (np.median([np.median(getattr(one, key)) for one in large.functions]) for key in ("even", "odd"))
+    even, odd = (
+        np.median([np.median(getattr(one, key)) for one in large.functions]) for key in ("even", "odd")
+    )
     assert even > 3.0 * odd
     before = np.median([np.median(one.even) for one in small.functions])
-    assert even / before == pytest.approx(4.0, rel=0.25)  # relative to the response it grows with the amplitude
+    assert even / before == pytest.approx(
+        4.0, rel=0.25
+    )  # relative to the response it grows with the amplitude
 
 
 def test_noise_is_told_apart_from_distortion_where_the_excitation_repeats(quiet):
@@ -147,17 +153,28 @@ def test_harmonics_that_show_are_found(synthetic):
 def test_an_excitation_that_does_not_separate_the_harmonics_is_refused_by_name(quiet):
     with pytest.raises(InputError, match="does not allow separated lines: it needs shifted chirps"):
         harmonic_transfer_functions(seen(quiet["dense"]), 2.0, "separated_lines")
-    sparse = seen(record(hopper(), {"type": "multisine", "rms": 0.003, "period": 10.0, "periods": 8}, std=0.0))
+    sparse = seen(
+        record(hopper(), {"type": "multisine", "rms": 0.003, "period": 10.0, "periods": 8}, std=0.0)
+    )
     with pytest.raises(InputError, match="closer together than the machine's resonance"):
         harmonic_transfer_functions(sparse, 2.0, "local_rational")
     assert harmonic_transfer_functions(sparse, 2.0).method == "regularised_least_squares"
 
 
 def test_a_machine_without_pumping_has_one_function(plant):
-    spec = {"type": "chirp", "amplitude": 0.02, "band": [0.5, 6.0], "sweep": 30.0, "repetitions": 4, "warm_up": 1}
+    spec = {
+        "type": "chirp",
+        "amplitude": 0.02,
+        "band": [0.5, 6.0],
+        "sweep": 30.0,
+        "repetitions": 4,
+        "warm_up": 1,
+    }
     smooth = hopper().with_values({"switched_damper.stance": 1.0, "switched_damper.flight": 1.0})
     made = replace(record(smooth, spec, forcing=0.0, delays=DELAYS, std=1e-6), forcing=None)
-    found = harmonic_transfer_functions(spectra(made, Pumping(1.0, np.zeros(2, dtype=complex), 0.0, "none"), 2.0, 5), 2.0)
+    found = harmonic_transfer_functions(
+        spectra(made, Pumping(1.0, np.zeros(2, dtype=complex), 0.0, "none"), 2.0, 5), 2.0
+    )
     assert found.harmonics == (0,)
     one = found.of(0)
     omega = 2 * np.pi * one.frequency

@@ -20,7 +20,9 @@ def test_frequency_amplitude_and_phase_of_a_recorded_cosine_are_found(frequency:
     found = pumping_of_channel(channel(0.7 * np.cos(2 * np.pi * frequency * TIME + phase)))
     assert found.frequency == pytest.approx(frequency, rel=1e-10)
     assert found.coefficients[1] == pytest.approx(0.7, rel=1e-9)
-    assert found(TIME - found.origin) == pytest.approx(0.7 * np.cos(2 * np.pi * frequency * TIME + phase), abs=1e-8)
+    assert found(TIME - found.origin) == pytest.approx(
+        0.7 * np.cos(2 * np.pi * frequency * TIME + phase), abs=1e-8
+    )
 
 
 @pytest.mark.parametrize("periods", [2.1, 2.5, 3.0, 4.0, 5.0, 6.3, 9.0])

@@ -85,7 +85,9 @@ def test_alpha_states_a_time_that_is_the_same_for_records_of_any_length_and_size
     assert operator.window == pytest.approx(12 * 1.95)
     again = regularised_least_squares(measured, 3, alpha=operator.alpha)
     assert again.window == pytest.approx(operator.window)
-    louder = Spectra(measured.pumping, measured.window, 10 * measured.input, 10 * measured.output, measured.cycle)
+    louder = Spectra(
+        measured.pumping, measured.window, 10 * measured.input, 10 * measured.output, measured.cycle
+    )
     assert estimate_htf(regularised_least_squares(louder, 3, ring_down=1.95)).htf.value == pytest.approx(
         estimate_htf(operator).htf.value
     )

@@ -83,10 +83,7 @@ def test_spectra_do_not_depend_on_when_the_recording_began(paper_record) -> None
     made = paper_record()
     later = replace(
         made,
-        **{
-            role: replace(channel, time=channel.time + 17.3456)
-            for role, channel in made.channels.items()
-        },
+        **{role: replace(channel, time=channel.time + 17.3456) for role, channel in made.channels.items()},
     )
     first = spectra(made, pumping_of(made), 1.95)
     second = spectra(later, pumping_of(later), 1.95)
@@ -106,7 +103,11 @@ def test_a_period_of_no_whole_number_of_samples_does_not_leak() -> None:
     time = np.arange(60_000) * 1e-3
     motion = 0.01 * np.cos(2 * np.pi * frequency * time) + 0.002 * np.cos(4 * np.pi * frequency * time + 1)
     found = spectra(
-        record(np.zeros(60_000), motion), Pumping.cosine(1.0, frequency), 1.0, sidebands=4, window=Window(10.0, 40, 0.0)
+        record(np.zeros(60_000), motion),
+        Pumping.cosine(1.0, frequency),
+        1.0,
+        sidebands=4,
+        window=Window(10.0, 40, 0.0),
     )
     lines = np.abs(found.output)
     lines[:: found.window.periods] = 0.0

@@ -58,7 +58,9 @@ def test_a_prior_pulls_and_narrows_the_estimate():
 
 def test_a_bound_holds_and_is_reported():
     value = hopper().parameters["linear_spring.stiffness"]
-    bounded = hopper().with_parameters({"linear_spring.stiffness": replace(value, bounds=(0.0, 190.0), value=180.0)})
+    bounded = hopper().with_parameters(
+        {"linear_spring.stiffness": replace(value, bounds=(0.0, 190.0), value=180.0)}
+    )
     fit = estimate(bounded, prepare(records(hopper(), SHORT[:1])), iterations=12)
     assert fit.model.value("linear_spring.stiffness") == 190.0
     assert "linear_spring.stiffness" in fit.at_bound
@@ -67,7 +69,9 @@ def test_a_bound_holds_and_is_reported():
 def test_a_model_that_diverges_is_refused_with_what_to_check():
     unstable = hopper().with_element(CATALOGUE["viscous_damper"], {"damping": 0.0})
     value = unstable.parameters["viscous_damper.damping"]
-    unstable = unstable.with_parameters({"viscous_damper.damping": replace(value, value=-1e4, bounds=(-1e5, 0.0))})
+    unstable = unstable.with_parameters(
+        {"viscous_damper.damping": replace(value, value=-1e4, bounds=(-1e5, 0.0))}
+    )
     with pytest.raises(InputError, match="diverges"):
         estimate(unstable, prepare(records(hopper(), SHORT[:1])))
 
@@ -108,7 +112,9 @@ def test_slow_motion_is_averaged_and_fast_motion_is_not():
     assert block_length(np.sin(2 * np.pi * 200.0 * t), 1e-3) == 1
 
 
-@pytest.mark.parametrize(("name", "values"), [("backlash", {"width": 0.4}), ("actuator_rate_limit", {"rate": 6.0})])
+@pytest.mark.parametrize(
+    ("name", "values"), [("backlash", {"width": 0.4}), ("actuator_rate_limit", {"rate": 6.0})]
+)
 def test_what_an_actuator_remembers_at_a_records_start_is_found(name, values):
     machine, noise = hopper().with_element(CATALOGUE[name], values), NoiseModel(np.empty(0), 1e-5)
     whole = records(machine, SHORT[1:2], std=1e-5, delays=(0.0, 0.0))[0]

@@ -26,7 +26,9 @@ NOISY = plant_model(
     CATALOGUE,
 )
 REMEMBERING = plant_model(
-    PAPER.with_element(CATALOGUE["backlash"], {"width": 0.3}).with_element(CATALOGUE["actuator_rate_limit"], {"rate": 300.0}),
+    PAPER.with_element(CATALOGUE["backlash"], {"width": 0.3}).with_element(
+        CATALOGUE["actuator_rate_limit"], {"rate": 300.0}
+    ),
     Forcing(),
     Noise(),
     CATALOGUE,
@@ -51,7 +53,9 @@ def in_one_go(model: Model, initial=(0.15, 0.0)) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    "model", [HOPPER, NOISY, REMEMBERING], ids=["hopper", "lag, noise and rounding", "play and a limit of rate"]
+    "model",
+    [HOPPER, NOISY, REMEMBERING],
+    ids=["hopper", "lag, noise and rounding", "play and a limit of rate"],
 )
 @given(cuts=some.lists(some.integers(0, (COUNT - 1) * MS), max_size=30), early=some.integers(0, 5 * MS))
 def test_every_chunking_gives_the_same_bits(model, cuts, early):

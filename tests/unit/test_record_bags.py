@@ -97,7 +97,11 @@ def test_a_bag_without_the_output_is_refused_and_says_what_it_has(tmp_path):
 def test_a_value_that_is_not_a_number_is_refused_with_its_place(tmp_path):
     bad = Y.copy()
     bad[1234] = np.nan
-    refused(tmp_path, {**TOPICS, "/hopper/joint_states": Messages(STAMPS, position=bad)}, "NaN|not a number|finite")
+    refused(
+        tmp_path,
+        {**TOPICS, "/hopper/joint_states": Messages(STAMPS, position=bad)},
+        "NaN|not a number|finite",
+    )
 
 
 def test_an_empty_file_and_a_missing_one_are_refused(tmp_path):

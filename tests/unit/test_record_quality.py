@@ -17,7 +17,11 @@ from rhythmid.record.timing import Timing, nominal_period, put_in_order
 seeds = st.integers(0, 10_000)
 
 
-@given(seed=seeds, rate=st.sampled_from([7.0, 50.0, 60.0, 100.0, 333.0, 1000.0, 2500.0]), count=st.integers(20, 400))
+@given(
+    seed=seeds,
+    rate=st.sampled_from([7.0, 50.0, 60.0, 100.0, 333.0, 1000.0, 2500.0]),
+    count=st.integers(20, 400),
+)
 def test_the_nominal_period_survives_jitter_and_loss(seed, rate, count):
     rng = np.random.default_rng(seed)
     time = (np.arange(count) + rng.uniform(-0.1, 0.1, count)) / rate
@@ -83,7 +87,9 @@ def test_samples_that_overtook_one_another_are_put_back(seed):
 def test_a_clock_that_was_set_back_is_refused(back):
     time = np.arange(300) * 1e-3 + 2e9
     time[100:] -= back
-    with pytest.raises(InputError, match=r"^output: time goes backwards by .* \(sample 100 of 300\).*; split it$"):
+    with pytest.raises(
+        InputError, match=r"^output: time goes backwards by .* \(sample 100 of 300\).*; split it$"
+    ):
         put_in_order(time, "output", "split it")
 
 
@@ -98,7 +104,13 @@ def test_clipping_is_seen(seed, limit):
 def test_what_is_not_clipped_is_not_called_so(seed):
     rng = np.random.default_rng(seed)
     smooth = np.sin(2 * np.pi * np.arange(2000) / 200 + rng.uniform(0, 6))
-    for value in (smooth, np.round(smooth, 1), rng.standard_normal(500), np.repeat([0.0, 1.0], 50), np.zeros(10)):
+    for value in (
+        smooth,
+        np.round(smooth, 1),
+        rng.standard_normal(500),
+        np.repeat([0.0, 1.0], 50),
+        np.zeros(10),
+    ):
         assert clipped(value) == 0
 
 

@@ -31,7 +31,10 @@ def jittered(seed, jitter, n=N):
 
 
 def record(**channels) -> Record:
-    made = {role: Channel(np.asarray(time, dtype=float), np.asarray(value, dtype=float), "1") for role, (time, value) in channels.items()}
+    made = {
+        role: Channel(np.asarray(time, dtype=float), np.asarray(value, dtype=float), "1")
+        for role, (time, value) in channels.items()
+    }
     return Record("made", **made)
 
 
@@ -129,7 +132,9 @@ def test_a_forcing_known_by_formula_is_evaluated_not_interpolated():
 
 def test_a_band_limited_input_is_restored_between_its_samples():
     time = np.arange(400) / 100.0
-    made = replace(record(output=(GRID, np.sin(GRID)), input=(time, band_limited(time, 3))), hold="band_limited")
+    made = replace(
+        record(output=(GRID, np.sin(GRID)), input=(time, band_limited(time, 3))), hold="band_limited"
+    )
     uniform = made.uniform()
     inside = slice(100, -100)
     assert np.abs(uniform.input - band_limited(uniform.time, 3))[inside].max() < 5e-3
@@ -156,7 +161,9 @@ def test_an_impossible_rate_is_refused(rate):
 def test_a_cut_keeps_what_lies_within_and_the_command_in_force(seed, start, length):
     rng = np.random.default_rng(seed)
     sent = np.concatenate([[0.0], np.sort(rng.uniform(0, 1.5, 20))])
-    made = record(output=(GRID, np.sin(GRID)), input=(sent, rng.standard_normal(21))).cut(start, start + length)
+    made = record(output=(GRID, np.sin(GRID)), input=(sent, rng.standard_normal(21))).cut(
+        start, start + length
+    )
     assert made.output.time[0] >= start - 1e-9 and made.output.time[-1] < start + length
     assert len(made.output) == np.count_nonzero((GRID >= start - 1e-9) & (GRID < start + length - 1e-9))
     assert made.input.time[0] <= made.output.time[0] + 1e-9

@@ -53,7 +53,14 @@ def test_a_text_table_is_read_whatever_separates_its_columns(tmp_path, suffix, s
         text(head='"t","u","y"'),
         text(head=" t , u , y "),
     ],
-    ids=["names in a comment", "byte order mark", "blank lines", "CR LF", "quoted names", "spaces around names"],
+    ids=[
+        "names in a comment",
+        "byte order mark",
+        "blank lines",
+        "CR LF",
+        "quoted names",
+        "spaces around names",
+    ],
 )
 def test_the_ways_in_which_programs_write_csv_are_understood(tmp_path, content):
     (tmp_path / "run.csv").write_text(content, encoding="utf-8", newline="")
@@ -197,7 +204,10 @@ def test_a_missing_file_and_a_wrong_number_are_refused(tmp_path):
         ("time: {sample_rate: 500}\noutput: {column: y}\n", "'file:' is missing"),
         ("time: {sample_rate: 500}\noutput: {file: FILE}\n", "give topic and field"),
         ("time: {column: t}\noutput: {file: FILE, column: y, unit: mm}\n", "write  scale: 0.001, unit: m"),
-        ("time: {column: t}\noutput: {file: FILE, column: y}\ninput: {topic: /u, field: data}\n", "cannot be mixed"),
+        (
+            "time: {column: t}\noutput: {file: FILE, column: y}\ninput: {topic: /u, field: data}\n",
+            "cannot be mixed",
+        ),
     ],
 )
 def test_a_wrong_description_is_refused_with_its_line(tmp_path, content, words):
@@ -207,10 +217,14 @@ def test_a_wrong_description_is_refused_with_its_line(tmp_path, content, words):
     assert "signals.yaml:" in str(refused.value) and words in str(refused.value), str(refused.value)
 
 
-SILVERBOX = Path(os.environ.get("RHYTHMID_DATA") or Path(__file__).parents[3] / "shared" / "data") / "silverbox"
+SILVERBOX = (
+    Path(os.environ.get("RHYTHMID_DATA") or Path(__file__).parents[3] / "shared" / "data") / "silverbox"
+)
 
 
-@pytest.mark.skipif(not SILVERBOX.is_dir(), reason=f"the Silverbox data are not in {SILVERBOX}; set RHYTHMID_DATA")
+@pytest.mark.skipif(
+    not SILVERBOX.is_dir(), reason=f"the Silverbox data are not in {SILVERBOX}; set RHYTHMID_DATA"
+)
 def test_a_published_table_is_read_in_place(tmp_path):
     content = "tables: {file: FILE}\ntime: {sample_rate: 610.3515625}\ninput: {column: V1, unit: V}\noutput: {column: V2, unit: V}\n"
     record = read_record(signals(tmp_path, str(SILVERBOX / "SNLS80mV.mat"), content))

@@ -41,7 +41,9 @@ def test_an_element_without_a_size_has_no_fainter_guesses():
         assert propose(hopper(), element, [values], ()).faint == ()
 
 
-def fitted_force(monkeypatch, proposal: Proposal, chi2: dict[float, float], felt: float = 1e-6) -> tuple[float, list[float]]:
+def fitted_force(
+    monkeypatch, proposal: Proposal, chi2: dict[float, float], felt: float = 1e-6
+) -> tuple[float, list[float]]:
     """The force that a trial ends with, and those it was tried from, where a descent from a force ends with this chi2
     and a change of a parameter by `felt` shows."""
     tried: list[float] = []
@@ -52,7 +54,9 @@ def fitted_force(monkeypatch, proposal: Proposal, chi2: dict[float, float], felt
         return Descent(model, tuple(starts), (), chi2[tried[-1]], 64, True, "", (), steps, None)
 
     monkeypatch.setattr(refit, "descend", descend)
-    monkeypatch.setattr(refit, "fork_map", lambda work, cases: [(i, work(case)) for i, case in enumerate(cases)])
+    monkeypatch.setattr(
+        refit, "fork_map", lambda work, cases: [(i, work(case)) for i, case in enumerate(cases)]
+    )
     start = np.array([0.15, 0.0])
     trials, excluded = run_trials([proposal], [STILL], [start], ("position", "velocity"), QUIET, 1e-3)
     assert not excluded
@@ -75,6 +79,8 @@ def test_no_fainter_guess_is_tried_once_one_is_below_the_ceiling(monkeypatch):
     assert fitted_force(monkeypatch, friction(math.inf), {0.5: 900.0, 1.0: 800.0}) == (1.0, [0.5, 1.0])
 
 
-def test_parameters_that_have_wandered_to_where_nothing_shows_are_tried_again_from_the_first_guess(monkeypatch):
+def test_parameters_that_have_wandered_to_where_nothing_shows_are_tried_again_from_the_first_guess(
+    monkeypatch,
+):
     ends = {0.5: 70.0, 1.0: 60.0}
     assert fitted_force(monkeypatch, friction(100.0), ends, felt=1.5) == (1.0, [0.5, 1.0, 0.5])

@@ -91,12 +91,19 @@ def test_command_jitter_is_read_off_the_roll_off():
     acting = stamps - stamps[np.searchsorted(arrival, stamps, side="right") - 1]
     jitter = command_jitter(joint.fit)
     assert jitter.value == pytest.approx(float(acting[1000:].std()), abs=max(4.0 * jitter.std, 1e-3))
-    assert joint.fit.model.value(U) == pytest.approx(DELAYS[0] + float((arrival - stamps)[1000:].mean()), abs=2e-3)
+    assert joint.fit.model.value(U) == pytest.approx(
+        DELAYS[0] + float((arrival - stamps)[1000:].mean()), abs=2e-3
+    )
 
 
 def test_lost_samples_of_every_channel_do_no_harm():
     made = record(hopper(), SPEC, delays=DELAYS, std=5e-6)
-    thin = replace(made, input=lost(made.input, 0.02, 1), output=lost(made.output, 0.05, 2), forcing=lost(made.forcing, 0.05, 3))
+    thin = replace(
+        made,
+        input=lost(made.input, 0.02, 1),
+        output=lost(made.output, 0.05, 2),
+        forcing=lost(made.forcing, 0.05, 3),
+    )
     joint = fitted(thin)
     assert near(joint, U, DELAYS[0]) and near(joint, Y, DELAYS[1])
 

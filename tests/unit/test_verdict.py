@@ -28,7 +28,9 @@ def trial(base: Model, name: str, **values: float) -> Trial:
 
 
 def test_flight_damping_beside_a_free_switched_damper_is_a_viscous_damper_too():
-    assert twins_of(trial(hopper(), "flight_damping", damping=0.1), []) == [("flight_damping", "viscous_damper")]
+    assert twins_of(trial(hopper(), "flight_damping", damping=0.1), []) == [
+        ("flight_damping", "viscous_damper")
+    ]
 
 
 def test_flight_damping_has_no_twin_where_the_switched_damper_is_known_or_absent():
@@ -53,7 +55,9 @@ def fit_of(rest: float, line: float) -> Fit:
     noise = rest * np.random.default_rng(2).standard_normal(len(TIME))
     residuals = (np.std(SERIES.value) * (noise + np.sqrt(2.0) * line * np.sin(2 * np.pi * 3.7 * TIME)),)
     run, power = SimpleNamespace(series=(SERIES,)), float(np.sum(residuals[0] ** 2))
-    made = SimpleNamespace(run=run, residuals=residuals, chi2=power, nrmse=lambda: normalised_error(residuals, run.series))
+    made = SimpleNamespace(
+        run=run, residuals=residuals, chi2=power, nrmse=lambda: normalised_error(residuals, run.series)
+    )
     return cast(Fit, made)
 
 

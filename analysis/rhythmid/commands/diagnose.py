@@ -25,11 +25,16 @@ def diagnose(
     signals: SignalsFile = None,
     sim: Annotated[
         Path | None,
-        typer.Option("--sim", help="Record of a simulation to compare with directly; enough without a model."),
+        typer.Option(
+            "--sim", help="Record of a simulation to compare with directly; enough without a model."
+        ),
     ] = None,
     sim_signals: Annotated[
         Path | None,
-        typer.Option("--sim-signals", help="Which channel of --sim is what; by default as --signals, or our own topics."),
+        typer.Option(
+            "--sim-signals",
+            help="Which channel of --sim is what; by default as --signals, or our own topics.",
+        ),
     ] = None,
     holdout: Annotated[
         list[Path] | None, typer.Option("--holdout", help="Records to judge by only; may be repeated.")
@@ -37,7 +42,9 @@ def diagnose(
     elements: Elements = None,
     json: JsonFile = None,
     report: ReportFile = None,
-    save_model: Annotated[Path | None, typer.Option("--save-model", help="Write the augmented model.")] = None,
+    save_model: Annotated[
+        Path | None, typer.Option("--save-model", help="Write the augmented model.")
+    ] = None,
 ) -> None:
     """Say where records and model part, which physics the model lacks, and how much better it fits with it.
 
@@ -131,7 +138,9 @@ def show(result: dict) -> None:
     where = result["location"]
     console.print(f"where: {where['where']}")
     for effect in result["missing"]:
-        table = Table(title=f"{effect['element']}   {effect['equation']}   ({100 * effect['probability']:.0f} %)")
+        table = Table(
+            title=f"{effect['element']}   {effect['equation']}   ({100 * effect['probability']:.0f} %)"
+        )
         for column in ("parameter", "value", "std", "unit"):
             table.add_column(column)
         for name, value in effect["parameters"].items():

@@ -14,33 +14,45 @@ from rhythmid.output import require_new, write_json
 def identify(
     bags: Bags,
     model: Annotated[
-        Path | None, typer.Option("--model", help="What is known of the machine; the paper's hopper by default.")
+        Path | None,
+        typer.Option("--model", help="What is known of the machine; the paper's hopper by default."),
     ] = None,
     signals: SignalsFile = None,
     elements: Elements = None,
     json: JsonFile = None,
     report: ReportFile = None,
-    save_model: Annotated[Path | None, typer.Option("--save-model", help="Write the identified model.")] = None,
-    save: Annotated[Path | None, typer.Option("--save", help="Write delays and model for a controller.")] = None,
+    save_model: Annotated[
+        Path | None, typer.Option("--save-model", help="Write the identified model.")
+    ] = None,
+    save: Annotated[
+        Path | None, typer.Option("--save", help="Write delays and model for a controller.")
+    ] = None,
     method: Annotated[
         str, typer.Option("--method", help="joint (maximum likelihood) or paper (magnitudes, then phases).")
     ] = "joint",
     htf: Annotated[
         str,
-        typer.Option("--htf", help="How transfer functions are found: auto (as the excitation allows), separated_lines, "
-                     "local_rational or regularised_least_squares (the paper's)."),
+        typer.Option(
+            "--htf",
+            help="How transfer functions are found: auto (as the excitation allows), separated_lines, "
+            "local_rational or regularised_least_squares (the paper's).",
+        ),
     ] = "auto",
     forcing: Annotated[
         str | None,
-        typer.Option("--forcing", help="How the forcing reaches the machine: on_robot, delayed (like the command) or "
-                     "clock_unknown (its phase was recorded by another clock)."),
+        typer.Option(
+            "--forcing",
+            help="How the forcing reaches the machine: on_robot, delayed (like the command) or "
+            "clock_unknown (its phase was recorded by another clock).",
+        ),
     ] = None,
     clock_offset: Annotated[
         tuple[float, float] | None,
         typer.Option("--clock-offset", help="Bounds, in s, of that clock's offset, where it is unknown."),
     ] = None,
     clock_offset_std: Annotated[
-        float | None, typer.Option("--clock-offset-std", help="Or its standard deviation, in s, about zero.", min=0.0)
+        float | None,
+        typer.Option("--clock-offset-std", help="Or its standard deviation, in s, about zero.", min=0.0),
     ] = None,
 ) -> None:
     """Find a model's parameters, the command and measurement delays, and the harmonic transfer functions."""
@@ -63,13 +75,17 @@ def identify(
         raise InputError(f"--forcing {forcing}: one of {', '.join(get_args(Forcing))} is expected")
     offset = offset_of(clock_offset, clock_offset_std)
     if offset is not None and forcing not in (None, "clock_unknown"):
-        raise InputError(f"--clock-offset says that the forcing's clock is unknown, --forcing {forcing} that it is known")
+        raise InputError(
+            f"--clock-offset says that the forcing's clock is unknown, --forcing {forcing} that it is known"
+        )
     known = None if model is None else Model.load(model, load_catalogue(elements or ()))
     with Console(stderr=True).status("reading") as status:
         records = load_records(bags, signals)
         status.update("identifying")
         path = "clock_unknown" if offset is not None else cast(Forcing | None, forcing)
-        found = find(records, known, method=cast(Method, method), forcing=path, offset=offset, htf=cast(HtfMethod, htf))
+        found = find(
+            records, known, method=cast(Method, method), forcing=path, offset=offset, htf=cast(HtfMethod, htf)
+        )
     result = found.to_dict()
     show(result)
     if json is not None:
@@ -82,7 +98,9 @@ def identify(
         from rhythmid.identify.present import present
         from rhythmid.report.page import write_page
 
-        write_page(report, present(found, command_line(), "the paper's hopper" if model is None else model.name))
+        write_page(
+            report, present(found, command_line(), "the paper's hopper" if model is None else model.name)
+        )
         typer.echo(f"report: {report}")
 
 
@@ -105,11 +123,15 @@ def show(result: dict[str, Any]) -> None:
     console.print(table)
     console.print(f"assuming that {delays['assumption']}")
     if delays["closure"]["z"] is not None:
-        console.print(f"closure of phase, offset and slope: {delays['closure']['z']:+.2f} standard deviations")
+        console.print(
+            f"closure of phase, offset and slope: {delays['closure']['z']:+.2f} standard deviations"
+        )
     for name, (low, high) in (delays["intervals"] or {}).items():
         console.print(f"{name} delay: between {1e3 * low:.3f} and {1e3 * high:.3f} ms (95 %)")
     for first, second in delays["aliases"]:
-        console.print(f"the same record is given by {1e3 * first:.2f} ms (input) and {1e3 * second:.2f} ms (measurement)")
+        console.print(
+            f"the same record is given by {1e3 * first:.2f} ms (input) and {1e3 * second:.2f} ms (measurement)"
+        )
     for words in delays["undetermined"]:
         console.print(f"not determined: {words}")
     for name, estimates in result["methods"]["paper"].items():

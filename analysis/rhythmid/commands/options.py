@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-Bags = Annotated[list[Path], typer.Argument(help="Bag directories, .mcap/.db3 files, or signals.yaml files of tables.")]
+Bags = Annotated[
+    list[Path], typer.Argument(help="Bag directories, .mcap/.db3 files, or signals.yaml files of tables.")
+]
 SignalsFile = Annotated[Path | None, typer.Option("--signals", help="Which recorded channel is what.")]
 JsonFile = Annotated[Path | None, typer.Option("--json", help="Write the result as JSON.")]
 ReportFile = Annotated[Path | None, typer.Option("--report", help="Write a self-contained HTML page.")]

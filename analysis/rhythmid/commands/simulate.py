@@ -13,7 +13,9 @@ def simulate(
     model: Annotated[Path, typer.Argument(help="Model file of the machine.")],
     experiment: Annotated[Path, typer.Option("--experiment", help="Experiment file.")],
     out: Annotated[Path, typer.Option("--out", help="Bag to write.")],
-    all_topics: Annotated[bool, typer.Option("--all-topics", help="Record the true output and command too.")] = False,
+    all_topics: Annotated[
+        bool, typer.Option("--all-topics", help="Record the true output and command too.")
+    ] = False,
     elements: Elements = None,
 ) -> None:
     """Run an experiment without ROS: writes the bag that the graph would record."""
@@ -23,7 +25,9 @@ def simulate(
     require_new(out)
     described = Experiment.load(experiment, tuple(elements or ()), model)
     messages = perform(described)
-    wanted = list(messages) if all_topics else [topic for topic in described.record.topics if topic in messages]
+    wanted = (
+        list(messages) if all_topics else [topic for topic in described.record.topics if topic in messages]
+    )
     write_bag(
         out,
         {f"{described.namespace}/{topic}": messages[topic] for topic in wanted},

@@ -38,7 +38,9 @@ def chirp_comb(requirements: Requirements, ring_down: float) -> SignalPlan:
     repeat = periods * pumping / count
     sweep = whole * pumping
     low, high = requirements.band
-    cycles = max(1, math.floor(0.5 * (low + high) * sweep + 1e-9))  # whole ones: a chirp ends at zero, without a jump
+    cycles = max(
+        1, math.floor(0.5 * (low + high) * sweep + 1e-9)
+    )  # whole ones: a chirp ends at zero, without a jump
     high = max(2.0 * cycles / sweep - low, low + 1.0 / sweep)
     teeth = count * np.arange(max(1, math.ceil(low * repeat - 1e-9)), math.floor(high * repeat + 1e-9) + 1)
     teeth = teeth[teeth % periods != 0]  # a tooth on a harmonic of the cycle tells nothing, and is not read

@@ -138,7 +138,9 @@ def interleaved_multisine(
         lines=tuple(int(k) for k in lines), weights=tuple(weights), phases=tuple(float(p) for p in phases),
     )  # fmt: skip
     window = made.repeats * period
-    response = ResponseLines(made.repeats * lines, made.repeats * made.periods, 1.0 / window, requirements.harmonics)
+    response = ResponseLines(
+        made.repeats * lines, made.repeats * made.periods, 1.0 / window, requirements.harmonics
+    )
     facts = {
         "period": period, "repeats": made.repeats, "lines": len(lines),
         "spacing": float(made.spaced[1] - made.spaced[0]) / period,

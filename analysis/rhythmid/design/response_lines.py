@@ -57,12 +57,16 @@ class ResponseLines:
                 f"the design aliases: the line at {self.frequency[hidden[0]]:.6g} Hz lies on a harmonic of the forcing, where "
                 f"the limit cycle hides its response; {remedy}"
             )
-        for nearest in range(1, self.harmonics + 1):  # the fewer the harmonics between them, the plainer the case
+        for nearest in range(
+            1, self.harmonics + 1
+        ):  # the fewer the harmonics between them, the plainer the case
             rows = np.flatnonzero(np.abs(self.orders) <= nearest)
             order = np.argsort(bins[rows], axis=None, kind="stable")
             same = np.flatnonzero(np.diff(bins[rows].ravel()[order]) == 0)
             if len(same):
-                (first, n), (second, k) = (divmod(int(order[same[0] + step]), len(self.lines)) for step in (0, 1))
+                (first, n), (second, k) = (
+                    divmod(int(order[same[0] + step]), len(self.lines)) for step in (0, 1)
+                )
                 raise InputError(
                     f"the design aliases: the responses to {self.frequency[n]:.6g} Hz at m = {_signed(first - nearest)} and to "
                     f"{self.frequency[k]:.6g} Hz at m = {_signed(second - nearest)} both fall on "

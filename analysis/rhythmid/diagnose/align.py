@@ -64,8 +64,14 @@ def white_level(value: Array) -> float:
 
 def align(simulation: Record, recording: Record) -> Alignment:
     """Align a simulation with a recording. Raises InputError when they cannot overlap long enough to be compared."""
-    if simulation.input is not None and recording.input is not None and simulation.input_kind != recording.input_kind:
-        kinds = f"the simulation's input is a {simulation.input_kind}, the recording's a {recording.input_kind}"
+    if (
+        simulation.input is not None
+        and recording.input is not None
+        and simulation.input_kind != recording.input_kind
+    ):
+        kinds = (
+            f"the simulation's input is a {simulation.input_kind}, the recording's a {recording.input_kind}"
+        )
         return replace(_by_output(simulation, recording), mismatch=kinds)
     given, seen = active(simulation.input), active(recording.input)
     if given and seen:
@@ -106,7 +112,9 @@ def _on_grid(channel: Channel, step: float) -> Array:
     return np.interp(channel.time[0] + step * np.arange(count), channel.time, channel.value)
 
 
-def _offsets(recording: Channel, simulation: Channel, centred: bool) -> tuple[list[tuple[float, float]], float]:
+def _offsets(
+    recording: Channel, simulation: Channel, centred: bool
+) -> tuple[list[tuple[float, float]], float]:
     """Likely offsets [s] with their correlations, best first, and the grid's step [s]."""
     longest = max(c.time[-1] - c.time[0] for c in (recording, simulation))
     step = max(min(recording.period, simulation.period), longest / MOST)
@@ -121,7 +129,9 @@ def _offsets(recording: Channel, simulation: Channel, centred: bool) -> tuple[li
     return [(begin + step * float(lags[i]), float(value[i])) for i in best], step
 
 
-def _refined(recording: Channel, simulation: Channel, offset: float, step: float) -> tuple[float, float, float]:
+def _refined(
+    recording: Channel, simulation: Channel, offset: float, step: float
+) -> tuple[float, float, float]:
     """Offset below a sample, its standard deviation, and the rms difference of the channels there relative to their rms."""
     known = smooth(simulation)
     inside = (recording.time > simulation.time[0] + offset + 2 * step) & (
@@ -148,10 +158,16 @@ def _forcings(simulation: Record, recording: Record, offset: float) -> tuple[flo
     if a is None or b is None:
         return 0.0, ""
     if abs(a.frequency - b.frequency) * recording.duration > 0.05:
-        return 0.0, f"the forcing is at {a.frequency:.6g} Hz in the simulation and at {b.frequency:.6g} Hz in the recording"
+        return (
+            0.0,
+            f"the forcing is at {a.frequency:.6g} Hz in the simulation and at {b.frequency:.6g} Hz in the recording",
+        )
     size, other = np.linalg.norm(a.coefficients[1:]), np.linalg.norm(b.coefficients[1:])
     if abs(size - other) > SAME * max(size, other):
-        return 0.0, f"the forcing's amplitude is {size:.4g} in the simulation and {other:.4g} in the recording"
+        return (
+            0.0,
+            f"the forcing's amplitude is {size:.4g} in the simulation and {other:.4g} in the recording",
+        )
     period = b.period
     turn = (b.origin - a.origin - offset + 0.5 * period) % period - 0.5 * period
     return (float(turn) if abs(turn) > TURN * period else 0.0), ""
@@ -167,7 +183,10 @@ def _by_command(simulation: Record, recording: Record, sent: Channel, seen: Chan
         if correlation < 0.5:
             mismatch = mismatch or "no stretch of the recorded command is the simulation's"
         elif difference > SAME + 3.0 * white_level(seen.value) / size:
-            mismatch = mismatch or f"the commands differ by {100 * difference:.0f} % of their size where they agree best"
+            mismatch = (
+                mismatch
+                or f"the commands differ by {100 * difference:.0f} % of their size where they agree best"
+            )
         agreement, common = _agreement(simulation, recording, offset)
         cost = difference + abs(turn) + 0.1 * (1.0 - agreement) + 0.2 * (1.0 - common)
         found.append((cost, Alignment("command", offset, std, turn, difference, mismatch)))
@@ -196,19 +215,26 @@ def _by_forcing(simulation: Record, recording: Record) -> Alignment | None:
     first = float(recording.output.time[0] - simulation.output.time[-1])
     last = float(recording.output.time[-1] - simulation.output.time[0])
     least = OVERLAP * min(recording.duration, simulation.duration)
-    counts = np.arange(math.ceil((first + least - turn) / b.period), math.floor((last - least - turn) / b.period) + 1)
+    counts = np.arange(
+        math.ceil((first + least - turn) / b.period), math.floor((last - least - turn) / b.period) + 1
+    )
     if not len(counts):
         return None
     offsets = [float(turn + count * b.period) for count in counts]
     near = sorted(offsets, key=lambda o: abs(o - (recording.output.time[0] - simulation.output.time[0])))
-    offset = max(near[:200], key=lambda o: sum(w * part for w, part in zip((1.0, 0.2), _agreement(simulation, recording, o))))
+    offset = max(
+        near[:200],
+        key=lambda o: sum(w * part for w, part in zip((1.0, 0.2), _agreement(simulation, recording, o))),
+    )
     _, mismatch = _forcings(simulation, recording, offset)
     return Alignment("forcing", offset, 0.0, mismatch=mismatch)
 
 
 def _by_output(simulation: Record, recording: Record) -> Alignment:
     offsets, step = _offsets(recording.output, simulation.output, centred=True)
-    found = [_refined(_centred(recording.output), _centred(simulation.output), start, step) for start, _ in offsets]
+    found = [
+        _refined(_centred(recording.output), _centred(simulation.output), start, step) for start, _ in offsets
+    ]
     offset, std, _ = min(found, key=lambda one: one[2])
     return Alignment("output", offset, std)
 

@@ -157,7 +157,11 @@ class Comparison:
 
     def _where(self) -> str:
         place = self.place
-        at = "from the start" if place.first is None or place.first - self.pair.time[0] < 2.0 / self.pair.frequency else f"from {place.first:.4g} s on"
+        at = (
+            "from the start"
+            if place.first is None or place.first - self.pair.time[0] < 2.0 / self.pair.frequency
+            else f"from {place.first:.4g} s on"
+        )
         said = [f"The difference shows {at}"]
         if place.growth > 3.0:
             said.append("grows with time")
@@ -166,7 +170,9 @@ class Comparison:
         said.append(f"at x = {place.position:.4g} {self.unit}, v = {place.velocity:.3g} {self.unit}/s")
         line = f"harmonic {place.harmonic} of the forcing" if place.harmonic else "no harmonic of the forcing"
         if place.coherence is not None and not place.harmonic:
-            line += ", " + ("it follows the command" if place.coherence > 0.6 else "it does not follow the command")
+            line += ", " + (
+                "it follows the command" if place.coherence > 0.6 else "it does not follow the command"
+            )
         said.append(f"and is strongest at {place.frequency:.3g} Hz ({line})")
         return ", ".join(said) + "."
 
@@ -225,7 +231,9 @@ def compare(
     if model is not None and (alignment.mismatch or alignment.turn != 0.0):
         tell("fitting the model to the simulation and running it with the recording's inputs")
         known, through = in_its_place(simulation, recording, model), True
-    pair, notes = pair_of(known, recording, replace(alignment, offset=0.0, turn=0.0) if through else alignment)
+    pair, notes = pair_of(
+        known, recording, replace(alignment, offset=0.0, turn=0.0) if through else alignment
+    )
     notes = [*notes, *_unit_notes(simulation, recording)]
     difference = pair.recording - pair.simulation
     tell("explaining the difference")
@@ -233,7 +241,10 @@ def compare(
         explanations, left = [], difference
     else:
         explanations, left = explain(
-            pair, recording.output.unit, alignment.by == "output" and not through, alignment.turn != 0.0 and not through
+            pair,
+            recording.output.unit,
+            alignment.by == "output" and not through,
+            alignment.turn != 0.0 and not through,
         )
     spread = float(np.std(pair.recording[pair.used]))
     return Comparison(
@@ -272,12 +283,20 @@ def place_of(pair: Pair, difference: Array) -> Place:
     level = max(LOUD * pair.noise**2, 0.1 * float(np.mean(square)))
     loud = np.flatnonzero(local > level)
     quarter = max(1, len(square) // 4)
-    share = [float(np.mean(square[part]) / max(np.var(pair.recording[part]), 1e-300)) for part in (slice(quarter), slice(-quarter, None))]
+    share = [
+        float(np.mean(square[part]) / max(np.var(pair.recording[part]), 1e-300))
+        for part in (slice(quarter), slice(-quarter, None))
+    ]
     growth = share[1] / max(share[0], 1e-300)
     phase, phase_share = None, None
     if pair.phase is not None:
         sums = np.bincount((pair.phase * PHASES).astype(int) % PHASES, square, PHASES)
-        around = np.array([np.take(sums, range(i - PHASES // 8, i + PHASES // 8 + 1), mode="wrap").sum() for i in range(PHASES)])
+        around = np.array(
+            [
+                np.take(sums, range(i - PHASES // 8, i + PHASES // 8 + 1), mode="wrap").sum()
+                for i in range(PHASES)
+            ]
+        )
         phase = (int(np.argmax(around)) + 0.5) / PHASES
         phase_share = float(around.max() / max(sums.sum(), 1e-300))
     x, v = pair.recording, pair.velocity

@@ -34,7 +34,9 @@ def contradiction(found: Search, pool: ThreadPoolExecutor | None = None) -> str 
         series = [fit.run.series[i] for i in places]
         try:
             run = prepare_run(fit.model, series, fit.run.max_step)
-            alone[name] = minimise(fit.model, run, fit.names, fit.noise, [fit.starts[i] for i in places], 30, pool)
+            alone[name] = minimise(
+                fit.model, run, fit.names, fit.noise, [fit.starts[i] for i in places], 30, pool
+            )
         except InputError:
             return None
     if _error(list(alone.values())) > LESS * _error([found.fit]):

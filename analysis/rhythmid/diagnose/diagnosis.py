@@ -106,14 +106,20 @@ def diagnose(
     with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
         check_units(model, everything[:count], pool)
         scoring = settle(model, everything[:count], everything[count:], known, pool, tell)
-        calibration, seen, unseen = scoring.calibration, list(scoring.calibration.series), list(scoring.unseen)
+        calibration, seen, unseen = (
+            scoring.calibration,
+            list(scoring.calibration.series),
+            list(scoring.unseen),
+        )
         if holdout:
             heldout = f"held out: {', '.join(record.name for record in holdout)}"
         else:
             heldout = f"held out: the last fifth of every {'record' if scoring.whole else 'window'}"
         known = known.within(scales(seen, calibration.fit.model))
         if seen[0].observer is not None:  # which takes the measurement for the motion
-            known = known.without(*(name for name, element in known.elements.items() if element.slot == "sensor"))
+            known = known.without(
+                *(name for name, element in known.elements.items() if element.slot == "sensor")
+            )
             notes[TIED_SENSOR] = None
         found = search(seen, calibration.fit, known, pool, tell)
         tell("judging on held-out records")
@@ -155,7 +161,11 @@ def check_comparable(series: Sequence[Series]) -> None:
             decades = [abs(math.log10(max(abs(a), 1e-300) / max(abs(b), 1e-300))) for a, b in
                        ((spread[i], spread[j]), (level[i], level[j]))]  # fmt: skip
             thousand = all(2.5 < one < 3.5 for one in decades)
-            if thousand or jump > 300.0 * size or max(spread[i], spread[j]) > 2000.0 * min(spread[i], spread[j]):
+            if (
+                thousand
+                or jump > 300.0 * size
+                or max(spread[i], spread[j]) > 2000.0 * min(spread[i], spread[j])
+            ):
                 raise InputError(
                     f"{series[j].name} and {one.name} do not look like one machine in one unit (outputs "
                     f"{level[j]:.3g} ± {spread[j]:.3g} and {level[i]:.3g} ± {spread[i]:.3g}); check units and files"

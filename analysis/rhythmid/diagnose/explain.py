@@ -97,7 +97,11 @@ class Difference:
     def whole(self) -> Array:
         """What is left at all times (n,)."""
         raw = self.pair.recording - predicted(self.pair, self.values)
-        return raw - self.columns @ np.linalg.lstsq(self.columns[self.pair.used], raw[self.pair.used], rcond=1e-10)[0]
+        return (
+            raw
+            - self.columns
+            @ np.linalg.lstsq(self.columns[self.pair.used], raw[self.pair.used], rcond=1e-10)[0]
+        )
 
     def share(self, square: float) -> float:
         """Share of what is left beyond noise that a remaining sum of squares takes away."""
@@ -108,8 +112,19 @@ class Difference:
     def fitted(self, names: list[str], way: Way | None = None) -> tuple[float, dict[str, float]]:
         """Sum of squares and values of these ways fitted together; of the last one, `way`, several starts are tried."""
         pair = self.pair
-        span, size, length = 1.0 / pair.frequency, float(np.std(pair.recording)), float(pair.time[-1] - pair.time[0])
-        scale = {"time": 0.05 * span, "lag": 0.05 * span, "gain": 0.1, "length": size, "rate": size / length, "skew": 0.1 * span / length}
+        span, size, length = (
+            1.0 / pair.frequency,
+            float(np.std(pair.recording)),
+            float(pair.time[-1] - pair.time[0]),
+        )
+        scale = {
+            "time": 0.05 * span,
+            "lag": 0.05 * span,
+            "gain": 0.1,
+            "length": size,
+            "rate": size / length,
+            "skew": 0.1 * span / length,
+        }
         kinds = {one.name: one for one in WAYS}
         sizes = np.array([scale[kinds[name].kind] for name in names])
         begin = np.array([self.values.get(name, kinds[name].neutral) for name in names])
@@ -153,7 +168,9 @@ class Difference:
         for way in WAYS:
             if way.name in self.values or (blind and way.name == "measurement_delay"):
                 continue
-            if (self.pair.cycle is None and way.slot == "command") or (self.pair.effort is None and way.slot == "actuator"):
+            if (self.pair.cycle is None and way.slot == "command") or (
+                self.pair.effort is None and way.slot == "actuator"
+            ):
                 continue
             square, values = self.fitted([*self.values, way.name], way)
             extra = ("input_delay",) if way.name == "measurement_delay" and self.pair.cycle is None else ()
@@ -185,7 +202,9 @@ class Difference:
         return replace(trial.what, explained=float(np.clip(self.share(trial.square), 0.0, 1.0)))
 
 
-def explain(pair: Pair, unit: str, blind: bool = False, rough: bool = False) -> tuple[list[Explanation], Array]:
+def explain(
+    pair: Pair, unit: str, blind: bool = False, rough: bool = False
+) -> tuple[list[Explanation], Array]:
     """What explains the difference of a pair whose motions are in `unit`, step by step, and what is left of it (n,).
 
     `blind` says that the motions themselves were aligned, which hides a constant delay; `rough` that the pair is not exact.

@@ -16,7 +16,9 @@ from rhythmid.diagnose.search import Search
 from rhythmid.identify.series import Series
 
 FAINT = 3.0  # standard deviations from its absence, nearer than which an effect's size is no size
-NEEDED = 100.0  # chi2 that an effect is worth, from which its size is only badly parted from its other parameters
+NEEDED = (
+    100.0  # chi2 that an effect is worth, from which its size is only badly parted from its other parameters
+)
 HARM = 0.01  # share by which the held-out error falls without an effect that does harm
 USE = 0.003  # share by which the error on seen and held-out records together has to rise without an effect of use
 
@@ -80,9 +82,13 @@ def _without(found: Search, label: str, pool: ThreadPoolExecutor | None) -> Sear
         return replace(found, best=nominal, fit=found.nominal)
     series, step = found.fit.run.series, found.fit.run.max_step
     known = compile_model(best.model).layout.states
-    trials, _ = run_trials([Proposal(rest, best.model.without(label), ({},))], series, best.starts, known, found.noise, step)
+    trials, _ = run_trials(
+        [Proposal(rest, best.model.without(label), ({},))], series, best.starts, known, found.noise, step
+    )
     if not trials:
         return None
     fit = whole_fit(trials[0], series, found.noise, step, pool=pool)
     others = tuple(trial for trial in found.trials if set(trial.added) != set(rest))
-    return replace(found, best=trials[0], fit=fit, trials=tuple(sorted((trials[0], *others), key=lambda t: t.bic())))
+    return replace(
+        found, best=trials[0], fit=fit, trials=tuple(sorted((trials[0], *others), key=lambda t: t.bic()))
+    )

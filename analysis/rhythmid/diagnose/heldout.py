@@ -48,5 +48,7 @@ def tail_error(found: Search, trial: Trial) -> float | None:
     outputs = run.outputs(trial.model, trial.starts)
     if outputs is None:
         return None
-    value = normalised_error([output - one.averaged for output, one in zip(outputs, run.series)], run.series, True)
+    value = normalised_error(
+        [output - one.averaged for output, one in zip(outputs, run.series)], run.series, True
+    )
     return None if math.isnan(value) else value

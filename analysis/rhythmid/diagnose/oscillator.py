@@ -27,7 +27,9 @@ class Oscillator:
         s = 2j * np.pi * np.arange(size // 2 + 1) / (size * step)
         transfer = self.gain / (s * s + self.damping * s + self.omega**2)
         shape = (-1,) + (1,) * (forces.ndim - 1)
-        return np.asarray(np.fft.irfft(transfer.reshape(shape) * np.fft.rfft(forces, size, axis=0), size, axis=0))[:n]
+        return np.asarray(
+            np.fft.irfft(transfer.reshape(shape) * np.fft.rfft(forces, size, axis=0), size, axis=0)
+        )[:n]
 
     def free(self, time: Array) -> Array:
         """What two unknown initial conditions do, (n, 2)."""
@@ -37,7 +39,9 @@ class Oscillator:
         return np.column_stack([wave.real, wave.imag])
 
 
-def oscillator_of(effort: Array, motion: Array, step: float, dominant: float, bandwidth: float) -> Oscillator | None:
+def oscillator_of(
+    effort: Array, motion: Array, step: float, dominant: float, bandwidth: float
+) -> Oscillator | None:
     """Oscillator that turns a force (n,) into a motion (n,), both at steps [s], by what moves below `bandwidth` [Hz].
 
     Iterated weighted least squares over frequency (C. K. Sanathanan, J. Koerner, IEEE Trans. Autom. Control 8 (1963) 56) with a
@@ -63,7 +67,9 @@ def oscillator_of(effort: Array, motion: Array, step: float, dominant: float, ba
             columns = np.column_stack([s * s * late, s * late, late]) * weight[:, None]
             target = force * weight
             solution = np.linalg.lstsq(
-                np.vstack([columns.real, columns.imag]), np.concatenate([target.real, target.imag]), rcond=None
+                np.vstack([columns.real, columns.imag]),
+                np.concatenate([target.real, target.imag]),
+                rcond=None,
             )[0]
             m, c, k = solution
             weight = 1.0 / np.maximum(np.abs(m * s * s + c * s + k), 1e-300)
@@ -71,8 +77,6 @@ def oscillator_of(effort: Array, motion: Array, step: float, dominant: float, ba
         if left < least and m > 0.0 and k > 0.0:
             best, least = Oscillator(math.sqrt(k / m), max(c / m, 0.01 * math.sqrt(k / m)), 1.0 / m), left
     return best
-
-
 
 
 def ringing(motion: Array, step: float, dominant: float) -> Oscillator | None:

@@ -68,12 +68,16 @@ def pair_of(simulation: Record, recording: Record, alignment: Alignment) -> tupl
     offset = alignment.offset
     for one in (simulation, recording):
         if len(one.output) < FEWEST:
-            raise InputError(f"{one.name}: has only {len(one.output)} samples of the output; {FEWEST} are needed to compare")
+            raise InputError(
+                f"{one.name}: has only {len(one.output)} samples of the output; {FEWEST} are needed to compare"
+            )
         if np.ptp(one.output.value) == 0.0:
             raise InputError(f"{one.name}: the output never changes; there is nothing to compare")
     rate = min(1.0 / simulation.output.period, 1.0 / recording.output.period)
     grid = recording.uniform(rate)
-    inside = (grid.time >= simulation.output.time[0] + offset) & (grid.time <= simulation.output.time[-1] + offset)
+    inside = (grid.time >= simulation.output.time[0] + offset) & (
+        grid.time <= simulation.output.time[-1] + offset
+    )
     common, value = grid.time[inside], np.asarray(grid.output[inside])
     if len(common) < FEWEST:
         raise InputError(
@@ -100,10 +104,14 @@ def pair_of(simulation: Record, recording: Record, alignment: Alignment) -> tupl
     effort = np.sum(efforts, axis=0) if efforts else None
     highest = min(bandwidth(value, grid.period), 0.5 / step)
     pumped = active_pumping(recording)
-    noise = math.hypot(white_level(recording.output.value), white_level(simulation.output.value)) / math.sqrt(block)
+    noise = math.hypot(white_level(recording.output.value), white_level(simulation.output.value)) / math.sqrt(
+        block
+    )
     oscillator = None if effort is None else oscillator_of(effort, simulated, step, frequency, highest)
     if oscillator is None:
-        oscillator = _free(real, simulated, time, step, noise, effort is None, None if pumped is None else pumped.frequency)
+        oscillator = _free(
+            real, simulated, time, step, noise, effort is None, None if pumped is None else pumped.frequency
+        )
     pair = Pair(
         time, step, real, simulated, average(grid.valid[inside].astype(float)) == 1.0, noise, frequency, highest,
         oscillator or Oscillator(3.0 * np.pi * frequency, 1.5 * np.pi * frequency), None, command, effort,

@@ -57,7 +57,9 @@ def present(
     return replace(page, sections=(section, *page.sections))
 
 
-def present_comparison(found: Comparison, simulation: Record, records: Sequence[Record], command: str = "") -> Page:
+def present_comparison(
+    found: Comparison, simulation: Record, records: Sequence[Record], command: str = ""
+) -> Page:
     """The report of a comparison without a model; `simulation` and `records` are what `compare` was given."""
     quality = [quality_of(simulation, "simulation"), *(quality_of(one, "recording") for one in records)]
     return comparison_page(found.to_dict(), run_of(found), found.unit, quality, command)

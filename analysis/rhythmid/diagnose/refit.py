@@ -75,7 +75,15 @@ def _outcome(end: Descent) -> _Outcome:
 def _trial(added: tuple[str, ...], model: Model, done: _Outcome, noise: NoiseModel) -> Trial:
     fitted = model.with_values(done.values)
     return Trial(
-        added, fitted, done.starts, done.chi2, done.samples, len(done.values), done.converged, noise, done.differences
+        added,
+        fitted,
+        done.starts,
+        done.chi2,
+        done.samples,
+        len(done.values),
+        done.converged,
+        noise,
+        done.differences,
     )
 
 
@@ -197,7 +205,9 @@ def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
             continue
         guesses = element.starts(scales(series, trial.model))
         known = {tuple(guess[name.rpartition(".")[2]] for name in flat) for guess in guesses}
-        for values in [tuple(share * value for value in one) for one in sorted(known) for share in (1.0, *FAINTER)]:
+        for values in [
+            tuple(share * value for value in one) for one in sorted(known) for share in (1.0, *FAINTER)
+        ]:
             again = replace(trial, model=trial.model.with_values(dict(zip(flat, values))), differences=None)
             try:
                 end = _outcome(_end(again, series, trial.noise, max_step, THOROUGH))
@@ -272,11 +282,15 @@ def whole_fit(
     )
 
 
-def _end(trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int) -> Descent:
+def _end(
+    trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int
+) -> Descent:
     """Where a trial's descent under a noise model ends; without `iterations`, the trial as it is."""
     run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
     names = tuple(trial.model.free)
-    return descend(trial.model, run, names, noise, trial.starts, iterations, None, TOLERANCE, trial.differences)
+    return descend(
+        trial.model, run, names, noise, trial.starts, iterations, None, TOLERANCE, trial.differences
+    )
 
 
 def under_noise(

@@ -28,7 +28,9 @@ PATIENCE = 2  # steps without such a gain before no more are tried
 BETTER = 0.6  # share to which all steps together have to: an error that adds up, not one made at once by noise or effect
 SHORTER = 2.0  # factor from one length of windows to the next
 FINE = 0.08  # of a sample rate that an observer's frequency may be
-INTEGRATES = "the model integrates or is unstable, so that a long free run would add up every small disturbance"
+INTEGRATES = (
+    "the model integrates or is unstable, so that a long free run would add up every small disturbance"
+)
 FREE_RUN = "free run"
 TIED = "the balance of forces, the model tied to the recorded motion by an observer of {0:.2g} Hz: "
 LOSES = "in free run the nominal model loses the machine"
@@ -113,7 +115,9 @@ def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
         free = False
     if free:
         yield _Way(FREE_RUN, list)
-    elif all(one.measured == "position" and one.kind == "force" and one.command is not None for one in series):
+    elif all(
+        one.measured == "position" and one.kind == "force" and one.command is not None for one in series
+    ):
         step = max(one.period * one.block for one in series)
         frequency = min(max(bandwidth(one.value, one.period) for one in series), FINE / step)
         yield _Way(TIED.format(frequency) + INTEGRATES, lambda given: observed(given, model, frequency))
@@ -126,7 +130,9 @@ def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
 
 def _error(fit: Fit) -> float:
     """rms of the residuals, in the output's unit."""
-    return float(np.sqrt(np.mean(np.concatenate([r[one.used] for r, one in zip(fit.residuals, fit.run.series)]) ** 2)))
+    return float(
+        np.sqrt(np.mean(np.concatenate([r[one.used] for r, one in zip(fit.residuals, fit.run.series)]) ** 2))
+    )
 
 
 def _words(length: float, reason: str) -> str:

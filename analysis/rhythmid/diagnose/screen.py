@@ -294,9 +294,7 @@ def score(fit: Fit, changes: Sequence[Change]) -> list[Score]:
 
 def under(fit: Fit, noise: NoiseModel, pool: ThreadPoolExecutor | None = None) -> Fit:
     """The fit repeated under another noise model, from where it is."""
-    return minimise(
-        fit.model, fit.run, fit.names, noise, fit.starts, 10, pool, differences=fit.differences
-    )
+    return minimise(fit.model, fit.run, fit.names, noise, fit.starts, 10, pool, differences=fit.differences)
 
 
 def residual_line(fit: Fit) -> float:

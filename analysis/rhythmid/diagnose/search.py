@@ -62,8 +62,12 @@ NEAR = (
 MOST = 4  # effects at once
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
 MISFIT = 0.1  # error, as a share of the motion, and
-PREDICTED = 25.0  # power of the residual over what its own past leaves of it, beyond both of which it is no noise
-ROUGH = 0.1  # of the noise: integration error of an element with corners beyond which all steps are made finer
+PREDICTED = (
+    25.0  # power of the residual over what its own past leaves of it, beyond both of which it is no noise
+)
+ROUGH = (
+    0.1  # of the noise: integration error of an element with corners beyond which all steps are made finer
+)
 RIVALS = 4  # elements that scored best at first, tried again in the place of each of several effects
 
 
@@ -135,7 +139,9 @@ def _one_round(
     if colour:
         noise = noise_without(fit, changes)
         if fit.nrmse() > MISFIT and noise.variance > PREDICTED * noise.std**2:
-            noise = NoiseModel(np.empty(0), noise.variance**0.5)  # motion that is missed, not noise: do not whiten it away
+            noise = NoiseModel(
+                np.empty(0), noise.variance**0.5
+            )  # motion that is missed, not noise: do not whiten it away
         fit = under(fit, noise, pool)
     scores = score(fit, changes)
     return Round(tuple(scores), p_value(scores)), fit
@@ -349,7 +355,11 @@ def _defend(
 def _shared(trial: Trial, label: str, element: Element) -> dict[str, float]:
     """Values of the parameters that another element has by the same names as the one under the label."""
     own = {parameter.name for parameter in element.parameters}
-    return {p.name: trial.model.value(f"{label}.{p.name}") for p in trial.element(label).parameters if p.name in own}
+    return {
+        p.name: trial.model.value(f"{label}.{p.name}")
+        for p in trial.element(label).parameters
+        if p.name in own
+    }
 
 
 def _rest(trial: Trial, label: str) -> tuple[str, ...]:

@@ -88,7 +88,9 @@ def slowest(series: Series) -> float:
     value = np.asarray(series.forcing(inside))
     if np.ptp(value) == 0.0:
         return own
-    return max(min(own, fundamental_frequency(series.centres, value)), 0.5 / float(series.time[-1] - series.time[0]))
+    return max(
+        min(own, fundamental_frequency(series.centres, value)), 0.5 / float(series.time[-1] - series.time[0])
+    )
 
 
 def amplitudes(series: Series, frequency: float) -> Array:
@@ -142,7 +144,9 @@ def tempered(
         reason = contradiction(found, pool)
         if reason is None:
             return diagnosis
-        shortfall = Shortfall(reason, "diagnose each record on its own, then record again whichever differs", True)
+        shortfall = Shortfall(
+            reason, "diagnose each record on its own, then record again whichever differs", True
+        )
     if shortfall is None:
         return diagnosis
     return replace(
@@ -157,4 +161,3 @@ def undecided(reason: str, missing: Sequence[MissingEffect]) -> str:
     """The summary of a diagnosis that decides nothing."""
     names = " and ".join(effect.element.replace("_", " ") for effect in missing)
     return f"Undecided: {reason}." + (f" Best so far: {names}." if names else "")
-

@@ -25,7 +25,9 @@ from rhythmid.model import Model
 Array = NDArray[np.float64]
 HOLD, PERIOD, DELAY = "command_hold", "command_hold.period", "input_delay.delay"
 COARSE = 50  # rates of the coarse scan
-BAND = 0.5  # of the way from the best to the middling cost of the coarse scan, up to which a rate is in the band
+BAND = (
+    0.5  # of the way from the best to the middling cost of the coarse scan, up to which a rate is in the band
+)
 MOST = 3000  # rates tried over the first stretch
 SERIES = 2  # looked at, those with the strongest command at first
 FASTEST = 100.0  # [Hz] beyond which a hold is little but a delay, and its ticks do not matter
@@ -34,13 +36,17 @@ FOUND = 2  # guesses returned
 FINEST = 0.008  # spacing of the rates at the end, over the inverse length of the record
 
 
-def scanned(model: Model, series: Sequence[Series], starts: Sequence[Array], noise: NoiseModel) -> list[dict[str, float]]:
+def scanned(
+    model: Model, series: Sequence[Series], starts: Sequence[Array], noise: NoiseModel
+) -> list[dict[str, float]]:
     """First guesses of period and delay [s] of a model with a command hold, best first; empty where no rate is possible.
 
     `starts` are the initial states of the series; the other parameters stay at the model's values.
     """
     mean = model.parameters[DELAY].value if DELAY in model.parameters else 0.0
-    driven = [(one, start) for one, start in zip(series, starts) if one.command is not None and one.kind == "force"]
+    driven = [
+        (one, start) for one, start in zip(series, starts) if one.command is not None and one.kind == "force"
+    ]
     if mean <= 0.0 or not driven:
         return []
     slowest = max(0.45 / mean, 4.0 * max(dominant_frequency(one) for one, _ in driven))
@@ -75,7 +81,9 @@ def scanned(model: Model, series: Sequence[Series], starts: Sequence[Array], noi
     cases, _ = best_of(length, _unshifted(np.arange(low, high, spacing)), cases[0])
     while spacing > FINEST / longest:
         length = min(2.0 * length, whole)
-        around = np.array([(r * spacing, d * late) for r in (-1.0, -0.5, 0.0, 0.5, 1.0) for d in (-1.0, 0.0, 1.0)])
+        around = np.array(
+            [(r * spacing, d * late) for r in (-1.0, -0.5, 0.0, 0.5, 1.0) for d in (-1.0, 0.0, 1.0)]
+        )
         tried = (cases[:FOLLOWED, None, :] + around).reshape(-1, 2)
         cases, _ = best_of(length, np.unique(np.round(tried, 9), axis=0), cases[0])
         spacing, late = 0.5 * spacing, 0.5 * late
@@ -93,7 +101,11 @@ def _strength(series: Series) -> float:
 
 
 def _costs(
-    run: FreeRun, middle: Model, guesses: Sequence[dict[str, float]], starts: Sequence[Array], noise: NoiseModel
+    run: FreeRun,
+    middle: Model,
+    guesses: Sequence[dict[str, float]],
+    starts: Sequence[Array],
+    noise: NoiseModel,
 ) -> Array:
     """Whitened sums of squares that the guesses leave, beyond what the model's other parameters can do at `middle`."""
     names = tuple(name for name in middle.free if name != PERIOD)

@@ -80,4 +80,7 @@ def _scaled(one: Series, attribute: str, factor: float) -> Series | None:
     signal = getattr(one, attribute)
     if signal is None:
         return None
-    return replace(one, **{attribute: PPoly(factor * signal.c, signal.x) if isinstance(signal, PPoly) else factor * signal})
+    return replace(
+        one,
+        **{attribute: PPoly(factor * signal.c, signal.x) if isinstance(signal, PPoly) else factor * signal},
+    )

@@ -37,7 +37,9 @@ def twins_of(best: Trial, rivals: Sequence[Trial]) -> list[tuple[str, ...]]:
             come = set(rival.added) - set(best.added)
             if gone == {label} and len(come) == 1:
                 other = rival.element(come.pop()).name
-                if other not in others and other not in element.special_case_of:  # which contains it: no rival
+                if (
+                    other not in others and other not in element.special_case_of
+                ):  # which contains it: no rival
                     others.append(other)
         if others:
             groups.append((element.name, *others))

@@ -52,7 +52,9 @@ def predicted(pair: Pair, values: Mapping[str, float]) -> Array:
     mean = float(np.mean(pair.simulation))
     base = pair.cycle if pair.cycle is not None else np.full(n, mean)
     answer = pair.simulation - base  # to the command
-    answer = late_by(_lagged(answer, values.get("command_lag", 0.0), pair.step), values.get("input_delay", 0.0), pair)
+    answer = late_by(
+        _lagged(answer, values.get("command_lag", 0.0), pair.step), values.get("input_delay", 0.0), pair
+    )
     motion = base + values.get("command_gain", 1.0) * answer
     motion = mean + values.get("actuator_gain", 1.0) * (motion - mean)
     motion = _lagged(motion, values.get("sensor_lag", 0.0), pair.step)
@@ -78,5 +80,3 @@ def _lagged(signal: Array, constant: float, step: float) -> Array:
     share = constant / step * (1.0 - keep)
     begin = float(signal[0])
     return begin + np.asarray(lfilter([1.0 - share, share - keep], [1.0, -keep], signal - begin))
-
-

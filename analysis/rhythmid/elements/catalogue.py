@@ -29,7 +29,9 @@ class _Source(SourceFileLoader):
 
 def _module(path: Path) -> ModuleType:
     if BUILT_IN in path.parents:
-        spec = importlib.util.spec_from_file_location(f"rhythmid.elements.{path.parent.name}.{path.stem}", path)
+        spec = importlib.util.spec_from_file_location(
+            f"rhythmid.elements.{path.parent.name}.{path.stem}", path
+        )
     else:
         name = f"_element_{path.stem}"
         spec = importlib.util.spec_from_file_location(name, path, loader=_Source(name, str(path)))
@@ -39,7 +41,9 @@ def _module(path: Path) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except Exception as error:  # whatever a user's file raises is bad input, not a failure of ours
-        raise InputError(f"{path}: this element file does not load: {type(error).__name__}: {error}") from error
+        raise InputError(
+            f"{path}: this element file does not load: {type(error).__name__}: {error}"
+        ) from error
     return module
 
 

@@ -67,7 +67,9 @@ class Scales:
     duration: float  # [s] longest record
     period: float  # [s] sample period
     forcing_frequency: float = 0.0  # [Hz] pumping frequency, 0 where there is none
-    residual_frequency: float = 0.0  # [Hz] strongest line that the nominal model leaves unexplained, 0 where unknown
+    residual_frequency: float = (
+        0.0  # [Hz] strongest line that the nominal model leaves unexplained, 0 where unknown
+    )
     reference: float = 0.0  # standard deviation of a controller's reference, 0 where there is none
 
     @property
@@ -113,7 +115,9 @@ class Element:
     acts: Acts = "leg"
     states: tuple[str, ...] = ()
     memories: tuple[str, ...] = ()
-    initial: Callable[..., tuple[float, ...]] | None = None  # (x, v, f, **parameters) -> `own` at the start; default 0
+    initial: Callable[..., tuple[float, ...]] | None = (
+        None  # (x, v, f, **parameters) -> `own` at the start; default 0
+    )
     borrows: Mapping[str, tuple[str, float | None]] = field(default_factory=dict)
     also_known_as: tuple[str, ...] = ()
     family: str = ""
@@ -124,7 +128,9 @@ class Element:
     candidate: bool = True  # takes part in the search for missing physics
     needless_with: tuple[str, ...] = ()  # elements beside which another candidate says the same
     same_as: tuple[str, ...] = ()  # elements that make one and the same model, with other parameters
-    same_beside: Mapping[str, str] = field(default_factory=dict)  # beside which element it is the same as which other
+    same_beside: Mapping[str, str] = field(
+        default_factory=dict
+    )  # beside which element it is the same as which other
     rotational: bool = False  # makes sense only where the position is an angle
     controlled: bool = False  # makes sense only where a controller in the command path closes the loop
     starts: Callable[[Scales], list[dict[str, float]]] | None = None

@@ -42,7 +42,9 @@ class Multisine(Excitation):
             if given and len(given) != len(self.lines):
                 raise ValueError(f"{name}: {len(given)} values for {len(self.lines)} lines")
         if len(self.harmonics) == 0:
-            raise ValueError("band: no line of the multisine falls into it; make the period longer or the band wider")
+            raise ValueError(
+                "band: no line of the multisine falls into it; make the period longer or the band wider"
+            )
         return self
 
     @property
@@ -69,7 +71,11 @@ class Multisine(Excitation):
         k = self.harmonics
         weight = np.array(self.weights) if self.weights else np.ones(len(k))
         amplitude = self.rms * math.sqrt(2.0) * weight / np.linalg.norm(weight)
-        phase = np.array(self.phases) if self.phases else np.random.default_rng(self.seed).uniform(0, 2 * np.pi, len(k))
+        phase = (
+            np.array(self.phases)
+            if self.phases
+            else np.random.default_rng(self.seed).uniform(0, 2 * np.pi, len(k))
+        )
         t = np.asarray(time) - self.start_delay
         value = np.zeros(len(t))
         for number, size, angle in zip(k, amplitude, phase):

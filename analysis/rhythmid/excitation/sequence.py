@@ -54,7 +54,8 @@ def _resolve(spec: Any, folder: Path) -> Any:
     """File names in the description are relative to the file that holds it."""
     if isinstance(spec, Mapping):
         return {
-            key: str(folder / value) if key == "file" else _resolve(value, folder) for key, value in spec.items()
+            key: str(folder / value) if key == "file" else _resolve(value, folder)
+            for key, value in spec.items()
         }
     if isinstance(spec, (list, tuple)):
         return [_resolve(item, folder) for item in spec]

@@ -36,7 +36,9 @@ class Bound:
     @property
     def std(self) -> Mapping[str, float]:
         """Smallest standard deviation of each parameter; infinite where the record does not determine it."""
-        return {n: math.sqrt(v) if v < 1e20 else math.inf for n, v in zip(self.names, np.diag(self.covariance))}
+        return {
+            n: math.sqrt(v) if v < 1e20 else math.inf for n, v in zip(self.names, np.diag(self.covariance))
+        }
 
 
 def planned_record(experiment: Experiment) -> Record:

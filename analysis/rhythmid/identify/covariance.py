@@ -40,6 +40,8 @@ def on_the_edge(model: Model, names: Sequence[str], covariance: Array) -> dict[s
     for name, variance in zip(names, np.diag(covariance)):
         value = model.value(name)
         for bound in model.parameters[name].bounds:
-            if math.isfinite(bound) and 0.0 < abs(value - bound) < EDGE * math.sqrt(max(float(variance), 0.0)):
+            if math.isfinite(bound) and 0.0 < abs(value - bound) < EDGE * math.sqrt(
+                max(float(variance), 0.0)
+            ):
                 found[name] = bound
     return found

@@ -165,7 +165,10 @@ def combine_delays(
     """(τ_u, τ_y) that satisfy (9) for several harmonics at once, each phase weighed by its noise."""
     phases = [_phase(estimate, model, m, weigh_by_noise=True) for m in harmonics]
     joined = _Phase(
-        *(np.concatenate([getattr(p, name) for p in phases]) for name in ("error", "omega", "offset", "weight"))
+        *(
+            np.concatenate([getattr(p, name) for p in phases])
+            for name in ("error", "omega", "offset", "weight")
+        )
     )
     delays, inverse = joined.refine(np.array(start), BOTH)
     covariance = inverse * _scatter(estimate, joined, delays, 2)

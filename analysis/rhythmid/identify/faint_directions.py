@@ -41,7 +41,9 @@ def with_faint_directions(
     """The linearisation with its sensitivities along faint directions replaced by differences along these directions."""
     jacobian = linearisation.jacobian
     norms = np.linalg.norm(jacobian, axis=0)
-    size = float(np.median((norms * np.abs(linearisation.steps))[norms > 0.0])) if np.any(norms > 0.0) else 0.0
+    size = (
+        float(np.median((norms * np.abs(linearisation.steps))[norms > 0.0])) if np.any(norms > 0.0) else 0.0
+    )
     for change in faint(jacobian):
         slope = _slope(linearisation, problem, model, starts, change, size)
         if slope is not None:
@@ -51,7 +53,12 @@ def with_faint_directions(
 
 
 def _slope(
-    linearisation: Linearisation, problem: Problem, model: Model, starts: Sequence[Array], change: Array, size: float
+    linearisation: Linearisation,
+    problem: Problem,
+    model: Model,
+    starts: Sequence[Array],
+    change: Array,
+    size: float,
 ) -> Array | None:
     """Whitened slope of the outputs along `change`, initial states projected out; None where a simulation diverges or the
     bounds leave no room."""

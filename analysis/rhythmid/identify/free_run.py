@@ -158,7 +158,9 @@ def prepare_run(
     excited: InputKind = kinds.pop() if kinds else "force"
     sensors: set[OutputKind] = {one.measured for one in series}
     if len(sensors) > 1:
-        raise InputError(f"records that measure different things ({', '.join(sorted(sensors))}) cannot be fitted together")
+        raise InputError(
+            f"records that measure different things ({', '.join(sorted(sensors))}) cannot be fitted together"
+        )
     measured: OutputKind = sensors.pop() if sensors else "position"
     inputs = tuple(_inputs(one) for one in series)
     smooth = not _sees_steps(model) and all(i.smooth is not None or len(i.command[0]) <= 2 for i in inputs)

@@ -119,7 +119,9 @@ class _Comparison:
         except InputError:
             return np.full(2 * len(self.bins) + (2 * CYCLE + 1 if self.cycle else 0), 1e6)
         measured = self.spectra.output[self.bins]
-        left = (self.expected(self.sidebands(model), input_delay, measurement_delay) - measured) / np.sqrt(self.variance)
+        left = (self.expected(self.sidebands(model), input_delay, measurement_delay) - measured) / np.sqrt(
+            self.variance
+        )
         parts = [np.sqrt(2.0) * left.real, np.sqrt(2.0) * left.imag]
         if self.cycle:
             n = np.arange(CYCLE + 1)
@@ -144,7 +146,9 @@ class _Comparison:
         total = np.arange(0.0, 2.0 * longest + 0.5 * step, step)
         turned = np.exp(1j * self.pumping.omega * np.multiply.outer(one, self.m)) @ parts
         cross = ((turned * measured.conj()) @ np.exp(-1j * np.multiply.outer(omega, total))).real
-        left = float(np.sum(np.abs(measured) ** 2)) + np.sum(np.abs(turned) ** 2, axis=1)[:, None] - 2.0 * cross
+        left = (
+            float(np.sum(np.abs(measured) ** 2)) + np.sum(np.abs(turned) ** 2, axis=1)[:, None] - 2.0 * cross
+        )
         left = left / float(np.sum(np.abs(measured) ** 2))
         later = total[None, :] - one[:, None]
         possible = (later > -step) & (later < longest + step)
@@ -202,8 +206,14 @@ def _descend(comparison: _Comparison, start: Array, longest: float, tolerance: f
     scale = np.array([abs(v) if v else 1.0 for v in start[:-2]] + [0.02, 0.02])
     inside = np.clip(start, low, high)
     found = least_squares(
-        comparison.residual, inside, bounds=(low, high), x_scale=scale, diff_step=1e-5, xtol=tolerance,
-        ftol=tolerance, max_nfev=25,
+        comparison.residual,
+        inside,
+        bounds=(low, high),
+        x_scale=scale,
+        diff_step=1e-5,
+        xtol=tolerance,
+        ftol=tolerance,
+        max_nfev=25,
     )
     return found.x
 
@@ -282,7 +292,11 @@ def _covariance(comparison: _Comparison, values: Array) -> Array:
 
 
 def visible_sidebands(
-    record: Record, model: Model, pumping: Pumping, noise_density: float, harmonics: Sequence[int] = (1, 2, 3, 4)
+    record: Record,
+    model: Model,
+    pumping: Pumping,
+    noise_density: float,
+    harmonics: Sequence[int] = (1, 2, 3, 4),
 ) -> list[int]:
     """Harmonics |m| that stand out of a noise of `noise_density` [unit²/Hz], two-sided: Σ|G_m U|²/σ² > 25."""
     found = spectra(record, pumping, 2.0, max(harmonics) + 1)

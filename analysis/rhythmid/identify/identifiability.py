@@ -52,9 +52,13 @@ def offset_of(bounds: tuple[float, float] | None, std: float | None) -> Offset |
     if bounds is None:
         return None if std is None else Offset(std=std)
     if std is not None:
-        raise InputError("the clock offset is either bounded or has a standard deviation: give one of the two")
+        raise InputError(
+            "the clock offset is either bounded or has a standard deviation: give one of the two"
+        )
     if not bounds[0] < bounds[1]:
-        raise InputError(f"bounds of the clock offset {bounds[0]:g} to {bounds[1]:g} s: the lower comes first")
+        raise InputError(
+            f"bounds of the clock offset {bounds[0]:g} to {bounds[1]:g} s: the lower comes first"
+        )
     return Offset(*bounds)
 
 
@@ -77,7 +81,9 @@ def undetermined(fit: Fit) -> list[Direction]:
         return []
     radian = 1.0 / (2 * np.pi * max(dominant_frequency(one) for one in fit.run.series))
     parameters = fit.model.parameters
-    size = np.array([radian if parameters[n].unit == "s" else abs(v) or 1.0 for n, v in zip(fit.names, fit.values)])
+    size = np.array(
+        [radian if parameters[n].unit == "s" else abs(v) or 1.0 for n, v in zip(fit.names, fit.values)]
+    )
     information = (fit.linearisation.jacobian * size).T @ (fit.linearisation.jacobian * size)
     for i, name in enumerate(fit.names):
         prior = parameters[name].prior
@@ -190,7 +196,9 @@ def _estimate(fit: Fit, *names: str) -> Estimate:
     places = pick > 0
     norm = np.linalg.norm(fit.linearisation.jacobian[:, places].sum(axis=1)) if places.any() else 0.0
     variance = float(pick @ fit.covariance @ pick)
-    if places.sum() > 1 and not 0.0 <= variance < 1.0:  # the sum of two undetermined ones is lost in their rounding
+    if (
+        places.sum() > 1 and not 0.0 <= variance < 1.0
+    ):  # the sum of two undetermined ones is lost in their rounding
         variance = 1.0 / max(_projected(fit, places) ** 2, 1e-300) if norm > 0.0 else math.inf
     std = math.sqrt(variance) if variance >= 0.0 else math.inf
     return Estimate(float(value), std if math.isfinite(std) and std < 1e6 else None, "s")
@@ -209,13 +217,18 @@ def _projected(fit: Fit, places: NDArray[np.bool_]) -> float:
 def stated_by(joint: JointFit) -> Forcing | None:
     """Where the forcing acts, as the recordings themselves say: a run that names its forcing made it on the robot."""
     runs_given = [record.run for record in joint.records]
-    if runs_given and all(run is not None and dict(run.get("forcing") or {}).get("amplitude") for run in runs_given):
+    if runs_given and all(
+        run is not None and dict(run.get("forcing") or {}).get("amplitude") for run in runs_given
+    ):
         return "on_robot"
     return None
 
 
 def delays_of(
-    joint: JointFit, forcing: Forcing | None = None, offset: Offset | None = None, source: str = "the recorded forcing"
+    joint: JointFit,
+    forcing: Forcing | None = None,
+    offset: Offset | None = None,
+    source: str = "the recorded forcing",
 ) -> Delays:
     """The answer about the delays, no firmer than what the records and the user's statement support.
 
@@ -258,8 +271,14 @@ def delays_of(
             shifted = _shifted(first, second, known)
             words = f"the forcing's clock is off by {known.mean:g} ± {known.std:g} s, as stated"
             return Delays(*shifted, total, True, words, closure, (), None, seen, directions)
-        limits = f"between {known.low:g} and {known.high:g} s" if math.isfinite(known.high - known.low) else "unknown"
-        words = f"the offset of the forcing's clock is {limits}: each delay is only known to lie in an interval"
+        limits = (
+            f"between {known.low:g} and {known.high:g} s"
+            if math.isfinite(known.high - known.low)
+            else "unknown"
+        )
+        words = (
+            f"the offset of the forcing's clock is {limits}: each delay is only known to lie in an interval"
+        )
         return only_sum(words, _intervals(first, second, total, known))
     step = max(record.output.period for record in joint.records)
     assert first.value is not None and second.value is not None
@@ -279,7 +298,12 @@ def delays_of(
 
 def _shifted(first: Estimate, second: Estimate, offset: Offset) -> tuple[Estimate, Estimate]:
     """Delays under a Gaussian prior of the offset δ_f: τ_u = C + δ_f, τ_y = A − δ_f."""
-    assert first.value is not None and first.std is not None and second.value is not None and second.std is not None
+    assert (
+        first.value is not None
+        and first.std is not None
+        and second.value is not None
+        and second.std is not None
+    )
     return (
         Estimate(first.value + offset.mean, math.hypot(first.std, offset.std), "s"),
         Estimate(second.value - offset.mean, math.hypot(second.std, offset.std), "s"),
@@ -302,5 +326,3 @@ def _intervals(
     )
     low, high = zip(*[(min(max(a, 0.0), longest), min(max(b, 0.0), longest)) for a, b in ranges])
     return {"input": (low[0], high[0]), "measurement": (low[1], high[1])}
-
-

@@ -77,7 +77,9 @@ class Delays:
             "assumption": self.assumption,
             "closure": {"z": self.closure},
             "aliases": [list(pair) for pair in self.aliases],
-            "intervals": None if self.intervals is None else {n: list(pair) for n, pair in self.intervals.items()},
+            "intervals": None
+            if self.intervals is None
+            else {n: list(pair) for n, pair in self.intervals.items()},
             "observables": None if self.observables is None else self.observables.to_dict(),
             "undetermined": list(self.undetermined),
         }
@@ -118,7 +120,9 @@ class Identification:
             "transfer_functions": {
                 "method": self.harmonics.method,
                 "false_alarm": self.harmonics.false_alarm,
-                "tested": [{"m": t.m, "p_value": t.p_value, "visible": t.visible} for t in self.harmonics.tested],
+                "tested": [
+                    {"m": t.m, "p_value": t.p_value, "visible": t.visible} for t in self.harmonics.tested
+                ],
             },
             "methods": {"paper": {harmonic_name(m): d.to_dict() for m, d in self.paper[0].delays.items()}},
             "quality": dict(self.quality),

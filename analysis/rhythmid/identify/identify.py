@@ -71,7 +71,11 @@ def forced_by(model: Model, record: Record) -> tuple[Model, Pumping]:
 
 def with_delays(model: Model, input_delay: float, measurement_delay: float) -> Model:
     """The model with these transport delays [s], whose elements are added where it lacks them."""
-    catalogue = load_catalogue() if not {"input_delay", "measurement_delay"} <= {t.label for t in model.terms} else None
+    catalogue = (
+        load_catalogue()
+        if not {"input_delay", "measurement_delay"} <= {t.label for t in model.terms}
+        else None
+    )
     for label, delay in (("input_delay", input_delay), ("measurement_delay", measurement_delay)):
         if model.term(label) is None:
             assert catalogue is not None
@@ -298,4 +302,3 @@ def _quality(nrmse: float, records: Sequence[Record], results: Sequence[PaperRes
         "smoothing_window": first.estimate.operator.window,
         "smoothing_loss": {f"{m:+d}": float(v) for m, v in zip(first.estimate.htf.harmonics, first.loss)},
     }
-

@@ -28,7 +28,10 @@ LONGEST = 0.5  # [s] delays that are looked for on either side, if not told othe
 STUCK = 0.5  # unexplained share (rms) of the response to the command, beyond which a fit is no answer
 POOR = 0.3  # the same of the whole motion
 CYCLE_HARMONICS = 24  # that are projected out where the limit cycle is not to be used
-STEP, FINE_STEP = 0.2, 0.05  # of a block, integrated in one step; the latter where the limit cycle is not to be used
+STEP, FINE_STEP = (
+    0.2,
+    0.05,
+)  # of a block, integrated in one step; the latter where the limit cycle is not to be used
 NO_PUMPING = Pumping(1.0, np.zeros(2, dtype=complex), 0.0, "none")
 
 
@@ -147,7 +150,9 @@ def _explained(fit: Fit, pumping: Pumping | None) -> Search:
     explained = max(response - floor, 1e-300)
     motion = fit.nrmse() if all(one.ignored is None for one in fit.run.series) else 0.0
     least = max(floor, 1e-18 * response)
-    return Search(motion, float(np.sqrt(left / max(explained, 0.01 * response))), float(np.sqrt(left / least)))
+    return Search(
+        motion, float(np.sqrt(left / max(explained, 0.01 * response))), float(np.sqrt(left / least))
+    )
 
 
 def _start(
@@ -157,7 +162,11 @@ def _start(
     found: list[tuple[float, Model]] = []
     plain = without_forcing(model)
     for record in sorted(records, key=lambda r: -r.duration)[:3]:
-        if record.input is None or np.ptp(record.input.value) == 0.0 or record.input_kind == "base_displacement":
+        if (
+            record.input is None
+            or np.ptp(record.input.value) == 0.0
+            or record.input_kind == "base_displacement"
+        ):
             continue
         try:
             own = (pumping_of(record) or pumping) if pumping is not None else NO_PUMPING
@@ -181,7 +190,10 @@ def _search_in_time(
     windows = [part for one in series for part in split(one, length)]
     best: Fit | None = None
     failure: InputError | None = None
-    for attempt in (lambda: model, lambda: estimate(model, windows[:: max(1, len(windows) // 60)], iterations=12).model):
+    for attempt in (
+        lambda: model,
+        lambda: estimate(model, windows[:: max(1, len(windows) // 60)], iterations=12).model,
+    ):
         try:
             trial = estimate(attempt(), series, pool=pool)
         except InputError as error:
@@ -247,7 +259,10 @@ def joint_likelihood(
             trial = _judged(estimate(start, series, pool=pool, max_step=step_of(series)), pumping, given)
         except InputError:
             continue
-        if best is None or trial.search.motion + trial.search.response < best.search.motion + best.search.response:
+        if (
+            best is None
+            or trial.search.motion + trial.search.response < best.search.motion + best.search.response
+        ):
             best = trial
         if trial.search.arrived:
             return trial

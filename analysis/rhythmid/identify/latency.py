@@ -50,7 +50,9 @@ class Latency:
 def save_latency(found: Identification, path: Path) -> None:
     """Write the delays and the model of an identification. Raises InputError when not even the sum is known."""
     if found.delays.sum.value is None:
-        raise InputError("no latency to save: the records show no command, so the sum of the delays is unknown")
+        raise InputError(
+            "no latency to save: the records show no command, so the sum of the delays is unknown"
+        )
 
     def entry(estimate: Estimate) -> dict[str, float | None]:
         return {

@@ -180,7 +180,13 @@ def fit_magnitude(estimate: HtfEstimate, model: Model) -> MagnitudeFit:
     final = comparison.linearised(values)
     covariance = _covariance(comparison, values, residual) if names else np.empty((0, 0))
     return MagnitudeFit(
-        fitted, tuple(names), values, covariance, final, comparison.expected(final), comparison.misfit(residual)
+        fitted,
+        tuple(names),
+        values,
+        covariance,
+        final,
+        comparison.expected(final),
+        comparison.misfit(residual),
     )
 
 
@@ -196,7 +202,9 @@ def _covariance(comparison: _Comparison, values: Array, residual: Array) -> Arra
     scatter = float(np.sum(residual[:-1] ** 2)) / independent
     _, singular, right = np.linalg.svd(jacobian / norms, full_matrices=False)
     determined = singular > 1e-5 * singular[0]
-    inverse = (right.T[:, determined] / singular[determined]) @ (right.T[:, determined] / singular[determined]).T
+    inverse = (right.T[:, determined] / singular[determined]) @ (
+        right.T[:, determined] / singular[determined]
+    ).T
     covariance = scatter * inverse / np.outer(norms, norms)
     unknown = dead | (np.abs(right[~determined]).max(axis=0, initial=0.0) > 1e-3)
     covariance[unknown, unknown] = np.inf

@@ -18,7 +18,9 @@ from rhythmid.model import Model
 from rhythmid.signal import first_order_hold
 
 MARGIN = 1.0  # [s] of a command kept before a window, for delays
-GROWTH = 1.5  # of the response to a constant force, from the middle to the end of a record, that calls for windows
+GROWTH = (
+    1.5  # of the response to a constant force, from the middle to the end of a record, that calls for windows
+)
 PERIODS = 2.0  # of the dominant motion in a window
 FEWEST = 4  # windows a record
 LEAST = 24  # blocks in a window
@@ -80,8 +82,12 @@ def forgets(model: Model, series: Sequence[Series]) -> bool:
     run = prepare_run(model, series, disturbed=True)
     for index, (one, start) in enumerate(zip(series, first_guess(model, run))):
         span = one.centres[-1] - one.centres[0]
-        scale = float(np.std(one.averaged)) * model.mass.value * (2.0 * math.pi * dominant_frequency(one)) ** 2
-        push = first_order_hold(np.array([one.centres[0] - span, one.centres[-1] + span]), np.full(2, 1e-3 * scale))
+        scale = (
+            float(np.std(one.averaged)) * model.mass.value * (2.0 * math.pi * dominant_frequency(one)) ** 2
+        )
+        push = first_order_hold(
+            np.array([one.centres[0] - span, one.centres[-1] + span]), np.full(2, 1e-3 * scale)
+        )
         free, pushed = run.rows(model, index, start), run.rows(model, index, start, push)
         if free is None or pushed is None:
             return False

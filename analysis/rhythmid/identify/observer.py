@@ -70,7 +70,10 @@ def observed(series: "Sequence[Series]", model: Model, frequency: float) -> "lis
         rate = motion.derivative()
         cubic = np.vstack([np.zeros((1, rate.c.shape[1])), rate.c])
         pull = PPoly(stiffness * motion.c + damping * cubic, motion.x, extrapolate=True)
-        effort = sum((part(one.centres) for part in (one.command, one.forcing) if part is not None), np.zeros(one.blocks))
+        effort = sum(
+            (part(one.centres) for part in (one.command, one.forcing) if part is not None),
+            np.zeros(one.blocks),
+        )
         size = float(np.std(effort)) / stiffness
         found.append(replace(one, observer=Observer(stiffness, damping, pull, size)))
     return found
@@ -89,7 +92,9 @@ def with_observer(model: Model, observer: Observer | None) -> Model:
     """The model as it is simulated over a series with this observer."""
     if observer is None:
         return model
-    return model.with_element(OBSERVER, {"stiffness": observer.stiffness, "damping": observer.damping}, fixed=True)
+    return model.with_element(
+        OBSERVER, {"stiffness": observer.stiffness, "damping": observer.damping}, fixed=True
+    )
 
 
 def tied(compiled: Compiled, observer: Observer | None) -> Compiled:

@@ -28,9 +28,13 @@ WHITE = NoiseModel(np.empty(0), 1.0)
 STAY = 0.1  # share of its distance from a lower bound that one step leaves a parameter: a width of zero is hard to leave
 BRINK = 1e-3  # share of its first distance within which it may reach the bound
 LOST = 0.3  # error, as a share of the motion, above which a model has lost the machine
-FALSE_EDGE = 25.0  # chi2 that it may cost to put a parameter on its bound where the fit says that it cannot tell
+FALSE_EDGE = (
+    25.0  # chi2 that it may cost to put a parameter on its bound where the fit says that it cannot tell
+)
 Progress = Callable[[str], None]
-INTEGRATION = 0.02  # of the residual, below which an error of integration has to stay: it must not count among models
+INTEGRATION = (
+    0.02  # of the residual, below which an error of integration has to stay: it must not count among models
+)
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,9 @@ def first_guess(model: Model, run: FreeRun) -> list[Array]:
         span = 0.05 / max(dominant_frequency(one), 1e-9)
         n = int(np.clip(round(span / one.period), 3, max(len(one.time) // 4, 3)))
         slope, level = np.polyfit(one.time[:n] - one.time[0], one.value[:n], 1)
-        begin = {"position": (level, slope), "velocity": (0.0, level), "acceleration": (0.0, 0.0)}[one.measured]
+        begin = {"position": (level, slope), "velocity": (0.0, level), "acceleration": (0.0, 0.0)}[
+            one.measured
+        ]
         if one.kind == "base_displacement" and one.command is not None and one.measured != "position":
             begin = float(one.command(one.centres[0])) + begin[0], begin[1]
         found.append(start_of(model, run, index, float(begin[0]), float(begin[1])))
@@ -167,16 +173,26 @@ def minimise(
 
     A parameter that the records cannot tell from its bound is put there: what else it would be drags others along.
     """
-    fit = _fit(descend(model, run, names, noise, starts, iterations, pool, tolerance, differences), run, names, noise, pool)
+    fit = _fit(
+        descend(model, run, names, noise, starts, iterations, pool, tolerance, differences),
+        run,
+        names,
+        noise,
+        pool,
+    )
     edge = on_the_edge(fit.model, names, fit.covariance)
     if edge:
-        end = descend(fit.model.with_values(edge), run, names, noise, fit.starts, max(iterations, 3), pool, tolerance)
+        end = descend(
+            fit.model.with_values(edge), run, names, noise, fit.starts, max(iterations, 3), pool, tolerance
+        )
         if end.chi2 < fit.chi2 + FALSE_EDGE:
             return _fit(end, run, names, noise, pool)
     return fit
 
 
-def _fit(end: Descent, run: FreeRun, names: Sequence[str], noise: NoiseModel, pool: ThreadPoolExecutor | None) -> Fit:
+def _fit(
+    end: Descent, run: FreeRun, names: Sequence[str], noise: NoiseModel, pool: ThreadPoolExecutor | None
+) -> Fit:
     linearisation = end.linearisation
     if linearisation is None or faint(linearisation.jacobian):
         problem = Problem(run, names, noise, pool)
@@ -188,7 +204,9 @@ def _fit(end: Descent, run: FreeRun, names: Sequence[str], noise: NoiseModel, po
         model=end.model,
         names=tuple(names),
         values=np.array([end.model.value(name) for name in names]),
-        covariance=covariance_of(linearisation.jacobian, [end.model.parameters[name].prior for name in names]),
+        covariance=covariance_of(
+            linearisation.jacobian, [end.model.parameters[name].prior for name in names]
+        ),
         starts=end.starts,
         run=run,
         residuals=end.residuals,
@@ -246,7 +264,9 @@ def descend(
     here: Linearisation | None = None
     samples = sum(len(problem.whitened(i, r)) for i, r in enumerate(residuals))
     for _ in range(iterations):
-        here, states, steps, state_steps_next = problem.linearise(model, current, residuals, steps, state_steps)
+        here, states, steps, state_steps_next = problem.linearise(
+            model, current, residuals, steps, state_steps
+        )
         jacobian, residual = here.jacobian, here.residual
         values = np.array([model.value(name) for name in names])
         weight = [(i, prior) for i, prior in enumerate(priors) if prior is not None]
@@ -297,7 +317,14 @@ def descend(
             trial_residuals = problem.residuals(model, moved)
             trial_cost = problem.cost(model, trial_residuals, moved)
             if trial_cost < cost - enough:
-                current, cost, residuals, here, damping, converged = moved, trial_cost, trial_residuals, None, 1e-6, False
+                current, cost, residuals, here, damping, converged = (
+                    moved,
+                    trial_cost,
+                    trial_residuals,
+                    None,
+                    1e-6,
+                    False,
+                )
         state_steps = state_steps_next
         assert residuals is not None
         if converged:
@@ -319,7 +346,9 @@ def descend(
 
 
 def _prior_cost(priors: Sequence, values: Array) -> float:
-    return sum(((value - prior.mean) / prior.std) ** 2 for prior, value in zip(priors, values) if prior is not None)
+    return sum(
+        ((value - prior.mean) / prior.std) ** 2 for prior, value in zip(priors, values) if prior is not None
+    )
 
 
 def noise_of(residuals: Sequence[Array], series: Sequence[Series], floor: float = 0.0) -> NoiseModel:
@@ -367,7 +396,9 @@ def estimate(
         if finer.max_step > 0.4 * run.max_step:
             break  # fine enough before any halving
         run = finer  # whose smaller residual may ask for finer steps still
-        end = descend(end.model, run, chosen, scaled, end.starts, iterations, pool, differences=end.differences)
+        end = descend(
+            end.model, run, chosen, scaled, end.starts, iterations, pool, differences=end.differences
+        )
     noise = noise_of(end.residuals, series, floor=1e-9 * spread)
     if progress is not None:
         progress(f"residual {noise.variance**0.5:.3g}, colour of order {noise.order}")

@@ -35,7 +35,9 @@ def _transfer(found: Identification) -> list[TransferFunction]:
     pumping, delays = found.paper[0].pumping, found.delays
     both = delays.separable and delays.input.value is not None and delays.measurement.value is not None
     input_delay, measurement_delay = (
-        (delays.input.value or 0.0, delays.measurement.value or 0.0) if both else (delays.sum.value or 0.0, 0.0)
+        (delays.input.value or 0.0, delays.measurement.value or 0.0)
+        if both
+        else (delays.sum.value or 0.0, 0.0)
     )
     try:
         machine = linearised(without_forcing(found.model), pumping)

@@ -43,7 +43,8 @@ class Problem:
             [s for s in runs(one.used) if s.stop - s.start > noise.order + 1] for one in run.series
         ]
         self.ignored = [
-            None if one.ignored is None else _basis(self._white(i, one.ignored)) for i, one in enumerate(run.series)
+            None if one.ignored is None else _basis(self._white(i, one.ignored))
+            for i, one in enumerate(run.series)
         ]
 
     def _white(self, index: int, samples: Array) -> Array:
@@ -191,7 +192,9 @@ class Problem:
             joined = np.vstack([white, known])
             basis = _basis(joined[:, 1 + p :])
             projected = joined[:, : 1 + p] - basis @ (basis.T @ joined[:, : 1 + p])
-            if self.ignored[index] is not None:  # what is left of a parameter that acts as the ignored is rounding
+            if (
+                self.ignored[index] is not None
+            ):  # what is left of a parameter that acts as the ignored is rounding
                 whole = np.linalg.norm(self._white(index, change[:, :p]), axis=0)
                 projected[:, 1:][:, np.linalg.norm(projected[:, 1:], axis=0) < DEAD * whole] = 0.0
             rows.append(projected[: len(white), 0])

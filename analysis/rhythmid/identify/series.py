@@ -100,8 +100,16 @@ class Series:
 def _extended(samples: Array, count: int) -> Array:
     """Samples with `count` more at either end, on the cubic through the last four there."""
     for _ in range(count):
-        first = 4.0 * samples[0] - 6.0 * samples[1] + 4.0 * samples[2] - samples[3] if len(samples) > 3 else samples[0]
-        last = 4.0 * samples[-1] - 6.0 * samples[-2] + 4.0 * samples[-3] - samples[-4] if len(samples) > 3 else samples[-1]
+        first = (
+            4.0 * samples[0] - 6.0 * samples[1] + 4.0 * samples[2] - samples[3]
+            if len(samples) > 3
+            else samples[0]
+        )
+        last = (
+            4.0 * samples[-1] - 6.0 * samples[-2] + 4.0 * samples[-3] - samples[-4]
+            if len(samples) > 3
+            else samples[-1]
+        )
         samples = np.concatenate([[first], samples, [last]])
     return samples
 

@@ -103,7 +103,11 @@ def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tupl
             "record's zero"
         )
     found = replace(joint, fit=fit)
-    if joint.search.over_noise > UNEXPLAINED and fit is joint.fit and fit.model.term("input_delay") is not None:
+    if (
+        joint.search.over_noise > UNEXPLAINED
+        and fit is joint.fit
+        and fit.model.term("input_delay") is not None
+    ):
         found, period = command_hold(found, pool)
         if period.value is not None and period.std is not None:
             notes.append(

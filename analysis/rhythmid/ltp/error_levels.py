@@ -61,7 +61,8 @@ def error_levels(lines: ExcitedLines, harmonics: int) -> ErrorLevels:
         noise = _least(levels or [local_level(power, empty, MANY)])
     unknown = np.full(len(power), np.nan)
     even, odd = (
-        _excess(local_level(power, kind, MANY), noise) if kind.sum() >= FEW else unknown for kind in kinds or (empty & False,) * 2
+        _excess(local_level(power, kind, MANY), noise) if kind.sum() >= FEW else unknown
+        for kind in kinds or (empty & False,) * 2
     )
     return ErrorLevels(noise, even, odd, _higher(lines, harmonics, power, empty, noise))
 

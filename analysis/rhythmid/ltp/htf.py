@@ -19,7 +19,9 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-ORDER = 12  # harmonics of the state kept on either side; more changes the paper's G_0 and G_±1 by less than 5e-5
+ORDER = (
+    12  # harmonics of the state kept on either side; more changes the paper's G_0 and G_±1 by less than 5e-5
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +52,20 @@ class HarmonicTransferFunctions:
         """G_m(jω), complex128[n]."""
         return self.value[self.row(m)]
 
-    def delayed(self, input_delay: float, measurement_delay: float, frequency: float) -> "HarmonicTransferFunctions":
+    def delayed(
+        self, input_delay: float, measurement_delay: float, frequency: float
+    ) -> "HarmonicTransferFunctions":
         """H_m = G_m exp(−j[(ω − mω_p) τ_u + ω τ_y]): paper, equation (7); delays [s], pumping frequency [Hz]."""
         turn = delay_phase(self.harmonics, self.frequency, input_delay, measurement_delay, frequency)
         return replace(self, value=self.value * np.exp(-1j * turn))
 
 
 def delay_phase(
-    harmonics: NDArray[np.int64], frequency: Array, input_delay: float, measurement_delay: float, pumping: float
+    harmonics: NDArray[np.int64],
+    frequency: Array,
+    input_delay: float,
+    measurement_delay: float,
+    pumping: float,
 ) -> Array:
     """(ω − mω_p) τ_u + ω τ_y [rad] of equation (9); harmonics (h,), frequency [Hz] (n,) -> (h, n)."""
     shifted = frequency[None, :] - np.asarray(harmonics)[:, None] * pumping
@@ -89,7 +97,9 @@ def linearised(
     Raises InputError when there is no limit cycle, and for an input whose rate acts too (a moving base).
     """
     if excited == "base_displacement":
-        raise InputError("harmonic transfer functions need a force or a base acceleration as input, not a displacement")
+        raise InputError(
+            "harmonic transfer functions need a force or a base acceleration as input, not a displacement"
+        )
     cycle = limit_cycle(model, pumping, guess, excited)
     return LinearisedModel(cycle, harmonic_state_space(linearise(cycle, effort), order))
 
@@ -100,7 +110,9 @@ def transport_delays(model: Model, at: float = 0.0) -> tuple[float, float]:
     command = measurement = 0.0
     for term in model.terms:
         if term.element.delay is not None:
-            late = float(term.element.delay(stamps, **{name: value.value for name, value in term.values.items()})[0])
+            late = float(
+                term.element.delay(stamps, **{name: value.value for name, value in term.values.items()})[0]
+            )
             if term.element.slot == "command":
                 command += late
             else:

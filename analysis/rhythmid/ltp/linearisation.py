@@ -57,7 +57,9 @@ class Linearisation:
         """Fourier coefficients −order … order of A | B over C | D, impulses included; (2 order + 1, q + 1, q + 1)."""
         pumping = self.cycle.pumping
         n = np.arange(order + 1)
-        kernel = np.exp(-1j * pumping.omega * np.multiply.outer(n, self.time)) * (self.weight / pumping.period)
+        kernel = np.exp(-1j * pumping.omega * np.multiply.outer(n, self.time)) * (
+            self.weight / pumping.period
+        )
         flat = self.jacobian.reshape(len(self.time), -1).astype(complex)
         half = (kernel @ flat).reshape(order + 1, *self.jacobian.shape[1:]).astype(complex)
         for impulse in self.impulses:
@@ -200,7 +202,11 @@ def linearise(cycle: LimitCycle, effort: float | None = None) -> Linearisation:
     jacobian = _Jacobian(cycle, effort)
     switches, steep = _jumps(jacobian)
     period = cycle.pumping.period
-    edges = np.unique(np.concatenate([np.linspace(0.0, period, PANELS + 1), switches, steep[(steep > 0) & (steep < period)]]))
+    edges = np.unique(
+        np.concatenate(
+            [np.linspace(0.0, period, PANELS + 1), switches, steep[(steep > 0) & (steep < period)]]
+        )
+    )
     edges = edges[np.concatenate([[True], np.diff(edges) > 1e-12 * period])]
     edges[-1] = period
     half = 0.5 * np.diff(edges)

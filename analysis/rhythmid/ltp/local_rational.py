@@ -27,7 +27,9 @@ ORDER = 2  # of the polynomials
 FREEDOM = 20  # degrees of freedom that are left for the error
 ROUNDS = 3  # of solving with instruments
 HIGHEST = 3  # M that is considered
-WIDEST = 2.5  # half-width of a window, as a multiple of the resonance's own half-width, that a local model bears
+WIDEST = (
+    2.5  # half-width of a window, as a multiple of the resonance's own half-width, that a local model bears
+)
 RANK = 1e-6  # singular value, relative to the largest, below which a combination is not determined
 POOR = 100.0  # times the usual variance, beyond which a value is not worth stating
 NEEDED = 1e-3  # probability of noise alone asking for a denominator
@@ -133,7 +135,9 @@ class _Windows:
     left: Array
 
 
-def _solve(regressors: Complex, output: Complex, r: Array, rows: NDArray[np.int64]) -> tuple[Complex, Array, Array, Array]:
+def _solve(
+    regressors: Complex, output: Complex, r: Array, rows: NDArray[np.int64]
+) -> tuple[Complex, Array, Array, Array]:
     """Solve each window; regressors (w, rows, q), output (w, rows).
 
     Returns values (w, q) at r = 0, their variance for an error of unit variance (inf where not determined), the error's
@@ -152,7 +156,11 @@ def _solve(regressors: Complex, output: Complex, r: Array, rows: NDArray[np.int6
     gain = (left - poled.left) / np.maximum(poled.left / np.maximum(other_freedom, 1), 1e-300)
     needed = (gain > f_distribution.isf(NEEDED, 2, 2 * np.maximum(other_freedom, 1))) & (other_freedom > 1)
     value[needed] = (poled.value / size)[needed]
-    variance[needed], left[needed], freedom[needed] = other_variance[needed], poled.left[needed], other_freedom[needed]
+    variance[needed], left[needed], freedom[needed] = (
+        other_variance[needed],
+        poled.left[needed],
+        other_freedom[needed],
+    )
     return value, variance / size**2, left / np.maximum(freedom, 1), freedom.astype(float)
 
 

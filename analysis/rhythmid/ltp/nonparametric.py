@@ -50,13 +50,17 @@ def harmonic_transfer_functions(
         if method != "auto":
             raise InputError(f"the excitation does not allow {method.replace('_', ' ')}: {_needed(method)}")
     highest = SMOOTHED if harmonics is None else harmonics
-    operator = regularised_least_squares(spectra, highest if spectra.pumping.active else 0, ring_down=ring_down)
+    operator = regularised_least_squares(
+        spectra, highest if spectra.pumping.active else 0, ring_down=ring_down
+    )
     return smoothed(estimate_htf(operator))
 
 
 def _needed(method: HtfMethod) -> str:
     if method == "separated_lines":
-        return "it needs shifted chirps or interleaved lines that repeat over whole periods, and bins left empty"
+        return (
+            "it needs shifted chirps or interleaved lines that repeat over whole periods, and bins left empty"
+        )
     return "it needs lines closer together than the machine's resonance is wide"
 
 

@@ -34,7 +34,9 @@ class Pumping:
     source: str = "given"
 
     @classmethod
-    def cosine(cls, amplitude: float, frequency: float, phase: float = 0.0, source: str = "given") -> "Pumping":
+    def cosine(
+        cls, amplitude: float, frequency: float, phase: float = 0.0, source: str = "given"
+    ) -> "Pumping":
         """f0(t) = amplitude [N] cos(2π frequency [Hz] t + phase [rad])."""
         turned = phase if amplitude >= 0 else phase + np.pi
         origin = -((turned + np.pi) % (2 * np.pi) - np.pi) / (2 * np.pi * frequency)
@@ -72,12 +74,16 @@ class Pumping:
         return spline(t, self(t))
 
 
-def _projection(time: Array, value: Array, frequency: float, harmonics: int) -> tuple[NDArray[np.complex128], Array]:
+def _projection(
+    time: Array, value: Array, frequency: float, harmonics: int
+) -> tuple[NDArray[np.complex128], Array]:
     """Least-squares Fourier coefficients F_0 … F_H of `value` in time, and what they leave (n,)."""
     angle = np.multiply.outer(2 * np.pi * frequency * time, np.arange(1, harmonics + 1))
     columns = np.hstack([np.ones((len(time), 1)), np.cos(angle), np.sin(angle)])
     solution = np.linalg.lstsq(columns, value, rcond=1e-10)[0]
-    coefficients = np.concatenate([[solution[0] + 0j], solution[1 : harmonics + 1] - 1j * solution[harmonics + 1 :]])
+    coefficients = np.concatenate(
+        [[solution[0] + 0j], solution[1 : harmonics + 1] - 1j * solution[harmonics + 1 :]]
+    )
     return coefficients, value - columns @ solution
 
 
@@ -124,7 +130,9 @@ def _fourier_fit(time: Array, value: Array, frequency: float, harmonics: int) ->
         solution = np.linalg.solve(fourier @ fourier.T, fourier @ value)
         left = float(np.sqrt(np.mean((value - solution @ fourier) ** 2)))
         a, b = solution[1 : harmonics + 1], solution[harmonics + 1 :]
-        columns[-1] = 2 * np.pi * time * ((h * b) @ fourier[1 : harmonics + 1] - (h * a) @ fourier[harmonics + 1 :])
+        columns[-1] = (
+            2 * np.pi * time * ((h * b) @ fourier[1 : harmonics + 1] - (h * a) @ fourier[harmonics + 1 :])
+        )
         size = np.sqrt(np.sum(columns**2, axis=1))
         scaled = columns / size[:, None]
         step = float(np.linalg.solve(scaled @ scaled.T, scaled @ value)[-1] / size[-1])

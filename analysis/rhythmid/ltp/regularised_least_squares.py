@@ -117,7 +117,11 @@ class RegularisedLeastSquares:
 
 
 def regularised_least_squares(
-    spectra: Spectra, harmonics: int = 3, window: float | None = None, ring_down: float = 1.0, alpha: float | None = None
+    spectra: Spectra,
+    harmonics: int = 3,
+    window: float | None = None,
+    ring_down: float = 1.0,
+    alpha: float | None = None,
 ) -> RegularisedLeastSquares:
     """Set up and factorise equation (5) for `harmonics` M, that is m = −M … M.
 
@@ -126,11 +130,15 @@ def regularised_least_squares(
     """
     low, high = spectra.band
     m = np.arange(-harmonics, harmonics + 1)
-    last = min(round((high + harmonics * spectra.pumping.frequency) / spectra.resolution), len(spectra.input) - 1)
+    last = min(
+        round((high + harmonics * spectra.pumping.frequency) / spectra.resolution), len(spectra.input) - 1
+    )
     bins = np.arange(-last, last + 1)
     shifted = spectra.shifted_input(m, bins)
     shifted[:, bins % spectra.window.periods == 0] = 0.0  # the limit cycle's own bins
-    mean = float(np.mean(np.abs(spectra.input[(spectra.frequency >= low) & (spectra.frequency <= high)]) ** 2))
+    mean = float(
+        np.mean(np.abs(spectra.input[(spectra.frequency >= low) & (spectra.frequency <= high)]) ** 2)
+    )
     if alpha is None:
         t_c = window or RING_DOWNS * ring_down
         alpha = mean / (2.0 * np.pi * spectra.resolution * t_c) ** 4
@@ -152,7 +160,9 @@ def regularised_least_squares(
     try:
         factor = cholesky_banded(band, lower=True)
     except np.linalg.LinAlgError:
-        raise InputError("the excitation does not determine the transfer functions; excite more frequencies") from None
+        raise InputError(
+            "the excitation does not determine the transfer functions; excite more frequencies"
+        ) from None
     return RegularisedLeastSquares(spectra, m, bins, shifted, factor, float(t_c), float(alpha))
 
 
@@ -183,5 +193,7 @@ def estimate_htf(operator: RegularisedLeastSquares) -> HtfEstimate:
     gain, taken = operator.noise_gain
     noise = float(np.sqrt(np.sum(np.abs(residual) ** 2) / (used.sum() - taken)))
     keep = operator.positive
-    htf = HarmonicTransferFunctions(operator.harmonics, operator.frequency[keep], found[:, keep], noise * gain[:, keep])
+    htf = HarmonicTransferFunctions(
+        operator.harmonics, operator.frequency[keep], found[:, keep], noise * gain[:, keep]
+    )
     return HtfEstimate(htf, operator.reached[:, keep], operator, noise)

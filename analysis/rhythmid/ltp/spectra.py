@@ -19,7 +19,9 @@ from rhythmid.signal import continuous, fast_length
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 RING_DOWNS = 12.0  # of warm-up: e^-12 = 6e-6 of any transient is left
-FINE = 0.03  # [rad] a cell of the integrated input covers at the highest frequency; relative error FINE^2 / 12
+FINE = (
+    0.03  # [rad] a cell of the integrated input covers at the highest frequency; relative error FINE^2 / 12
+)
 
 
 @dataclass(frozen=True)
@@ -163,7 +165,12 @@ def highest_input(record: Record) -> float:
 
 
 def spectra(
-    record: Record, pumping: Pumping, ring_down: float, sidebands: int = 4, window: Window | None = None, cycle: int = 8
+    record: Record,
+    pumping: Pumping,
+    ring_down: float,
+    sidebands: int = 4,
+    window: Window | None = None,
+    cycle: int = 8,
 ) -> Spectra:
     """Spectra of a record up to `sidebands` pumping frequencies above its input's band.
 
@@ -181,7 +188,9 @@ def spectra(
     grid = chosen.start + np.arange(total) * (period / samples)
     near = (output.time > grid[0] - 20 * output.period) & (output.time < grid[-1] + 20 * output.period)
     apart = np.concatenate([[True], np.diff(output.time[near]) > 0.1 * output.period])
-    value = CubicSpline(output.time[near][apart], output.value[near][apart])(np.minimum(grid, output.time[-1]))
+    value = CubicSpline(output.time[near][apart], output.value[near][apart])(
+        np.minimum(grid, output.time[-1])
+    )
     step = period / samples
     omega = 2.0 * np.pi * np.arange(bins + 1) / (chosen.periods * period)
     turn = np.exp(-1j * omega * (chosen.start - pumping.origin))
@@ -189,5 +198,9 @@ def spectra(
     lines = whole[:: chosen.periods][: min(cycle + 1, samples // 2)] / total
     lines = lines * np.exp(-1j * pumping.omega * np.arange(len(lines)) * (chosen.start - pumping.origin))
     return Spectra(
-        pumping, chosen, _input_integral(record, chosen, period, bins) * turn, whole[: bins + 1] * step * turn, lines
+        pumping,
+        chosen,
+        _input_integral(record, chosen, period, bins) * turn,
+        whole[: bins + 1] * step * turn,
+        lines,
     )

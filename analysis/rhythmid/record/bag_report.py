@@ -141,7 +141,9 @@ def quality_report(source: str | Path, signals: Signals | str | Path | None = No
     notes += [note for note in bag.notes if note not in notes]
     times = [log_ns for log_ns in received.values() if len(log_ns)]
     if times:
-        duration = (max(int(log_ns.max()) for log_ns in times) - min(int(log_ns.min()) for log_ns in times)) * 1e-9
+        duration = (
+            max(int(log_ns.max()) for log_ns in times) - min(int(log_ns.min()) for log_ns in times)
+        ) * 1e-9
     topics = tuple(
         _topic_report(name, topic.type, received.get(name, np.empty(0, dtype=np.int64)), stamped.get(name))
         for name, topic in sorted(bag.topics.items())
@@ -178,5 +180,10 @@ def _topic_report(name: str, msgtype: str, log_ns: NDArray[np.int64], columns: C
         return TopicReport(name, msgtype, received)
     lateness = (columns.log_ns - columns.stamp_ns) * 1e-9
     return TopicReport(
-        name, msgtype, received, Timing.of(seconds(columns.stamp_ns)), float(lateness.mean()), float(lateness.max())
+        name,
+        msgtype,
+        received,
+        Timing.of(seconds(columns.stamp_ns)),
+        float(lateness.mean()),
+        float(lateness.max()),
     )

@@ -147,7 +147,9 @@ class Layout:
         constant = [(0, "<u2", LITTLE_ENDIAN)] + [(at, "<u4", value) for at, value in self.words if at < end]
         for name in dict.fromkeys(names):
             constant += [(name.at + i, "u1", self._message[name.at + i]) for i in range(name.size)]
-        return all((gather(block.buffer, block.start + at, kind) == value).all() for at, kind, value in constant)
+        return all(
+            (gather(block.buffer, block.start + at, kind) == value).all() for at, kind, value in constant
+        )
 
     @staticmethod
     def read(block: Block, number: Number) -> NDArray[np.float64]:

@@ -21,7 +21,9 @@ from rhythmid.record.timing import Timing, put_in_order
 from rhythmid.signal import Hold
 
 AMBIGUOUS = 0.01  # share of samples that may have the time of another one with another value
-CLOCKS_APART = 1.0  # seconds between the ages at receipt of two channels, from which their stamps hardly share a clock
+CLOCKS_APART = (
+    1.0  # seconds between the ages at receipt of two channels, from which their stamps hardly share a clock
+)
 RUN_CLOCK = 10.0  # seconds; a clock that reads less at the first sample started with the run
 SAMPLES_PER_CYCLE = 100  # of a forcing that is given by formula
 
@@ -130,7 +132,9 @@ def read_tables(signals: Signals) -> Record:
             )
         made[role] = Samples(source, time, value * source.scale + source.offset)
     assert signals.path is not None
-    name = signals.path.stem if signals.path.stem != "signals" else signals.path.resolve().parent.name  # tells more
+    name = (
+        signals.path.stem if signals.path.stem != "signals" else signals.path.resolve().parent.name
+    )  # tells more
     record = _record(name, made, signals, "sort or split the table", Quality({}))
     return _finish(replace(record, hold=signals.hold or _measured_hold(record)), signals)
 
@@ -173,7 +177,9 @@ def _from_columns(
     if source.topic not in bag.topics:
         listed = ", ".join(sorted(bag.topics)) or "none"
         mend = "" if signals.path else "; say with --signals which of them is what"
-        raise InputError(f"{source.place}topic {source.topic} is not in {bag.path}; its topics: {listed}{mend}")
+        raise InputError(
+            f"{source.place}topic {source.topic} is not in {bag.path}; its topics: {listed}{mend}"
+        )
     if source.topic not in columns:
         raise InputError(
             f"{source.place}topic {source.topic} in {bag.path} is empty: no message was recorded"
@@ -290,7 +296,9 @@ def _require_overlap(record: Record) -> None:
 
 def _clock_notes(channels: Mapping[str, ChannelQuality]) -> tuple[str, ...]:
     """A note if channels are stamped by clocks that cannot be the same."""
-    age = {role: channel.lateness_mean for role, channel in channels.items() if channel.lateness_mean is not None}
+    age = {
+        role: channel.lateness_mean for role, channel in channels.items() if channel.lateness_mean is not None
+    }
     if not age or max(age.values()) - min(age.values()) < CLOCKS_APART:
         return ()
     told = ", ".join(f"{role} {seconds:.6g} s" for role, seconds in age.items())

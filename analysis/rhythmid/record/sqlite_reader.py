@@ -56,7 +56,9 @@ class SqliteReader:
                 for file in (self.path, *self._journals):
                     shutil.copyfile(file, Path(folder) / file.name)
                 copy = Path(folder) / self.path.name
-                if cut_off:  # zeros for the pages that are lost, or sqlite would not even read those that are there
+                if (
+                    cut_off
+                ):  # zeros for the pages that are lost, or sqlite would not even read those that are there
                     os.truncate(copy, size - size % page)
                     os.truncate(copy, whole)
                 yield from self._read(copy, "mode=rw", wanted)

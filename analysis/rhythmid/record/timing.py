@@ -79,7 +79,9 @@ def nominal_period(step: Times) -> float:
     have a median that is off by up to half of one), and rounded to whole nanoseconds, the resolution of stamps;
     not rounded where the steps are even and the rounding would lead away from them.
     """
-    median = float(np.percentile(step, 50.0, method="lower"))  # a step that occurs, where steps are of two kinds
+    median = float(
+        np.percentile(step, 50.0, method="lower")
+    )  # a step that occurs, where steps are of two kinds
     near = step[np.abs(step - median) < 0.5 * median]
     mean = float(np.mean(near))
     whole = round(mean * 1e9) * 1e-9

@@ -50,8 +50,16 @@ def _tiles(result: Mapping[str, Any]) -> Tiles:
     alignment = result["alignment"]
     return Tiles(
         (
-            Tile("difference, of the motion", percent(result["nrmse"]), f"noise: {percent(result['noise_nrmse'])}"),
-            Tile("the recording begins later by", _seconds(alignment["offset"]["value"]), f"by {CLOCKS[alignment['by']]}"),
+            Tile(
+                "difference, of the motion",
+                percent(result["nrmse"]),
+                f"noise: {percent(result['noise_nrmse'])}",
+            ),
+            Tile(
+                "the recording begins later by",
+                _seconds(alignment["offset"]["value"]),
+                f"by {CLOCKS[alignment['by']]}",
+            ),
         )
     )
 
@@ -121,22 +129,31 @@ def _alignment(result: Mapping[str, Any]) -> Table:
     alignment, rates = result["alignment"], result["rates"]
     offset = alignment["offset"]
     rows = [
-        ("offset of the recording", f"{_seconds(offset['value'])} ± {_seconds(2.0 * (offset['std'] or 0.0))}"),
+        (
+            "offset of the recording",
+            f"{_seconds(offset['value'])} ± {_seconds(2.0 * (offset['std'] or 0.0))}",
+        ),
         ("found by", CLOCKS[alignment["by"]]),
         ("in common", with_unit(number(result["overlap"]["value"], 4), "s")),
-        ("rates", f"{with_unit(number(rates['simulation'], 6), 'Hz')} and {with_unit(number(rates['recording'], 6), 'Hz')}"),
+        (
+            "rates",
+            f"{with_unit(number(rates['simulation'], 6), 'Hz')} and {with_unit(number(rates['recording'], 6), 'Hz')}",
+        ),
         ("commands differ by", percent(alignment["command_difference"])),
     ]
     if alignment["mismatch"]:
         rows.append(("different excitation", alignment["mismatch"]))
     if result["through_model"]:
-        rows.append(("compared with", "the model, fitted to the simulation and run with the recording's inputs"))
+        rows.append(
+            ("compared with", "the model, fitted to the simulation and run with the recording's inputs")
+        )
     return Table("How the two were brought together.", ("what", "value"), tuple(rows))
 
 
 def _harmonics(result: Mapping[str, Any]) -> Table:
     rows = tuple(
-        (f"harmonic {one['number']}", number(one["gain"], 4), _seconds(one["late"])) for one in result["harmonics"]
+        (f"harmonic {one['number']}", number(one["gain"], 4), _seconds(one["late"]))
+        for one in result["harmonics"]
     )
     return Table(
         "Harmonics of the forcing, recording over simulation. A delay makes all of them late by the same time, a sensor's gain changes "

@@ -115,7 +115,11 @@ def _tiles(found: Findings) -> Tiles:
         if found.repaired:
             value += f" → {percent(held[1], after.half if after else None)}"
         tiles.append(
-            Tile(f"error on held-out data, of the {found.whole}", value, "before → after" if found.repaired else "")
+            Tile(
+                f"error on held-out data, of the {found.whole}",
+                value,
+                "before → after" if found.repaired else "",
+            )
         )
     if found.noise is not None:
         tiles.append(

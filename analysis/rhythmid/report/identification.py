@@ -167,7 +167,9 @@ def _errors(result: Mapping[str, Any], unit: str) -> tuple[Block, ...]:
     """How the transfer functions were found, and how large each kind of error is in each of them."""
     about = result.get("transfer_functions") or {}
     method = FOUND_BY.get(about.get("method") or "")
-    functions = [one for one in result.get("harmonics") or () if one.get("noise") is not None and one["frequency"]]
+    functions = [
+        one for one in result.get("harmonics") or () if one.get("noise") is not None and one["frequency"]
+    ]
     if method is None or not functions:
         return ()
     p_values = {test["m"]: test["p_value"] for test in about.get("tested") or ()}
@@ -182,9 +184,7 @@ def _errors(result: Mapping[str, Any], unit: str) -> tuple[Block, ...]:
         )  # fmt: skip
     words = method
     if p_values:
-        words += (
-            f" As many harmonics are shown as stand out of the errors, at a rate of false alarms of {percent(about['false_alarm'])}."
-        )
+        words += f" As many harmonics are shown as stand out of the errors, at a rate of false alarms of {percent(about['false_alarm'])}."
     caption = (
         "Errors by their cause, as rms over frequency: distortion of even and odd order, and what harmonics beyond those shown "
         "may add. A dash: this excitation cannot tell. The last column is the probability that noise alone would show as much."

@@ -154,7 +154,9 @@ def _over_frequency(run: Run, output: str) -> Drawing:
     curves = [Curve(frequency, factor * motion, "measured motion", "measured"),
               Curve(frequency, factor * before, run.labels[0], "before")]  # fmt: skip
     if run.after is not None:
-        curves.append(Curve(frequency, factor * density(run, run.residual("after"))[1], run.labels[1], "after"))
+        curves.append(
+            Curve(frequency, factor * density(run, run.residual("after"))[1], run.labels[1], "after")
+        )
     return drawing(
         "Over frequency",
         Chart(

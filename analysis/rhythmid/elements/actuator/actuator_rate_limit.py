@@ -31,7 +31,9 @@ ELEMENT = Element(
     size="rate",
     absent=inf,
     starts=lambda s: [
-        {"rate": w * s.effort * tau * max(s.frequency, s.natural_frequency)} for w in (0.4, 0.8, 1.6, 3.2) if s.effort > 0.0
+        {"rate": w * s.effort * tau * max(s.frequency, s.natural_frequency)}
+        for w in (0.4, 0.8, 1.6, 3.2)
+        if s.effort > 0.0
     ],
     also_known_as=("slew-rate limit", "ramp limit"),
     family="actuator nonlinearity",

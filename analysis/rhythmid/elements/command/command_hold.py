@@ -29,7 +29,24 @@ ELEMENT = Element(
     size="period",
     starts=lambda s: [  # usual rates of drives and buses, from twice the sample period to a quarter of the motion's
         {"period": 1.0 / rate}
-        for rate in (500.0, 400.0, 250.0, 200.0, 125.0, 100.0, 80.0, 60.0, 50.0, 40.0, 30.0, 25.0, 20.0, 10.0, 5.0, 1.0)
+        for rate in (
+            500.0,
+            400.0,
+            250.0,
+            200.0,
+            125.0,
+            100.0,
+            80.0,
+            60.0,
+            50.0,
+            40.0,
+            30.0,
+            25.0,
+            20.0,
+            10.0,
+            5.0,
+            1.0,
+        )
         if 1.5 * s.period < 1.0 / rate < 0.25 / s.frequency
     ],
     also_known_as=("zero-order hold", "down-sampled command", "bus cycle"),

@@ -21,7 +21,13 @@ ELEMENT = Element(
     equation="F = k_p (r − x) − k_d v",
     parameters=(
         Parameter("proportional", "N/m", "proportional gain k_p", bounds=(0.0, inf)),
-        Parameter("derivative", "N*s/m", "derivative gain k_d, on the measured speed", bounds=(0.0, inf), default=0.0),
+        Parameter(
+            "derivative",
+            "N*s/m",
+            "derivative gain k_d, on the measured speed",
+            bounds=(0.0, inf),
+            default=0.0,
+        ),
     ),
     kernel=kernel,
     acts="feedback",

@@ -31,7 +31,9 @@ ELEMENT = Element(
     size="rate",
     absent=inf,
     controlled=True,
-    starts=lambda s: [{"rate": w * (s.reference or s.position) * tau * s.frequency} for w in (1.0, 2.0, 4.0, 8.0)],
+    starts=lambda s: [
+        {"rate": w * (s.reference or s.position) * tau * s.frequency} for w in (1.0, 2.0, 4.0, 8.0)
+    ],
     also_known_as=("set-point ramp", "speed limit of a servo", "slew-rate limit"),
     family="command nonlinearity",
     confusable={

@@ -22,8 +22,12 @@ ELEMENT = Element(
     equation="F = −F_c± sgn v,  F_c± = F_c (1 ± a)",
     parameters=(
         Parameter("force", "N", "mean friction force F_c of both directions", bounds=(0.0, math.inf)),
-        Parameter("asymmetry", "1", "asymmetry a: F_c (1 + a) for v > 0, F_c (1 − a) for v < 0", bounds=(-1.0, 1.0)),
-        Parameter("transition", "m/s", "speed v_t over which the sign turns", bounds=(0.0, math.inf), default=1e-3),
+        Parameter(
+            "asymmetry", "1", "asymmetry a: F_c (1 + a) for v > 0, F_c (1 − a) for v < 0", bounds=(-1.0, 1.0)
+        ),
+        Parameter(
+            "transition", "m/s", "speed v_t over which the sign turns", bounds=(0.0, math.inf), default=1e-3
+        ),
     ),
     borrows={"mass": ("inertia.mass", None), "step": (STEP, 1e-3)},
     kernel=kernel,

@@ -21,7 +21,9 @@ ELEMENT = Element(
     equation="F = −F_c sgn v",
     parameters=(
         Parameter("force", "N", "friction force F_c while sliding", bounds=(0.0, math.inf)),
-        Parameter("transition", "m/s", "speed v_t over which the sign turns", bounds=(0.0, math.inf), default=1e-3),
+        Parameter(
+            "transition", "m/s", "speed v_t over which the sign turns", bounds=(0.0, math.inf), default=1e-3
+        ),
     ),
     borrows={"mass": ("inertia.mass", None), "step": (STEP, 1e-3)},
     kernel=kernel,

@@ -34,7 +34,13 @@ ELEMENT = Element(
     starts=lambda s: [
         {"stiffness": 0.02 * s.stiffness / w, "yield_displacement": w * s.position} for w in (0.1, 0.4, 1.5)
     ],
-    also_known_as=("Jenkins element", "Iwan element", "Bouc-Wen hysteresis", "presliding friction", "Dahl friction"),
+    also_known_as=(
+        "Jenkins element",
+        "Iwan element",
+        "Bouc-Wen hysteresis",
+        "presliding friction",
+        "Dahl friction",
+    ),
     family="friction",
     confusable={
         "coulomb_friction": "differ before sliding: small slow reversals",

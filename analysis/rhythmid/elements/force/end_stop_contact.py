@@ -43,7 +43,12 @@ ELEMENT = Element(
         Parameter("damping_ratio", "1", "damping ratio ζ of the contact", bounds=(0.0, 10.0), default=0.1),
         Parameter("position", "m", "position x_s of the stop"),
         Parameter(
-            "side", "1", "+1: stop above (acts for x > x_s), −1: below", bounds=(-1.0, 1.0), default=1.0, fixed=True
+            "side",
+            "1",
+            "+1: stop above (acts for x > x_s), −1: below",
+            bounds=(-1.0, 1.0),
+            default=1.0,
+            fixed=True,
         ),
     ),
     borrows={"mass": ("inertia.mass", None), "step": (STEP, 1e-3)},

@@ -20,7 +20,10 @@ ELEMENT = Element(
     title="Freeplay",
     equation="F = +k clip(e, −b/2, b/2),  e = x − x₀",
     parameters=(Parameter("gap", "m", "width b of the gap", bounds=(0.0, inf)),),
-    borrows={"stiffness": ("linear_spring.stiffness", None), "rest_length": ("linear_spring.rest_length", 0.0)},
+    borrows={
+        "stiffness": ("linear_spring.stiffness", None),
+        "rest_length": ("linear_spring.rest_length", 0.0),
+    },
     kernel=kernel,
     size="gap",
     starts=lambda s: [{"gap": w * s.position} for w in (0.1, 0.5)],

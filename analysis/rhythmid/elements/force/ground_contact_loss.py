@@ -24,7 +24,9 @@ ELEMENT = Element(
     slot="force",
     title="Loss of ground contact",
     equation="leg force × (1 − ρ) for e > 0,  e = x − x₀",
-    parameters=(Parameter("loss", "1", "share ρ of the leg's force that vanishes; 1 lifts off", bounds=(0.0, 1.0)),),
+    parameters=(
+        Parameter("loss", "1", "share ρ of the leg's force that vanishes; 1 lifts off", bounds=(0.0, 1.0)),
+    ),
     borrows={"rest_length": ("linear_spring.rest_length", None), "step": (STEP, 1e-3)},
     kernel=kernel,
     acts="modifier",

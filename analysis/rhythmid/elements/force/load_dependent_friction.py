@@ -20,7 +20,9 @@ ELEMENT = Element(
     equation="F = −μ |f| sgn v",
     parameters=(
         Parameter("coefficient", "1", "friction coefficient μ", bounds=(0.0, 1.0)),
-        Parameter("transition", "m/s", "speed v_t over which the sign turns", bounds=(0.0, math.inf), default=1e-3),
+        Parameter(
+            "transition", "m/s", "speed v_t over which the sign turns", bounds=(0.0, math.inf), default=1e-3
+        ),
     ),
     borrows={"mass": ("inertia.mass", None), "step": (STEP, 1e-3)},
     kernel=kernel,

@@ -28,10 +28,20 @@ ELEMENT = Element(
     equation="F = −(σ₀ z + σ₁ ż),  ż = v − σ₀ |v| z / g(v),  g = F_c + F_s e^{−(v/v_s)²},  F_s = (r − 1) F_c",
     parameters=(
         Parameter("force", "N", "kinetic friction force F_c", bounds=(0.0, math.inf)),
-        Parameter("static_ratio", "1", "ratio r of static to kinetic friction", bounds=(1.0, 100.0), default=1.0),
-        Parameter("stribeck_speed", "m/s", "speed v_s over which friction falls", bounds=(0.0, math.inf), default=1e-3),
+        Parameter(
+            "static_ratio", "1", "ratio r of static to kinetic friction", bounds=(1.0, 100.0), default=1.0
+        ),
+        Parameter(
+            "stribeck_speed",
+            "m/s",
+            "speed v_s over which friction falls",
+            bounds=(0.0, math.inf),
+            default=1e-3,
+        ),
         Parameter("presliding", "m", "displacement z_c = F_c/σ₀ before sliding", bounds=(0.0, math.inf)),
-        Parameter("damping_time", "s", "bristle damping over stiffness σ₁/σ₀", bounds=(0.0, math.inf), default=0.0),
+        Parameter(
+            "damping_time", "s", "bristle damping over stiffness σ₁/σ₀", bounds=(0.0, math.inf), default=0.0
+        ),
     ),
     borrows={"step": (STEP, 1e-3)},
     kernel=kernel,

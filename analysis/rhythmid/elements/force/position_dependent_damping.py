@@ -26,7 +26,8 @@ ELEMENT = Element(
     kernel=kernel,
     size="coefficient",
     starts=lambda s: [
-        {"coefficient": 0.02 * s.damping / s.position**n, "reference": s.centre, "exponent": n} for n in (1.0, 2.0)
+        {"coefficient": 0.02 * s.damping / s.position**n, "reference": s.centre, "exponent": n}
+        for n in (1.0, 2.0)
     ],
     also_known_as=("tapered dashpot", "position-sensitive damping"),
     family="damping",

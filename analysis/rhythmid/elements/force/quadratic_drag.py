@@ -14,7 +14,9 @@ ELEMENT = Element(
     slot="force",
     title="Quadratic drag",
     equation="F = −c₂ v |v|",
-    parameters=(Parameter("coefficient", "N*s^2/m^2", "drag coefficient c₂ = ρ c_w A / 2", bounds=(0.0, inf)),),
+    parameters=(
+        Parameter("coefficient", "N*s^2/m^2", "drag coefficient c₂ = ρ c_w A / 2", bounds=(0.0, inf)),
+    ),
     kernel=kernel,
     acts="body",
     size="coefficient",

@@ -21,6 +21,8 @@ ELEMENT = Element(
     starts=lambda s: [{"coefficient": 0.03 * s.stiffness / (s.position + abs(s.centre)) ** 4}],
     also_known_as=("fifth-order stiffness",),
     family="stiffness",
-    confusable={"cubic_stiffness": "one amplitude only: the resonance moves with the fourth power of the amplitude"},
+    confusable={
+        "cubic_stiffness": "one amplitude only: the resonance moves with the fourth power of the amplitude"
+    },
     reference="I. Kovacic, M. J. Brennan (eds.), The Duffing Equation, Wiley, 2011",
 )

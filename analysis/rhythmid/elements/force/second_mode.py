@@ -13,7 +13,9 @@ from rhythmid.elements.element import STEP, Element, Parameter
 
 def kernel(x, v, t, f, mass, frequency, damping_ratio, step, position, velocity):
     omega = min(2.0 * math.pi * frequency, 1.0 / step)
-    pull = omega * omega * (position - x) + 2.0 * damping_ratio * omega * (velocity - v)  # per unit of attached mass
+    pull = omega * omega * (position - x) + 2.0 * damping_ratio * omega * (
+        velocity - v
+    )  # per unit of attached mass
     return mass * pull, velocity, -pull
 
 
@@ -31,7 +33,12 @@ ELEMENT = Element(
     equation="F = k₂ (q − x) + c₂ (q̇ − v),  m₂ q̈ = −F,  k₂ = m₂ (2πf₂)²,  c₂ = 2ζ₂ m₂ 2πf₂",
     parameters=(
         Parameter("mass", "kg", "attached mass m₂", bounds=(0.0, math.inf)),
-        Parameter("frequency", "Hz", "frequency f₂ of the attached mass with the first one held", bounds=(0.0, math.inf)),
+        Parameter(
+            "frequency",
+            "Hz",
+            "frequency f₂ of the attached mass with the first one held",
+            bounds=(0.0, math.inf),
+        ),
         Parameter("damping_ratio", "1", "its damping ratio ζ₂", bounds=(0.0, 2.0), default=0.05),
     ),
     borrows={"step": (STEP, 1e-3)},

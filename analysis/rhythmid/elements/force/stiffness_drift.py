@@ -16,7 +16,10 @@ ELEMENT = Element(
     title="Stiffness drift",
     equation="F = −k α t e,  e = x − x₀",
     parameters=(Parameter("rate", "1/s", "relative rate α of the stiffness"),),
-    borrows={"stiffness": ("linear_spring.stiffness", None), "rest_length": ("linear_spring.rest_length", 0.0)},
+    borrows={
+        "stiffness": ("linear_spring.stiffness", None),
+        "rest_length": ("linear_spring.rest_length", 0.0),
+    },
     kernel=kernel,
     size="rate",
     starts=lambda s: [{"rate": 0.005 / s.duration}],

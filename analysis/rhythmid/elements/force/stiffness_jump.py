@@ -30,7 +30,9 @@ ELEMENT = Element(
     },
     kernel=kernel,
     size="change",
-    starts=lambda s: [{"change": 0.005, "time": share * s.duration} for share in (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)],
+    starts=lambda s: [
+        {"change": 0.005, "time": share * s.duration} for share in (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)
+    ],
     also_known_as=("crack", "sudden softening", "slipped clamp"),
     family="drift",
     confusable={"stiffness_drift": "a step against a ramp"},

@@ -24,7 +24,9 @@ ELEMENT = Element(
         Parameter("force", "N", "kinetic friction force F_c", bounds=(0.0, math.inf)),
         Parameter("static_ratio", "1", "ratio r of static to kinetic friction", bounds=(1.0, 100.0)),
         Parameter("stribeck_speed", "m/s", "speed v_s over which friction falls", bounds=(0.0, math.inf)),
-        Parameter("transition", "m/s", "speed v_t over which the sign turns", bounds=(0.0, math.inf), default=1e-3),
+        Parameter(
+            "transition", "m/s", "speed v_t over which the sign turns", bounds=(0.0, math.inf), default=1e-3
+        ),
     ),
     borrows={"mass": ("inertia.mass", None), "step": (STEP, 1e-3)},
     kernel=kernel,

@@ -25,7 +25,12 @@ ELEMENT = Element(
     parameters=(
         Parameter("threshold", "m/s", "speed v_th at which the damper switches"),
         Parameter(
-            "transition", "m/s", "speed w over which it switches", bounds=(0.0, math.inf), default=1e-3, fixed=True
+            "transition",
+            "m/s",
+            "speed w over which it switches",
+            bounds=(0.0, math.inf),
+            default=1e-3,
+            fixed=True,
         ),
     ),
     borrows={"stance": ("switched_damper.stance", None), "flight": ("switched_damper.flight", None)},

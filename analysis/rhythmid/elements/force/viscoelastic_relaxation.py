@@ -31,7 +31,10 @@ ELEMENT = Element(
     initial=lambda x, v, f, stiffness, time_constant, step: (x,),
     size="stiffness",
     starts=lambda s: [
-        {"stiffness": 0.02 * s.stiffness * max(1.0, 0.3 / w), "time_constant": w / (tau * s.natural_frequency)}
+        {
+            "stiffness": 0.02 * s.stiffness * max(1.0, 0.3 / w),
+            "time_constant": w / (tau * s.natural_frequency),
+        }
         for w in (0.15, 0.7, 3.0)
     ],
     also_known_as=("Maxwell branch", "Zener solid", "standard linear solid", "creep"),

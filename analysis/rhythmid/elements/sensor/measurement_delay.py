@@ -16,7 +16,9 @@ ELEMENT = Element(
     slot="sensor",
     title="Measurement delay",
     equation="y(t) = ȳ(t − τ_y)",
-    parameters=(Parameter("delay", "s", "delay τ_y of the measurement", bounds=(0.0, math.inf), default=0.0),),
+    parameters=(
+        Parameter("delay", "s", "delay τ_y of the measurement", bounds=(0.0, math.inf), default=0.0),
+    ),
     delay=delay_of,
     size="delay",
     candidate=False,

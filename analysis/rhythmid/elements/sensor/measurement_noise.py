@@ -30,7 +30,9 @@ ELEMENT = Element(
     equation="y_k = ȳ_k + n_k,  n_k = ρ n_{k−1} + √(1−ρ²) σ ε_k",
     parameters=(
         Parameter("std", "m", "standard deviation σ", bounds=(0.0, math.inf), default=0.0),
-        Parameter("correlation", "1", "correlation ρ from sample to sample", bounds=(0.0, 0.9999), default=0.0),
+        Parameter(
+            "correlation", "1", "correlation ρ from sample to sample", bounds=(0.0, 0.9999), default=0.0
+        ),
     ),
     sampler=sampler,
     size="std",
