@@ -14,9 +14,8 @@ from rhythmid.signal import fast_length
 
 Array = NDArray[np.float64]
 Lines = NDArray[np.int64]
-OVERSAMPLING = (
-    12  # grid points in a period of the highest line; the peak between them is missed by less than 1 %
-)
+# grid points in a period of the highest line; the peak between them is missed by less than 1 %
+OVERSAMPLING = 12
 STARTS = 8  # Schroeder's and random ones
 ROUNDS = 1500  # of clipping
 WORK = 150_000_000  # grid points that are gone through; a long period then makes do with fewer starts

@@ -16,9 +16,8 @@ from rhythmid.diagnose.search import Search
 from rhythmid.identify.series import Series
 
 FAINT = 3.0  # standard deviations from its absence, nearer than which an effect's size is no size
-NEEDED = (
-    100.0  # chi2 that an effect is worth, from which its size is only badly parted from its other parameters
-)
+# chi2 that an effect is worth, from which its size is only badly parted from its other parameters
+NEEDED = 100.0
 HARM = 0.01  # share by which the held-out error falls without an effect that does harm
 USE = 0.003  # share by which the error on seen and held-out records together has to rise without an effect of use
 

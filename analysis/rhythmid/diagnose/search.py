@@ -48,26 +48,21 @@ from rhythmid.parallel import fork_map
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
 
-WORTH = (
-    10.0  # difference of the information criterion below which two models are told apart by nothing but hope
-)
+# difference of the information criterion below which two models are told apart by nothing but hope
+WORTH = 10.0
 SHARE = 5e-4  # of what is explained already, below which a further effect is an imperfection of the others
 LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
-REFITTED = (
-    6  # elements of a round that are refitted; the right one was among the first five in all of 234 trials
-)
-NEAR = (
-    60.0  # difference of the criterion within which models are compared again under the noise that they leave
-)
+# elements of a round that are refitted; the right one was among the first five in all of 234 trials
+REFITTED = 6
+# difference of the criterion within which models are compared again under the noise that they leave
+NEAR = 60.0
 MOST = 4  # effects at once
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
 MISFIT = 0.1  # error, as a share of the motion, and
-PREDICTED = (
-    25.0  # power of the residual over what its own past leaves of it, beyond both of which it is no noise
-)
-ROUGH = (
-    0.1  # of the noise: integration error of an element with corners beyond which all steps are made finer
-)
+# power of the residual over what its own past leaves of it, beyond both of which it is no noise
+PREDICTED = 25.0
+# of the noise: integration error of an element with corners beyond which all steps are made finer
+ROUGH = 0.1
 RIVALS = 4  # elements that scored best at first, tried again in the place of each of several effects
 
 

@@ -25,9 +25,8 @@ from rhythmid.model import Model
 Array = NDArray[np.float64]
 HOLD, PERIOD, DELAY = "command_hold", "command_hold.period", "input_delay.delay"
 COARSE = 50  # rates of the coarse scan
-BAND = (
-    0.5  # of the way from the best to the middling cost of the coarse scan, up to which a rate is in the band
-)
+# of the way from the best to the middling cost of the coarse scan, up to which a rate is in the band
+BAND = 0.5
 MOST = 3000  # rates tried over the first stretch
 SERIES = 2  # looked at, those with the strongest command at first
 FASTEST = 100.0  # [Hz] beyond which a hold is little but a delay, and its ticks do not matter

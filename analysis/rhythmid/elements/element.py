@@ -67,9 +67,8 @@ class Scales:
     duration: float  # [s] longest record
     period: float  # [s] sample period
     forcing_frequency: float = 0.0  # [Hz] pumping frequency, 0 where there is none
-    residual_frequency: float = (
-        0.0  # [Hz] strongest line that the nominal model leaves unexplained, 0 where unknown
-    )
+    # [Hz] strongest line that the nominal model leaves unexplained, 0 where unknown
+    residual_frequency: float = 0.0
     reference: float = 0.0  # standard deviation of a controller's reference, 0 where there is none
 
     @property
@@ -115,9 +114,8 @@ class Element:
     acts: Acts = "leg"
     states: tuple[str, ...] = ()
     memories: tuple[str, ...] = ()
-    initial: Callable[..., tuple[float, ...]] | None = (
-        None  # (x, v, f, **parameters) -> `own` at the start; default 0
-    )
+    # (x, v, f, **parameters) -> `own` at the start; default 0
+    initial: Callable[..., tuple[float, ...]] | None = None
     borrows: Mapping[str, tuple[str, float | None]] = field(default_factory=dict)
     also_known_as: tuple[str, ...] = ()
     family: str = ""

@@ -18,9 +18,8 @@ from rhythmid.model import Model
 from rhythmid.signal import first_order_hold
 
 MARGIN = 1.0  # [s] of a command kept before a window, for delays
-GROWTH = (
-    1.5  # of the response to a constant force, from the middle to the end of a record, that calls for windows
-)
+# of the response to a constant force, from the middle to the end of a record, that calls for windows
+GROWTH = 1.5
 PERIODS = 2.0  # of the dominant motion in a window
 FEWEST = 4  # windows a record
 LEAST = 24  # blocks in a window

@@ -28,13 +28,11 @@ WHITE = NoiseModel(np.empty(0), 1.0)
 STAY = 0.1  # share of its distance from a lower bound that one step leaves a parameter: a width of zero is hard to leave
 BRINK = 1e-3  # share of its first distance within which it may reach the bound
 LOST = 0.3  # error, as a share of the motion, above which a model has lost the machine
-FALSE_EDGE = (
-    25.0  # chi2 that it may cost to put a parameter on its bound where the fit says that it cannot tell
-)
+# chi2 that it may cost to put a parameter on its bound where the fit says that it cannot tell
+FALSE_EDGE = 25.0
 Progress = Callable[[str], None]
-INTEGRATION = (
-    0.02  # of the residual, below which an error of integration has to stay: it must not count among models
-)
+# of the residual, below which an error of integration has to stay: it must not count among models
+INTEGRATION = 0.02
 
 
 @dataclass(frozen=True)

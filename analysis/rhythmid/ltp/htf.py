@@ -19,9 +19,8 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-ORDER = (
-    12  # harmonics of the state kept on either side; more changes the paper's G_0 and G_±1 by less than 5e-5
-)
+# harmonics of the state kept on either side; more changes the paper's G_0 and G_±1 by less than 5e-5
+ORDER = 12
 
 
 @dataclass(frozen=True, eq=False)

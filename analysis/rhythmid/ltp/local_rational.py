@@ -27,9 +27,8 @@ ORDER = 2  # of the polynomials
 FREEDOM = 20  # degrees of freedom that are left for the error
 ROUNDS = 3  # of solving with instruments
 HIGHEST = 3  # M that is considered
-WIDEST = (
-    2.5  # half-width of a window, as a multiple of the resonance's own half-width, that a local model bears
-)
+# half-width of a window, as a multiple of the resonance's own half-width, that a local model bears
+WIDEST = 2.5
 RANK = 1e-6  # singular value, relative to the largest, below which a combination is not determined
 POOR = 100.0  # times the usual variance, beyond which a value is not worth stating
 NEEDED = 1e-3  # probability of noise alone asking for a denominator

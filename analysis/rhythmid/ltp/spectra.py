@@ -19,9 +19,8 @@ from rhythmid.signal import continuous, fast_length
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 RING_DOWNS = 12.0  # of warm-up: e^-12 = 6e-6 of any transient is left
-FINE = (
-    0.03  # [rad] a cell of the integrated input covers at the highest frequency; relative error FINE^2 / 12
-)
+# [rad] a cell of the integrated input covers at the highest frequency; relative error FINE^2 / 12
+FINE = 0.03
 
 
 @dataclass(frozen=True)

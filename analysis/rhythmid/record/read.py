@@ -21,9 +21,8 @@ from rhythmid.record.timing import Timing, put_in_order
 from rhythmid.signal import Hold
 
 AMBIGUOUS = 0.01  # share of samples that may have the time of another one with another value
-CLOCKS_APART = (
-    1.0  # seconds between the ages at receipt of two channels, from which their stamps hardly share a clock
-)
+# seconds between the ages at receipt of two channels, from which their stamps hardly share a clock
+CLOCKS_APART = 1.0
 RUN_CLOCK = 10.0  # seconds; a clock that reads less at the first sample started with the run
 SAMPLES_PER_CYCLE = 100  # of a forcing that is given by formula
 
