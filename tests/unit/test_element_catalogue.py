@@ -116,7 +116,10 @@ def test_acts_and_vanishes_when_its_size_is_absent(name, rig, scales, without):
 
 @pytest.mark.parametrize("name", [name for name in ADDABLE if CATALOGUE[name].kernel is not None])
 def test_one_step_a_millisecond_is_enough(name, rig, scales, without):
-    model = rig.hopper.with_element(CATALOGUE[name], starts_of(name, scales)[0])
+    guess = starts_of(name, scales)[0]
+    if name == "switching_threshold":  # no sharper than what the falling mass gains in a step
+        guess |= {"transition": 0.01}
+    model = rig.hopper.with_element(CATALOGUE[name], guess)
     coarse, fine = output(model), output(model, max_step=1.25e-4)
     assert np.abs(coarse - fine).max() < 0.015 * np.abs(fine - without).max() + 1e-6
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper
+from rhythmid.diagnose.heldout import HeldOut
+from rhythmid.diagnose.locate import Dependence
 from rhythmid.diagnose.refit import Trial
 from rhythmid.diagnose.search import Search
 from rhythmid.diagnose.verdict import twins_of, verdict_of
@@ -65,6 +67,47 @@ def fit_of(rest: float, line: float) -> Fit:
 def test_a_line_is_unknown_physics_unless_it_is_faint_beside_what_was_explained(unexplained, expected):
     best = trial(hopper(), "coulomb_friction", force=0.1, transition=0.01)
     found = Search(fit_of(unexplained, 0.0), best, fit_of(0.01, 0.005), QUIET, (best,), (), ())
-    verdict, why = verdict_of(found, 1e-9, [], [], None, [SERIES])
+    verdict, why = verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)
     assert verdict == expected
     assert ("a line at 3.7 Hz remains" in why) is (expected == "unknown_physics")
+
+
+def explained(nominal: float, left: float, held: float = 0.0) -> Search:
+    """A search whose one effect takes the error from `nominal` to `left`; both leave a line of size `held` where nothing was fitted."""
+    best = trial(hopper(), "coulomb_friction", force=0.1, transition=0.01)
+    fits = []
+    for size in (nominal, left):
+        residual = np.std(SERIES.value) * size * np.random.default_rng(3).standard_normal(len(TIME))
+        used = TIME < 7.0
+        residual[~used] += (
+            np.std(SERIES.value) * (held + nominal - left) * np.sqrt(2) * np.sin(6 * TIME[~used])
+        )
+        series = replace(SERIES, used=used)
+        chi2 = float(np.sum((residual[used] / (0.01 * np.std(SERIES.value))) ** 2))
+        run = SimpleNamespace(series=(series,))
+        fits.append(SimpleNamespace(run=run, residuals=(residual,), chi2=chi2, nrmse=lambda size=size: size))
+    return Search(cast(Fit, fits[0]), best, cast(Fit, fits[1]), QUIET, (best,), (), ())
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.002, "missing_physics"), (0.02, "unknown_physics")])
+def test_effects_that_leave_a_structured_remainder_are_not_named_unless_it_is_faint(share, expected):
+    found = explained(0.1, 0.01)
+    gain = share * (found.nominal.chi2 - found.fit.chi2)
+    remains = [Dependence("position", 0.5, 1e-30, gain, np.empty(0), np.empty(0))]
+    verdict, why = verdict_of(found, 1e-9, remains, [], None, [SERIES], 0.0)
+    assert verdict == expected
+    assert ("structured remainder" in why) is (expected == "unknown_physics")
+
+
+def test_effects_that_do_not_hold_on_held_out_data_are_not_named():
+    verdict, why = verdict_of(explained(0.1, 0.01), 1e-9, [], [], None, [SERIES], 0.2)
+    assert verdict == "unknown_physics"
+    assert "20 % of what is missing on held-out data remains" in why
+
+
+def test_what_noise_leaves_on_held_out_data_is_nothing_and_what_stays_is_told_as_a_share():
+    found = explained(0.1, 0.01)
+    calm = replace(found, fit=explained(0.01, 0.01).fit)
+    assert HeldOut(calm, None).uncarried() == 0.0
+    left = replace(found, fit=explained(0.01, 0.01, 0.05).fit)
+    assert HeldOut(left, None).uncarried() == pytest.approx(0.05**2 / (0.1**2 + 0.09**2), rel=0.2)

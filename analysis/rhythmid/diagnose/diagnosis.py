@@ -200,7 +200,7 @@ def _conclude(
         if len(t.added) == len(found.best.added) and t.bic() - found.best.bic() < WORTH
     ]
     twins = twins_of(found.best, rivals)
-    verdict, reason = verdict_of(found, p_value, remains, twins, repeats, series)
+    verdict, reason = verdict_of(found, p_value, remains, twins, repeats, series, judge.uncarried())
     chance = probabilities(found)
     best = found.best
     missing: list[MissingEffect] = []

@@ -3,13 +3,20 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rhythmid.diagnose.refit import Trial, fine_enough
 from rhythmid.diagnose.search import Search
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.noise import runs
 from rhythmid.identify.output_error import Fit, normalised_error, start_only
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
+
+Array = NDArray[np.float64]
+NOISE = 1.21  # power of a held-out residual over that of a seen one, up to which it is the same noise
 
 
 class HeldOut:
@@ -40,6 +47,43 @@ class HeldOut:
             return None
         value = own.nrmse(unused=True)
         return None if math.isnan(value) else value
+
+    def uncarried(self) -> float:
+        """Share of what the nominal model leaves of the held-out motion beyond noise that the chosen model leaves, too.
+
+        Noise is what the chosen model leaves where it was fitted; held-out noise that is stronger shows as a rougher
+        residual. 0 where nothing is held out.
+        """
+        fits = [self._found.fit, self._found.nominal]
+        if self._separate is None:
+            unseen = [_stretches(fit, unused=True) for fit in fits]
+        else:
+            again = [self.fit(fit.model) for fit in fits]
+            unseen = [[] if fit is None else _stretches(fit) for fit in again]
+        if not all(unseen):
+            return 0.0
+        seen = _stretches(self._found.fit)
+        rougher = _power([np.diff(r, 2) for r in unseen[0]]) / max(
+            _power([np.diff(r, 2) for r in seen]), 1e-300
+        )
+        floor = _power(seen) * max(rougher, 1.0)
+        chosen, nominal = (_power(stretches) for stretches in unseen)
+        return 0.0 if chosen < NOISE * floor else (chosen - floor) / max(nominal - floor, chosen - floor)
+
+
+def _stretches(fit: Fit, unused: bool = False) -> list[Array]:
+    """The residual where it counts, or where it does not, in stretches without a gap that are long enough to judge."""
+    parts = [
+        residual[stretch]
+        for residual, one in zip(fit.residuals, fit.run.series)
+        for stretch in runs(~one.used if unused else one.used)
+    ]
+    return [part for part in parts if len(part) > 2]
+
+
+def _power(parts: Sequence[Array]) -> float:
+    """Mean square of all parts together."""
+    return float(np.mean(np.concatenate(parts) ** 2))
 
 
 def tail_error(found: Search, trial: Trial) -> float | None:

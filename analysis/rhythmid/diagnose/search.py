@@ -197,7 +197,9 @@ def search(
     rounds, excluded = [first], []
     now = first
     gained = 0.0
-    while now.p_value < LEVEL and _could_pay(now, best) and len(best.added) < most:
+    while (
+        now.p_value < LEVEL and _could_pay(now, best, max(WORTH, SHARE * gained)) and len(best.added) < most
+    ):
         count = REFITTED if not best.added else REFITTED - 2
         proposals, enough = _proposals(best.model, best.added, now.scores, count, best.chi2)
         tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
@@ -270,9 +272,9 @@ def _most_likely(
     return near[min(found, key=lambda index: (found[index], index), default=0)]
 
 
-def _could_pay(now: Round, best: Trial) -> bool:
+def _could_pay(now: Round, best: Trial, margin: float) -> bool:
     """Whether the best score, which can understate what a refit gains, is of the order that an element has to earn."""
-    return now.scores[0].statistic > 0.5 * (WORTH + math.log(max(best.samples, 2)))
+    return now.scores[0].statistic > 0.5 * (margin + math.log(max(best.samples, 2)))
 
 
 def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial, count: int = 10) -> list[Trial]:

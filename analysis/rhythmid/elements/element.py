@@ -70,11 +70,18 @@ class Scales:
     # [Hz] strongest line that the nominal model leaves unexplained, 0 where unknown
     residual_frequency: float = 0.0
     reference: float = 0.0  # standard deviation of a controller's reference, 0 where there is none
+    rest: float | None = None  # position at which the model's linear spring is at rest, where that is known
 
     @property
     def force(self) -> float:
         """Typical force of the leg, stiffness times displacement."""
         return self.stiffness * self.position
+
+    @property
+    def inside(self) -> tuple[float, float]:
+        """The travel without a twentieth of it at either end: a kink further out is but an offset of the rest."""
+        margin = 0.05 * (self.high - self.low)
+        return self.low + margin, self.high - margin
 
     @property
     def damping(self) -> float:

@@ -21,6 +21,7 @@ from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.signal import continuous, fast_length, spline
 
+REST_LENGTH = "linear_spring.rest_length"
 FAINT = 1e-4  # of the inertia's own stiffness m ω², below which a spring sets no scale
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -255,6 +256,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         period=biggest.period,
         forcing_frequency=pumping,
         reference=reference,
+        rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
     )
 
 

@@ -29,6 +29,7 @@ ELEMENT = Element(
     kernel=kernel,
     size="change",
     starts=starts,
+    ranges=lambda s: {"kink": s.inside},
     also_known_as=("piecewise linear spring", "kinked spring", "helper spring"),
     family="stiffness",
     special_case_of=("end_stop_contact",),  # undamped, pushing only

@@ -56,6 +56,7 @@ ELEMENT = Element(
     acts="body",
     size="stiffness",
     starts=starts,
+    ranges=lambda s: {"position": (s.low, s.high)},
     also_known_as=("bump stop", "hard stop", "impact"),
     family="contact",
     confusable={"bilinear_stiffness": "soft, undamped, pulls as well as it pushes"},

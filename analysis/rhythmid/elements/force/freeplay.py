@@ -1,7 +1,8 @@
 """Freeplay: the linear spring engages only outside a gap b around its rest length, as in a worn joint.
 
 As an addition to the nominal spring: F = +k clip(e, -b/2, b/2), which leaves -k (e -/+ b/2) outside the gap and
-nothing inside.
+nothing inside. Under a weight the spring works on one side of the gap: with that edge out of reach all that is left is a
+constant force, so the search keeps an edge within the travel where the rest length is known.
 """
 
 from math import inf
@@ -12,6 +13,20 @@ from rhythmid.elements.element import Element, Parameter
 def kernel(x, v, t, f, gap, stiffness, rest_length):
     half = 0.5 * gap
     return stiffness * max(-half, min(half, x - rest_length))
+
+
+def edges(scales):
+    """The smallest and the largest gap with an edge within the travel."""
+    if scales.rest is None:
+        return 0.0, inf
+    low, high = (end - scales.rest for end in scales.inside)
+    nearest = 0.0 if low < 0.0 < high else min(abs(low), abs(high))
+    return 2.0 * nearest, 2.0 * max(abs(low), abs(high))
+
+
+def starts(scales):
+    nearest, farthest = edges(scales)
+    return [{"gap": min(nearest + share * scales.position, farthest)} for share in (0.1, 0.5)]
 
 
 ELEMENT = Element(
@@ -26,7 +41,8 @@ ELEMENT = Element(
     },
     kernel=kernel,
     size="gap",
-    starts=lambda s: [{"gap": w * s.position} for w in (0.1, 0.5)],
+    starts=starts,
+    ranges=lambda s: {"gap": edges(s)},
     also_known_as=("backlash in the joint", "dead zone in the spring", "gap"),
     family="stiffness",
     confusable={

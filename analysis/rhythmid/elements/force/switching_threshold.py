@@ -1,8 +1,9 @@
 """Switching threshold: the direction-switched damper turns on at v = v_th instead of v = 0.
 
 As an addition to the nominal damper: F = -(c_s - c_f) v ([v > v_th] - [v > 0]). The force now jumps at the switch.
-Both brackets are smoothed alike, [v > a] = (1 + tanh((v - a) / w)) / 2, so that the effect vanishes exactly at
-v_th = 0 and can be differentiated with respect to v_th; to second order in w the motion does not depend on w.
+Both brackets are smoothed alike, so that the effect vanishes exactly at v_th = 0 and can be differentiated with respect
+to v_th: [v > a] = 4/3 s((v - a) / w) - 1/3 s((v - a) / 2w) with s(z) = (1 + tanh z) / 2. The second moments of the two
+cancel, so that the motion depends on w to the fourth order only, and w need not be small beside v_th.
 The effect grows with the square of small thresholds: fits need starts of physical size.
 """
 
@@ -12,8 +13,10 @@ from rhythmid.elements.element import Element, Parameter
 
 
 def kernel(x, v, t, f, threshold, transition, stance, flight):
-    width = max(transition, 1e-300)
-    late = 0.5 * (math.tanh((v - threshold) / width) - math.tanh(v / width))
+    narrow = 1.0 / max(transition, 1e-300)
+    wide = 0.5 * narrow
+    late = (math.tanh((v - threshold) * narrow) - math.tanh(v * narrow)) * 2.0 / 3.0
+    late -= (math.tanh((v - threshold) * wide) - math.tanh(v * wide)) / 6.0
     return -(stance - flight) * v * late
 
 
@@ -37,7 +40,7 @@ ELEMENT = Element(
     kernel=kernel,
     size="threshold",
     starts=lambda s: [
-        {"threshold": sign * 0.3 * s.velocity, "transition": 0.02 * s.velocity} for sign in (1.0, -1.0)
+        {"threshold": sign * 0.3 * s.velocity, "transition": 0.005 * s.velocity} for sign in (1.0, -1.0)
     ],
     also_known_as=("late damping", "valve opening speed"),
     family="damping",
