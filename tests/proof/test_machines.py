@@ -11,7 +11,7 @@ import pytest
 import twins
 from twins import Twin
 
-from rhythmid.diagnose.diagnosis import Answer, diagnose
+from rhythmid.diagnose.diagnosis import TIED_SENSOR, Answer, diagnose
 from rhythmid.model import Model
 
 NAMED: dict[str, Callable[[], Twin]] = {
@@ -74,6 +74,7 @@ def test_a_machine_that_integrates_is_scored_by_force_and_it_is_said():
     twin = twins.axis(friction=0.0, count=1, duration=6.0)
     answer = examined(twin)
     assert "force" in answer.diagnosis.scoring and "integrates" in answer.diagnosis.scoring
+    assert TIED_SENSOR in answer.diagnosis.notes
     assert answer.diagnosis.heldout == "held out: the last fifth of every record"
     assert answer.diagnosis.parameters["inertia.mass"].value == pytest.approx(2.0, rel=1e-3)
     assert answer.diagnosis.parameters["viscous_damper.damping"].value == pytest.approx(8.0, rel=1e-3)

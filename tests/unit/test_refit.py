@@ -1,13 +1,14 @@
 """Refits of candidates: where the first guesses of an element lead away, fainter ones are tried."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper
 from rhythmid.diagnose import refit
-from rhythmid.diagnose.refit import Proposal, propose, run_trials
+from rhythmid.diagnose.refit import Proposal, Trial, propose, run_trials
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Descent
 from rhythmid.identify.series import Series
@@ -84,3 +85,33 @@ def test_parameters_that_have_wandered_to_where_nothing_shows_are_tried_again_fr
 ):
     ends = {0.5: 70.0, 1.0: 60.0}
     assert fitted_force(monkeypatch, friction(100.0), ends, felt=1.5) == (1.0, [0.5, 1.0, 0.5])
+
+
+def test_a_flat_parameter_of_a_close_model_is_tried_from_all_guesses_and_fainter_ones_and_the_best_is_kept(
+    monkeypatch,
+):
+    """As in a lag whose time ended where nothing shows: the element's own guesses bring it back."""
+    element = CATALOGUE["coulomb_friction"]
+    lost = hopper().with_element(element, {"force": 1e-9, "transition": 0.02})
+    tried: list[float] = []
+
+    def descend(model, run, names, noise, starts, *_, **__) -> Descent:
+        tried.append(model.value("coulomb_friction.force"))
+        steps = np.full(len(names), 1e-6), np.ones(run.states)
+        chi2 = 100.0 + abs(math.log(tried[-1] / 1e-3))
+        return Descent(model, tuple(starts), (), chi2, 64, True, "", (), steps, None)
+
+    monkeypatch.setattr(refit, "descend", descend)
+    steps = np.full(len(lost.free), 1e-6), np.ones(2)
+    start = (np.array([0.15, 0.0]),)
+    trial = Trial(("coulomb_friction",), lost, start, 500.0, 64, len(lost.free), True, QUIET, steps)
+    found = refit._unstuck(trial, [STILL], 1e-3)
+    assert tried and found.chi2 == pytest.approx(min(100.0 + abs(math.log(one / 1e-3)) for one in tried))
+    assert found.model.value("coulomb_friction.force") == min(
+        tried, key=lambda one: abs(math.log(one / 1e-3))
+    )
+    near = replace(
+        trial, model=lost.with_values({"coulomb_friction.force": 0.5, "coulomb_friction.transition": 0.02})
+    )
+    tried.clear()
+    assert refit._unstuck(near, [STILL], 1e-3) is near and not tried
