@@ -2,11 +2,14 @@
 
 import json
 from dataclasses import replace
+from importlib.resources import as_file, files
 
 import numpy as np
 import pytest
 
 from rhythmid.errors import InputError
+from rhythmid.experiment import Experiment
+from rhythmid.identify.bound import planned_record
 from rhythmid.identify.identification import Delays, Estimate, Observables
 from rhythmid.identify.identify import _open, identify, paper_hopper, with_delays
 from rhythmid.model import Model
@@ -120,3 +123,18 @@ def test_a_closure_is_open_beyond_five_deviations_and_a_hundredth_of_a_sample(ga
 def test_a_closure_that_cannot_be_had_is_not_open() -> None:
     nothing = Estimate(None, None, "s")
     assert not _open(Delays(nothing, nothing, nothing, False, ""), 1e-3)
+
+
+def test_an_excitation_that_misses_sidebands_still_gives_both_delays_by_maximum_likelihood() -> None:
+    """Two lines, too few to read the phase of a sideband as the paper does."""
+    text = """
+model: paper_hopper.yaml
+excitation: {type: multisine, rms: 0.004, period: 1.0, lines: [1, 3], periods: 16}
+forcing: {amplitude: 1.0, frequency: 2.0}
+delays: {input: 0.04, measurement: 0.05}
+"""
+    with as_file(files("rhythmid") / "models") as folder:
+        found = identify(planned_record(Experiment.from_text(text, folder)))
+    assert found.delays.input.value == pytest.approx(0.04, abs=1e-4)
+    assert found.delays.measurement.value == pytest.approx(0.05, abs=1e-4)
+    assert set(found.paper[0].delays) < {-1, 0, 1}

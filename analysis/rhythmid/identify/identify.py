@@ -43,6 +43,12 @@ ASSUMPTIONS = {
 }
 LEAKAGE = 0.05  # above which a record's leakage is told
 MISFIT = 0.1  # of the magnitudes above which the fit is called into question
+NO_PHASE = (
+    "the excitation reaches too few frequencies to read a delay from phases; excite more of them, or a chirp"
+)
+NO_SIDEBANDS = (
+    "the excitation reaches the sidebands at too few frequencies to tell the two delays apart by their phases"
+)
 NO_FORCING = "no forcing is known, so nothing tells when the machine's cycle is at which phase"
 
 
@@ -130,8 +136,11 @@ def _delays(results: Sequence[PaperResult], source: str) -> Delays:
     nothing = Estimate(None, None, "s")
     found = [result.combined for result in results]
     if source == "none" or any(one is None for one in found):
-        total = estimate([(result.delays[0].sum, result.delays[0].sum_std) for result in results])
-        return Delays(nothing, nothing, total, False, NO_FORCING)
+        whole = [result.delays[0] for result in results if 0 in result.delays]
+        if not whole:
+            raise InputError(NO_PHASE)
+        total = estimate([(one.sum, one.sum_std) for one in whole])
+        return Delays(nothing, nothing, total, False, NO_FORCING if source == "none" else NO_SIDEBANDS)
     pairs = [one for one in found if one is not None]
     return Delays(
         estimate([(one.input or 0.0, one.input_std or 0.0) for one in pairs]),

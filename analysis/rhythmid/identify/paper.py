@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from rhythmid.errors import InputError
-from rhythmid.identify.delay_fit import DelayEstimate, combine_delays, fit_delays
+from rhythmid.identify.delay_fit import DelayEstimate, combine_delays, fit_delays, shows_delays
 from rhythmid.identify.magnitude_fit import MagnitudeFit, fit_magnitude
 from rhythmid.ltp.htf import linearised
 from rhythmid.ltp.pumping import Pumping
@@ -28,7 +28,7 @@ class PaperResult:
     ----------
     estimate : Ĥ_m by (5).
     fit : parameters by (8).
-    delays : by (15)-(16) from each harmonic alone.
+    delays : by (15)-(16) from each harmonic alone, of those that the excitation reaches.
     combined : by (9) from several harmonics at once; None where only their sum can be had.
     loss : predicted relative loss of the peak of each |G_m| by the smoothing of (5), in the order of the harmonics.
     """
@@ -49,7 +49,9 @@ def paper_method(record: Record, model: Model, pumping: Pumping, harmonics: int 
     Raises InputError when the record has no input, is too short, or the model has no limit cycle.
     """
     if record.input is None:
-        raise InputError(f"{record.name}: has no input channel; the paper's method needs the excitation")
+        raise InputError(
+            f"{record.name}: has no input channel; identification needs the excitation (`rhythmid diagnose` takes records without)"
+        )
     ring_down = linearised(model, pumping).cycle.ring_down
     for _ in range(2):  # the smoothing follows the ring-down, which is known once the model is fitted
         measured = spectra(record, pumping, ring_down, harmonics + 1)
@@ -61,7 +63,7 @@ def paper_method(record: Record, model: Model, pumping: Pumping, harmonics: int 
         model = fit.model
     delays: dict[int, DelayEstimate] = {}
     for m in TABLE if pumping.active else (0,):
-        if abs(m) <= harmonics:
+        if abs(m) <= harmonics and shows_delays(estimate, m):
             delays[m] = fit_delays(estimate, fit.expected, m)
     sided = [m for m in delays if m != 0]
     combined = None

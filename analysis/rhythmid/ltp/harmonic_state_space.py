@@ -11,11 +11,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.errors import InputError
 from rhythmid.ltp.linearisation import Linearisation
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 TRUNCATION = 20  # harmonics kept on either side
+INTEGRATES = (
+    1e-9  # of the fastest mode, nearer than which to a frequency that is asked for a pole lies upon it
+)
 
 
 def toeplitz_blocks(coefficients: Complex) -> Complex:
@@ -60,12 +64,19 @@ class HarmonicStateSpace:
 
         Paper, equation (3): G = C [sI − (A − N)]⁻¹ B + D. In the convention of (4), Y(jω) = Σ_m G_m(jω) U(j(ω − mω_p)),
         G_m(jω) is the entry of row 0 (the output at ω) and column −m (the input at ω − mω_p) for s = jω.
+        Raises InputError at a pole on the imaginary axis: the machine integrates.
         """
         columns = self.order - np.asarray(harmonics)
         s = 2j * np.pi * np.asarray(frequency, dtype=float)
         direct = self.d[self.order, columns][:, None]
         if self._modes is not None:
             values, inputs, outputs = self._modes
+            apart = np.abs(s[None, :] - values[:, None])
+            if apart.size and apart.min() < INTEGRATES * np.abs(values).max():
+                raise InputError(
+                    "the machine does not return to its cycle once displaced (nothing restores its position), so it has no "
+                    "harmonic transfer functions; `rhythmid diagnose` estimates the parameters of such a model"
+                )
             return (inputs[:, columns] * outputs[:, None]).T @ (1.0 / (s[None, :] - values[:, None])) + direct
         found = np.empty((len(columns), len(s)), dtype=complex)
         for i, at in enumerate(s):
