@@ -3,6 +3,7 @@ that are far off.
 
     python benchmarks/delays_monte_carlo.py                    # everything, on two chirps: a few minutes
     python benchmarks/delays_monte_carlo.py --chirps 9 --only scatter     # the paper's nine chirps
+    python benchmarks/delays_monte_carlo.py --only scatter --case 1 --runs 1000     # of the four, the second
     python benchmarks/delays_monte_carlo.py --only starts --runs 200
 
 One record is simulated; every run adds white noise of its own and fits from values that are a little off. A start that
@@ -38,7 +39,7 @@ forcing: {{amplitude: 1.0, frequency: 1.0}}
 delays: {{input: {delays[0]}, measurement: {delays[1]}}}
 """
 DELAYS = (0.04, 0.05)
-NOISE = (5e-6, 2e-5)
+CASES = tuple(product((5e-6, 2e-5), (True, False)))  # noise [m], whether the limit cycle is used
 STIFFNESS, DAMPING = "linear_spring.stiffness", "switched_damper.stance"
 NAMES = (INPUT_DELAY, MEASUREMENT_DELAY, STIFFNESS, DAMPING)
 
@@ -132,13 +133,18 @@ def main() -> None:
     parser.add_argument("--runs", type=int, help="runs of each case (300), and starts (200)")
     parser.add_argument("--chirps", type=int, default=2, help="chirps of 30 s after the warm-up")
     parser.add_argument("--only", choices=("scatter", "starts"))
+    parser.add_argument(
+        "--case", type=int, choices=range(len(CASES)), help="one of the cases of --only scatter alone"
+    )
     parser.add_argument("--workers", type=int, help="processes; as many as there are processors if not told")
     given = parser.parse_args()
     if given.chirps < 1 or (given.runs is not None and given.runs < 2):
         parser.error("at least one chirp and two runs are needed")
     if given.only != "starts":
         record, runs = record_of(given.chirps), given.runs or 300
-        for case, (noise, cycle) in enumerate(product(NOISE, (True, False))):
+        for case, (noise, cycle) in enumerate(CASES):
+            if given.case not in (None, case):
+                continue
             print_scatter(range(case * runs, (case + 1) * runs), record, noise, cycle, given.workers)
     if given.only != "scatter":
         print_starts(given.runs or 200, given.chirps, given.workers)
