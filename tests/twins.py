@@ -139,8 +139,11 @@ def axis(
     )
 
 
-def joint(friction: float = 0.4, seed: int = 0, count: int = 2, duration: float = 15.0) -> Twin:
-    """Robot joint driven by a current [A] (500 Hz), of which only the velocity is measured; Coulomb friction missing."""
+def joint(
+    friction: float = 0.4, seed: int = 0, count: int = 2, duration: float = 15.0, weight: float = 0.0
+) -> Twin:
+    """Robot joint driven by a current [A] (500 Hz), of which only the velocity is measured; Coulomb friction [N m] missing,
+    or the `weight` [N m] of its link."""
     rng = np.random.default_rng([2, seed])
     inertia, c, constant, period = 0.05, 0.08, 0.6, 2e-3
 
@@ -149,18 +152,20 @@ def joint(friction: float = 0.4, seed: int = 0, count: int = 2, duration: float 
         time = np.arange(0.0, duration, period)
         held = sampled(current, time)
         states, h = np.zeros((len(time), 2)), period / 10
-        v = 0.0
+        x, v = 0.4, 0.0
 
-        def rate(v: float, i: float) -> float:
-            return (constant * i - c * v - friction * sign(v, 5e-3)) / inertia
+        def rate(x: float, v: float, i: float) -> float:
+            return (constant * i - c * v - friction * sign(v, 5e-3) - weight * np.sin(x)) / inertia
 
         for k in range(len(time)):
-            states[k, 1] = v
+            states[k] = x, v
             for _ in range(10):
-                a1 = rate(v, held[k])
-                a2 = rate(v + 0.5 * h * a1, held[k])
-                a3 = rate(v + 0.5 * h * a2, held[k])
-                v += h * (a1 + 2.0 * a2 + 2.0 * a3 + rate(v + h * a3, held[k])) / 6.0
+                a1 = rate(x, v, held[k])
+                a2 = rate(x + 0.5 * h * v, v + 0.5 * h * a1, held[k])
+                a3 = rate(x + 0.5 * h * v + 0.25 * h * h * a1, v + 0.5 * h * a2, held[k])
+                a4 = rate(x + h * v + 0.5 * h * h * a2, v + h * a3, held[k])
+                x += h * v + h * h * (a1 + a2 + a3) / 6.0
+                v += h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
         velocity = Channel(time, noisy(rng, states[:, 1], 0.02), "rad/s")
         return Record(f"joint {index}", velocity, Channel(time, held, "A"), output_kind="velocity")
 
@@ -170,6 +175,8 @@ units: {force: A, position: rad}
 inertia: {mass: {value: 0.07}}
 force: [{viscous_damper: {damping: {value: 0.1}}}]
 """
+    if weight:
+        return Twin(records, nominal, "pendulum_gravity", {"moment": weight / constant})
     truth = {"force": friction / constant}
     return Twin(records, nominal, "coulomb_friction" if friction else "", truth)
 

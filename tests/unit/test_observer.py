@@ -45,3 +45,16 @@ def test_an_error_is_a_share_of_the_driving_force():
     fit = estimate(MODEL, series, names=())
     driving = np.std(record().input.value)
     assert fit.nrmse() == pytest.approx(0.5 / driving, rel=0.02)
+
+
+def test_where_the_velocity_was_measured_a_damper_alone_draws_the_machine():
+    moving = record(constant=0.5)
+    rate = 0.1 * RATE * np.cos(RATE * TIME)
+    spun = Record(
+        "spun", Channel(TIME, rate, "m/s"), moving.input, hold="band_limited", output_kind="velocity"
+    )
+    series = observed(prepare([spun]), MODEL, 3.0)
+    observer = series[0].observer
+    assert observer is not None and observer.stiffness == 0.0
+    fit = estimate(MODEL, series, names=())
+    assert np.median(fit.residuals[0]) == pytest.approx(-0.5 / (observer.damping + 8.0), rel=1e-2)

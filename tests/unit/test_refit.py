@@ -115,3 +115,25 @@ def test_a_flat_parameter_of_a_close_model_is_tried_from_all_guesses_and_fainter
     )
     tried.clear()
     assert refit._unstuck(near, [STILL], 1e-3) is near and not tried
+
+
+def test_a_parameter_with_many_minima_is_followed_to_the_deepest_from_one_to_the_next(monkeypatch):
+    """Minima a second apart, each half as deep as the next one towards the true time of 7 s."""
+    element = CATALOGUE["stiffness_jump"]
+
+    def descend(model, run, names, noise, starts, *_, **__) -> Descent:
+        time = round(model.value("stiffness_jump.time"))
+        steps = np.full(len(names), 1e-6), np.ones(run.states)
+        end = model.with_values({"stiffness_jump.time": float(time)})
+        return Descent(end, tuple(starts), (), 100.0 + 50.0 * abs(time - 7), 64, True, "", (), steps, None)
+
+    monkeypatch.setattr(refit, "descend", descend)
+    monkeypatch.setattr(
+        refit, "fork_map", lambda work, cases: [(i, work(case)) for i, case in enumerate(cases)]
+    )
+    stepwise = replace(element, hops=lambda s: {"time": 1.0})
+    proposal = propose(hopper(), stepwise, [{"change": 0.01, "time": 3.0}], (), 1000.0)
+    trials, _ = run_trials(
+        [proposal], [STILL], [np.array([0.15, 0.0])], ("position", "velocity"), QUIET, 1e-3
+    )
+    assert trials[0].model.value("stiffness_jump.time") == 7.0

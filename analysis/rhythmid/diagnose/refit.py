@@ -25,6 +25,7 @@ from rhythmid.parallel import fork_map
 Array = NDArray[np.float64]
 SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
 PROMISING = 0.3  # share of the spread of chi2 within which a model is carried to convergence
+HOPS = 12  # at most, from one minimum to the next
 FAINTER = (0.1, 0.01)  # shares of a guess that led nowhere, tried in its place
 TOLERANCE = 0.05  # of chi2, at which a trial has converged: far below what an element has to earn
 
@@ -182,7 +183,29 @@ def _fit_proposal(
         back = best.model.with_values({name: proposal.guesses[0][name] for name in flat})
         again = descend(back, run, names, noise, best.starts, BRIEF, None, TOLERANCE)
         best = min(best, again, key=lambda end: end.chi2)
+    element, label = proposal.model.terms[-1].element, proposal.added[-1] if proposal.added else ""
+    if element.hops is not None and proposal.model.terms[-1].label == label and best.chi2 < proposal.ceiling:
+        for name, distance in element.hops(scales(series, proposal.model)).items():
+            best = _hopped(best, run, names, noise, f"{label}.{name}", distance)
     return _outcome(best)
+
+
+def _hopped(
+    best: Descent, run: FreeRun, names: tuple[str, ...], noise: NoiseModel, name: str, distance: float
+) -> Descent:
+    """The deepest of the minima that a parameter has at about this distance, as far as every next one is deeper."""
+    low, high = best.model.parameters[name].bounds
+    for _ in range(HOPS):
+        before = best
+        for value in (before.model.value(name) + way * distance for way in (0.5, -0.5, 1.0, -1.0)):
+            if not low < value < high:
+                continue
+            moved = before.model.with_values({name: value})
+            again = descend(moved, run, names, noise, before.starts, BRIEF, None, TOLERANCE)
+            best = min(best, again, key=lambda end: end.chi2)
+        if best.chi2 > before.chi2 - 1.0:
+            break
+    return best
 
 
 def _flat(model: Model, steps: Array, names: Sequence[str]) -> list[str]:

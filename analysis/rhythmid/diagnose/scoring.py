@@ -1,9 +1,9 @@
 """How records are scored: in free run where that means something, else tied to the record or in windows.
 
 A free run means nothing where the machine integrates, or where the nominal model loses it altogether: a score along a
-trajectory that the machine never took says nothing of what the model lacks. Where the position of an integrating machine
-and the force on it are known, an observer shows the force that the model lacks; else windows with starts of their own are
-made shorter until the model follows the machine through them.
+trajectory that the machine never took says nothing of what the model lacks. Where the force is known, and with it the
+position of an integrating machine or the velocity of any, an observer shows the force that the model lacks; else windows
+with starts of their own are made shorter until the model follows the machine through them.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -115,12 +115,14 @@ def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
         free = False
     if free:
         yield _Way(FREE_RUN, list)
-    elif all(
-        one.measured == "position" and one.kind == "force" and one.command is not None for one in series
+    driven = all(one.kind == "force" and one.command is not None for one in series)
+    if driven and all(
+        one.measured == "velocity" or (one.measured == "position" and not free) for one in series
     ):
         step = max(one.period * one.block for one in series)
         frequency = min(max(bandwidth(one.value, one.period) for one in series), FINE / step)
-        yield _Way(TIED.format(frequency) + INTEGRATES, lambda given: observed(given, model, frequency))
+        reason = LOSES if free else INTEGRATES
+        yield _Way(TIED.format(frequency) + reason, lambda given: observed(given, model, frequency))
     length = float(np.median([periods_long(one) for one in series]))
     shortest = LEAST * max(one.period * one.block for one in series)
     while length >= shortest:

@@ -29,6 +29,7 @@ from rhythmid.signal import first_order_hold
 from rhythmid.simulate import delay_of_command, delayed_command, physical_times
 
 Array = NDArray[np.float64]
+SMALL = 1e-3  # of the force that shakes the machine: a force that is tried is no larger, so that the answer is in proportion
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,11 @@ class Trajectories:
     legs: tuple[Path, ...]
     outputs: tuple[Array, ...]  # of each series at its block centres, as the sensor says
     commands: tuple[Array, ...]
+
+    @property
+    def shaken(self) -> float:
+        """Typical acceleration (rms) of the strongest motion."""
+        return max(float(np.std(np.gradient(path.velocity, path.time))) for path in self.paths)
 
 
 def trajectories(fit: Fit) -> Trajectories:
@@ -176,10 +182,11 @@ def change_of_output(
         if not np.any(force):
             changes.append(np.zeros(one.blocks))
             continue
-        rows = run.rows(fit.model, index, fit.starts[index], first_order_hold(path.time, force))
+        share = min(1.0, SMALL * fit.model.mass.value * known.shaken / float(np.sqrt(np.mean(force**2))))
+        rows = run.rows(fit.model, index, fit.starts[index], first_order_hold(path.time, share * force))
         if rows is None:
             return None
-        changes.append(one.of_block(rows[:, run.states] - known.outputs[index]))
+        changes.append(one.of_block(rows[:, run.states] - known.outputs[index]) / share)
     return changes
 
 

@@ -106,7 +106,7 @@ class Element:
     `confusable` maps another element's name to what tells the two apart. A `rotational` effect needs an angle for x, a
     `controlled` one a controller in the model.
     `ranges` bounds parameters by the record's scales to where the effect still is what its name says: a ripple repeats
-    within the travel, or it is but another spring.
+    within the travel, or it is but another spring. `hops` says how far apart the minima lie that a fit has in a parameter.
     """
 
     name: str
@@ -140,6 +140,7 @@ class Element:
     controlled: bool = False  # makes sense only where a controller in the command path closes the loop
     starts: Callable[[Scales], list[dict[str, float]]] | None = None
     ranges: Callable[[Scales], Mapping[str, tuple[float, float]]] | None = None
+    hops: Callable[[Scales], Mapping[str, float]] | None = None
     source: str = ""  # file that defines it
 
     def __post_init__(self) -> None:

@@ -139,6 +139,11 @@ def _ticks(series: Sequence[Series]) -> list[float]:
     return [float(np.median(np.diff(times))) for times in knots if len(times) > 2]
 
 
+def _longest(one: Series) -> float:
+    """Longest step [s] that shows all of a series: a block, or what lies between two values of an observer's pull."""
+    return one.period * one.block if one.observer is None else float(np.median(np.diff(one.observer.pull.x)))
+
+
 def _inputs(one: Series) -> Inputs:
     return Inputs(_contiguous(pieces(one.command)), _stand_in(one), _contiguous(pieces(one.forcing)))
 
@@ -148,7 +153,8 @@ def prepare_run(
 ) -> FreeRun:
     """Prepare the model's structure for the series. Raises InputError when series of different input kinds are mixed.
 
-    `max_step` [s] None means one Runge-Kutta step a block, or a value of a command at whose knots steps end, at most.
+    `max_step` [s] None means one Runge-Kutta step a block, a value of an observer's pull, or one of a command at whose knots
+    steps end, at most.
     """
     kinds: set[InputKind] = {one.kind for one in series if one.command is not None}
     if len(kinds) > 1:
@@ -173,7 +179,7 @@ def prepare_run(
         lambda: tied(compile_model(whole, disturbed, excited, measured=measured), observer),
         tuple(series),
         inputs,
-        max_step or min([one.period * one.block for one in series] + ([] if smooth else _ticks(series))),
+        max_step or min([*map(_longest, series), *([] if smooth else _ticks(series))]),
     )
 
 

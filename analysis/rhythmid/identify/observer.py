@@ -4,6 +4,7 @@ D. G. Luenberger, IEEE Trans. Autom. Control 16 (1971) 596. Where a machine inte
 up every small disturbance until it means nothing. Tied to the record it cannot get far: what it stays behind by is the
 force that the model lacks, seen through 1 / (m s² + d s + k). This is inverse dynamics without a derivative of the
 measurement: force and simulation are compared below the observer's bandwidth, and all else goes on as in a free run.
+A machine of which the velocity was measured is drawn by the damper alone; what it lags behind is the force over m s + d.
 """
 
 import math
@@ -47,7 +48,7 @@ OBSERVER = Element(
 @dataclass(frozen=True)
 class Observer:
     """A spring [N/m] and a damper [N s/m] from the simulated machine to the recorded motion, whose `pull` [N] is a function
-    of the measurement's stamps [s]. By `size` [m] the driving force (rms) would stretch the spring."""
+    of the measurement's stamps [s]. By `size`, in the output's unit, the driving force (rms) would hold the simulation off."""
 
     stiffness: float
     damping: float
@@ -61,20 +62,25 @@ class Observer:
 
 
 def observed(series: "Sequence[Series]", model: Model, frequency: float) -> "list[Series]":
-    """The series, position measured, each tied to its record by a critically damped observer of this frequency [Hz]."""
+    """The series, each tied to its record by an observer of this frequency [Hz]: critically damped where the position was
+    measured, a damper alone where the velocity was."""
     omega = 2.0 * math.pi * frequency
-    stiffness, damping = model.mass.value * omega**2, 2.0 * model.mass.value * omega
     found = []
     for one in series:
         motion = _motion(one.time, one.value, max(1, one.block // FINER))
-        rate = motion.derivative()
-        cubic = np.vstack([np.zeros((1, rate.c.shape[1])), rate.c])
-        pull = PPoly(stiffness * motion.c + damping * cubic, motion.x, extrapolate=True)
+        if one.measured == "velocity":
+            stiffness, damping = 0.0, model.mass.value * omega
+            holds, pull = damping, PPoly(damping * motion.c, motion.x, extrapolate=True)
+        else:
+            stiffness, damping = model.mass.value * omega**2, 2.0 * model.mass.value * omega
+            rate = motion.derivative()
+            cubic = np.vstack([np.zeros((1, rate.c.shape[1])), rate.c])
+            holds, pull = stiffness, PPoly(stiffness * motion.c + damping * cubic, motion.x, extrapolate=True)
         effort = sum(
             (part(one.centres) for part in (one.command, one.forcing) if part is not None),
             np.zeros(one.blocks),
         )
-        size = float(np.std(effort)) / stiffness
+        size = float(np.std(effort)) / holds
         found.append(replace(one, observer=Observer(stiffness, damping, pull, size)))
     return found
 

@@ -126,7 +126,7 @@ def bandwidth(value: Array, period: float, share: float = 0.9999) -> float:
     total = np.cumsum(power)
     if total[-1] <= 0.0:
         return 0.5 / period
-    return float(np.searchsorted(total, share * total[-1]) / (length * period))
+    return float(max(np.searchsorted(total, share * total[-1]), 1) / (length * period))
 
 
 def block_length(value: Array, period: float) -> int:

@@ -1,7 +1,7 @@
 """Stiffness jump: the linear spring's stiffness becomes k (1 + delta) at the time t_s (a crack, a slipped clamp).
 
-The step is spread over one integration step, so that the motion depends smoothly on t_s. A fit in t_s has local
-minima: it needs a grid of starts.
+The step is spread over one integration step, so that the motion depends smoothly on t_s. A fit in t_s has a minimum for
+every period of the motion: it needs a grid of starts, and hops from there.
 """
 
 from math import inf
@@ -30,9 +30,8 @@ ELEMENT = Element(
     },
     kernel=kernel,
     size="change",
-    starts=lambda s: [
-        {"change": 0.005, "time": share * s.duration} for share in (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)
-    ],
+    starts=lambda s: [{"change": 0.005, "time": k / 12.0 * s.duration} for k in range(1, 12)],
+    hops=lambda s: {"time": 1.0 / s.frequency},
     also_known_as=("crack", "sudden softening", "slipped clamp"),
     family="drift",
     confusable={"stiffness_drift": "a step against a ramp"},
