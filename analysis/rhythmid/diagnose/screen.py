@@ -86,11 +86,7 @@ class Trajectories:
     legs: tuple[Path, ...]
     outputs: tuple[Array, ...]  # of each series at its block centres, as the sensor says
     commands: tuple[Array, ...]
-
-    @property
-    def shaken(self) -> float:
-        """Typical acceleration (rms) of the strongest motion."""
-        return max(float(np.std(np.gradient(path.velocity, path.time))) for path in self.paths)
+    shaken: float  # typical acceleration (rms) of the strongest motion
 
 
 def trajectories(fit: Fit) -> Trajectories:
@@ -121,7 +117,8 @@ def trajectories(fit: Fit) -> Trajectories:
             legs[-1] = replace(paths[-1], position=rows[:, 0] - signal, velocity=rows[:, 1] - rate)
         outputs.append(rows[:, q].copy())
         commands.append(signal)
-    return Trajectories(fit, disturbed, tuple(paths), tuple(legs), tuple(outputs), tuple(commands))
+    shaken = max(float(np.std(np.gradient(path.velocity, path.time))) for path in paths)
+    return Trajectories(fit, disturbed, tuple(paths), tuple(legs), tuple(outputs), tuple(commands), shaken)
 
 
 def _evaluate(signal, time: Array) -> Array:
