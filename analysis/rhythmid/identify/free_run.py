@@ -18,6 +18,7 @@ from rhythmid.signal import impulse_preserving, pieces
 from rhythmid.simulate import physical_times, start_states
 
 Array = NDArray[np.float64]
+DIVERGED = 1e100  # of any unit; squares of what is larger would overflow
 NO_SIGNAL = pieces(None)
 Pieces = tuple[Array, Array]
 
@@ -76,7 +77,7 @@ class FreeRun:
             times, knots, coefficients, *given.forcing, *force,
             compiled.layout.vector(model), np.ascontiguousarray(start), self.max_step, out,
         )  # fmt: skip
-        return out if done == len(times) and np.isfinite(out[-1]).all() else None
+        return out if done == len(times) and float(np.abs(out[-1]).max()) < DIVERGED else None
 
     def outputs(self, model: Model, starts: Sequence[Array]) -> list[Array] | None:
         """Block-averaged outputs of all series from the given starts; None when one of them diverges."""
