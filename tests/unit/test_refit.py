@@ -137,3 +137,27 @@ def test_a_parameter_with_many_minima_is_followed_to_the_deepest_from_one_to_the
         [proposal], [STILL], [np.array([0.15, 0.0])], ("position", "velocity"), QUIET, 1e-3
     )
     assert trials[0].model.value("stiffness_jump.time") == 7.0
+
+
+def test_what_a_guess_fixes_is_kept_with_what_was_fitted_from_it(monkeypatch):
+    """As the side of a stop: a position fitted for the upper one means nothing for the lower one."""
+    element = CATALOGUE["end_stop_contact"]
+
+    def descend(model, run, names, noise, starts, *_, **__) -> Descent:
+        steps = np.full(len(names), 1e-9), np.ones(run.states)
+        chi2 = 100.0 if model.value("end_stop_contact.side") > 0.0 else 900.0
+        return Descent(model, tuple(starts), (), chi2, 64, True, "", (), steps, None)
+
+    monkeypatch.setattr(refit, "descend", descend)
+    monkeypatch.setattr(
+        refit, "fork_map", lambda work, cases: [(i, work(case)) for i, case in enumerate(cases)]
+    )
+    shape = {"stiffness": 100.0, "damping_ratio": 0.1}
+    guesses = [shape | {"position": 0.1, "side": -1.0}, shape | {"position": 0.2, "side": 1.0}]
+    proposal = propose(hopper(), element, guesses, (), 1000.0)
+    trials, _ = run_trials(
+        [proposal], [STILL], [np.array([0.15, 0.0])], ("position", "velocity"), QUIET, 1e-3
+    )
+    found = trials[0].model
+    assert (found.value("end_stop_contact.position"), found.value("end_stop_contact.side")) == (0.2, 1.0)
+    assert trials[0].free == len(found.free)

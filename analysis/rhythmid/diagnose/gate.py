@@ -13,6 +13,7 @@ from rhythmid.compiled import compile_model
 from rhythmid.diagnose.heldout import HeldOut
 from rhythmid.diagnose.refit import Proposal, run_trials, whole_fit
 from rhythmid.diagnose.search import Search
+from rhythmid.errors import InputError
 from rhythmid.identify.series import Series
 
 FAINT = 3.0  # standard deviations from its absence, nearer than which an effect's size is no size
@@ -86,7 +87,10 @@ def _without(found: Search, label: str, pool: ThreadPoolExecutor | None) -> Sear
     )
     if not trials:
         return None
-    fit = whole_fit(trials[0], series, found.noise, step, pool=pool)
+    try:
+        fit = whole_fit(trials[0], series, found.noise, step, pool=pool)
+    except InputError:
+        return None
     others = tuple(trial for trial in found.trials if set(trial.added) != set(rest))
     return replace(
         found, best=trials[0], fit=fit, trials=tuple(sorted((trials[0], *others), key=lambda t: t.bic()))

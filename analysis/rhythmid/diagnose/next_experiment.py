@@ -6,7 +6,7 @@ two fitted rival models predict. Computed with the models at hand, at sizes scal
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from rhythmid.identify.series import Series, dominant_frequency, scales
 from rhythmid.signal import spline, zero_order_hold
 
 Array = NDArray[np.float64]
+HIGHEST = 0.4  # of the sample rate
 LENGTH = 30.0  # periods of the dominant motion
 
 
@@ -34,9 +35,9 @@ class Proposal:
     duration: float
 
 
-def _menu(effort: float, frequency: float, length: float) -> list[tuple[str, dict, float]]:
-    """(words, excitation, factor on the forcing) for a machine of this size."""
-    top = 7.0 * frequency
+def _menu(effort: float, frequency: float, length: float, highest: float) -> list[tuple[str, dict, float]]:
+    """(words, excitation, factor on the forcing) for a machine of this size; nothing beyond the `highest` frequency."""
+    top, above = min(7.0 * frequency, highest), min(21.0 * frequency, highest)
     found: list[tuple[str, dict, float]] = []
     for factor in (0.3, 1.0, 3.0):
         amplitude = factor * effort
@@ -44,8 +45,8 @@ def _menu(effort: float, frequency: float, length: float) -> list[tuple[str, dic
                       {"type": "chirp", "amplitude": amplitude, "band": [0.0, top], "sweep": length}, 1.0))  # fmt: skip
         found.append((f"a step of bias force of {amplitude:.3g}, held for {length / 2:.3g} s and released",
                       {"type": "profile", "points": [[0.0, amplitude], [length / 2, 0.0]], "length": length}, 1.0))  # fmt: skip
-    found.append((f"an odd multisine of {effort:.3g} rms up to {3 * top:.3g} Hz",
-                  {"type": "multisine", "rms": effort, "period": length / 3, "periods": 3, "band": [frequency / 5, 3 * top]},
+    found.append((f"an odd multisine of {effort:.3g} rms up to {above:.3g} Hz",
+                  {"type": "multisine", "rms": effort, "period": length / 3, "periods": 3, "band": [frequency / 5, above]},
                   1.0))  # fmt: skip
     for scale in (0.3, 3.0):
         found.append(
@@ -74,9 +75,7 @@ def _imagined(series: Series, excitation: Excitation, forcing: PPoly | None, fac
         if span < time[-1]:
             return _imagined_shorter(series, excitation, forcing, factor, span)
         scaled = spline(time, factor * np.asarray(forcing(forcing.x[0] + time)))
-    command = zero_order_hold(time, excitation(time))
-    return Series("imagined", time, value, command, scaled, series.block, np.ones(n // series.block, bool), series.period,
-                  series.kind)  # fmt: skip
+    return _played(series, excitation, time, value, scaled)
 
 
 def _imagined_shorter(
@@ -84,9 +83,19 @@ def _imagined_shorter(
 ) -> Series:
     time = np.arange(0.0, span, series.period, dtype=np.float64)
     scaled = spline(time, factor * np.asarray(forcing(forcing.x[0] + time)))
-    n = len(time)
-    return Series("imagined", time, np.resize(series.value, n), zero_order_hold(time, excitation(time)), scaled,
-                  series.block, np.ones(n // series.block, bool), series.period, series.kind)  # fmt: skip
+    return _played(series, excitation, time, np.resize(series.value, len(time)), scaled)
+
+
+def _played(
+    series: Series, excitation: Excitation, time: Array, value: Array, forcing: PPoly | None
+) -> Series:
+    """The series as it would be with another command, in free run."""
+    command = zero_order_hold(time, excitation(time))
+    used = np.ones(len(time) // series.block, bool)
+    return replace(
+        series, name="imagined", time=time, value=value, command=command, forcing=forcing, used=used,
+        ignored=None, observer=None,
+    )  # fmt: skip
 
 
 def separation(a: Trial, b: Trial, series: Sequence[Series], variance: float, step: float) -> list[Proposal]:
@@ -96,7 +105,7 @@ def separation(a: Trial, b: Trial, series: Sequence[Series], variance: float, st
     frequency = dominant_frequency(longest)
     length = min(LENGTH / frequency, longest.time[-1] - longest.time[0])
     found: list[Proposal] = []
-    for words, spec, factor in _menu(sizes.effort, frequency, length):
+    for words, spec, factor in _menu(sizes.effort, frequency, length, HIGHEST / longest.period):
         if factor != 1.0 and longest.forcing is None:
             continue
         excitation = build(spec)

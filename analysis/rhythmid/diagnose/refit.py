@@ -58,9 +58,10 @@ class Trial:
 
 @dataclass(frozen=True)
 class _Outcome:
-    """What a worker sends back of a fit: plain numbers."""
+    """What a worker sends back of a fit: plain numbers. `values` are of all parameters, for guesses differ in fixed ones, too."""
 
     values: dict[str, float]
+    free: int
     starts: tuple[Array, ...]
     chi2: float
     samples: int
@@ -69,8 +70,10 @@ class _Outcome:
 
 
 def _outcome(end: Descent) -> _Outcome:
-    values = {name: end.model.value(name) for name in end.model.free}
-    return _Outcome(values, end.starts, end.chi2, end.samples, end.converged, end.differences)
+    values = {name: value.value for name, value in end.model.parameters.items()}
+    return _Outcome(
+        values, len(end.model.free), end.starts, end.chi2, end.samples, end.converged, end.differences
+    )
 
 
 def _trial(added: tuple[str, ...], model: Model, done: _Outcome, noise: NoiseModel) -> Trial:
@@ -81,7 +84,7 @@ def _trial(added: tuple[str, ...], model: Model, done: _Outcome, noise: NoiseMod
         done.starts,
         done.chi2,
         done.samples,
-        len(done.values),
+        done.free,
         done.converged,
         noise,
         done.differences,

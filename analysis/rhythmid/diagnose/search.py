@@ -207,6 +207,7 @@ def search(
             proposals, series, best.starts, current.run.compiled.layout.states, noise, step, enough
         )
         excluded += failed
+        found = [t for t in found if t.chi2 < best.chi2]  # a richer model that does worse got lost
         if not found:
             break
         trials |= {tuple(sorted(t.added)): t for t in found}

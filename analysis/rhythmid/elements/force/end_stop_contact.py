@@ -25,11 +25,12 @@ def kernel(x, v, t, f, stiffness, damping_ratio, position, side, mass, step):
 
 
 def starts(scales):
-    margin = 0.1 * (scales.high - scales.low)
-    shape = {"stiffness": 0.3 * scales.stiffness, "damping_ratio": 0.1}
+    """A soft stop some way in, and a stiff one that is hardly touched, at either end."""
+    travel = scales.high - scales.low
     return [
-        {**shape, "position": scales.low + margin, "side": -1.0},
-        {**shape, "position": scales.high - margin, "side": 1.0},
+        {"stiffness": stiffness * scales.stiffness, "damping_ratio": 0.1, "position": place, "side": side}
+        for stiffness, depth in ((0.3, 0.1), (3.0, 0.02))
+        for place, side in ((scales.low + depth * travel, -1.0), (scales.high - depth * travel, 1.0))
     ]
 
 
