@@ -16,8 +16,8 @@ import numpy as np
 from rhythmid.diagnose.calibrate import Calibration, calibrate, reconstructed
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.force_scoring import observed
 from rhythmid.identify.multiple_shooting import LEAST, forgets, periods_long, windows
-from rhythmid.identify.observer import observed
 from rhythmid.identify.output_error import Fit
 from rhythmid.identify.series import Series, bandwidth, hold_out_tail
 from rhythmid.model import Model

@@ -1,16 +1,9 @@
-"""Force scoring: the recorded motion draws the simulated machine along, through a spring and a damper.
+"""An observer: the recorded motion draws the simulated machine along, through a spring and a damper.
 
-D. G. Luenberger, IEEE Trans. Autom. Control 16 (1971) 596. Where a machine integrates, or sticks and slips, a free run adds
-up every small disturbance until it means nothing. Tied to the record it cannot get far: what it stays behind by is the
-force that the model lacks, seen through 1 / (m s² + d s + k). This is inverse dynamics without a derivative of the
-measurement: force and simulation are compared below the observer's bandwidth, and all else goes on as in a free run.
-A machine of which the velocity was measured is drawn by the damper alone; what it lags behind is the force over m s + d.
+D. G. Luenberger, IEEE Trans. Autom. Control 16 (1971) 596. `force_scoring` says what it is for.
 """
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +12,9 @@ from scipy.interpolate import PPoly
 from rhythmid.compiled import Compiled
 from rhythmid.elements.element import Element, Parameter
 from rhythmid.model import Model
-from rhythmid.signal import shifted, spline
-
-if TYPE_CHECKING:
-    from rhythmid.identify.series import Series
+from rhythmid.signal import shifted
 
 Array = NDArray[np.float64]
-FINER = 4  # times as many averages a second in the motion that pulls as in those that are compared
 
 
 def _kernel(x, v, t, f, stiffness, damping):
@@ -59,39 +48,6 @@ class Observer:
         """Force on the mass [N] over physical time, the measurement being `late` [s] behind it, and a further one."""
         moved = shifted(self.pull, -late)
         return moved if further is None else _sum(moved, further)
-
-
-def observed(series: "Sequence[Series]", model: Model, frequency: float) -> "list[Series]":
-    """The series, each tied to its record by an observer of this frequency [Hz]: critically damped where the position was
-    measured, a damper alone where the velocity was."""
-    omega = 2.0 * math.pi * frequency
-    found = []
-    for one in series:
-        motion = _motion(one.time, one.value, max(1, one.block // FINER))
-        if one.measured == "velocity":
-            stiffness, damping = 0.0, model.mass.value * omega
-            holds, pull = damping, PPoly(damping * motion.c, motion.x, extrapolate=True)
-        else:
-            stiffness, damping = model.mass.value * omega**2, 2.0 * model.mass.value * omega
-            rate = motion.derivative()
-            cubic = np.vstack([np.zeros((1, rate.c.shape[1])), rate.c])
-            holds, pull = stiffness, PPoly(stiffness * motion.c + damping * cubic, motion.x, extrapolate=True)
-        effort = sum(
-            (part(one.centres) for part in (one.command, one.forcing) if part is not None),
-            np.zeros(one.blocks),
-        )
-        size = float(np.std(effort)) / holds
-        found.append(replace(one, observer=Observer(stiffness, damping, pull, size)))
-    return found
-
-
-def _motion(time: Array, value: Array, block: int) -> PPoly:
-    """Spline through averages of the measurement, which a bent motion moves by a 24th of its second difference."""
-    count = len(time) // block
-    centres, averages = (a[: count * block].reshape(count, block).mean(axis=1) for a in (time, value))
-    bend = np.zeros(count)
-    bend[1:-1] = np.diff(averages, 2)
-    return spline(centres, averages - (1.0 - 1.0 / block**2) / 24.0 * bend)
 
 
 def with_observer(model: Model, observer: Observer | None) -> Model:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rhythmid.identify.observer import observed
+from rhythmid.identify.force_scoring import observed
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
