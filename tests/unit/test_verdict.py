@@ -111,3 +111,15 @@ def test_what_noise_leaves_on_held_out_data_is_nothing_and_what_stays_is_told_as
     assert HeldOut(calm, None).uncarried() == 0.0
     left = replace(found, fit=explained(0.01, 0.01, 0.05).fit)
     assert HeldOut(left, None).uncarried() == pytest.approx(0.05**2 / (0.1**2 + 0.09**2), rel=0.2)
+
+
+@pytest.mark.parametrize(("p_value", "expected"), [(3e-3, "undecided"), (1e-9, "unknown_physics")])
+def test_more_than_repeats_show_is_unknown_physics_only_where_the_catalogue_sees_it_too(p_value, expected):
+    """Rounding repeats with the motion, so that repeats can show less noise than there is."""
+    nothing = replace(
+        explained(0.01, 0.01),
+        best=replace(trial(hopper(), "coulomb_friction", force=0.1, transition=0.01), added=()),
+    )
+    repeats = NoiseModel(np.empty(0), 0.8 * 0.01 * float(np.std(SERIES.value)))
+    verdict, _ = verdict_of(nothing, p_value, [], [], repeats, [SERIES], 0.0)
+    assert verdict == expected

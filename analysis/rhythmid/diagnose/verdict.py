@@ -81,7 +81,9 @@ def verdict_of(
             f"a line at {line.frequency:.3g} Hz remains that nothing in the catalogue explains",
         )
     if not found.best.added:
-        if too_big:
+        if (
+            too_big and p_value < REMAINDER_LEVEL
+        ):  # rounding repeats, too, and makes repeats look better than they are
             return "unknown_physics", "no element of the catalogue explains what the nominal model leaves"
         if remains and remains[0].explained > 0.2 and p_value < LEVEL:
             return "unknown_physics", "no element of the catalogue explains what the nominal model leaves"
