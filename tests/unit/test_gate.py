@@ -23,7 +23,7 @@ def found(name: str, values: dict[str, float], size: str, std: float, gain: floa
     best = Trial((name,), model, (), 100.0, 1000, len(model.free), True, QUIET)
     none = Trial((), hopper(), (), 110.0, 1000, len(hopper().free), True, QUIET)
     fit = SimpleNamespace(
-        model=model, std={f"{name}.{size}": std}, chi2=100.0, nrmse=lambda unused=False: math.nan
+        model=model, std={f"{name}.{size}": std}, chi2=100.0, nrmse=lambda hidden=False: math.nan
     )
     nominal = SimpleNamespace(model=hopper(), std={}, chi2=100.0 + gain)
     return Search(cast(Fit, nominal), best, cast(Fit, fit), QUIET, (best, none), (), ())

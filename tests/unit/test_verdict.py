@@ -82,7 +82,7 @@ def explained(nominal: float, left: float, held: float = 0.0) -> Search:
         residual[~used] += (
             np.std(SERIES.value) * (held + nominal - left) * np.sqrt(2) * np.sin(6 * TIME[~used])
         )
-        series = replace(SERIES, used=used)
+        series = replace(SERIES, used=used, hidden=~used)
         chi2 = float(np.sum((residual[used] / (0.01 * np.std(SERIES.value))) ** 2))
         run = SimpleNamespace(series=(series,))
         fits.append(SimpleNamespace(run=run, residuals=(residual,), chi2=chi2, nrmse=lambda size=size: size))

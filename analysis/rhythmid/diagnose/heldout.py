@@ -45,7 +45,7 @@ class HeldOut:
             return None if fit is None else fit.nrmse()
         if own is None:
             return None
-        value = own.nrmse(unused=True)
+        value = own.nrmse(hidden=True)
         return None if math.isnan(value) else value
 
     def uncarried(self) -> float:
@@ -56,7 +56,7 @@ class HeldOut:
         """
         fits = [self._found.fit, self._found.nominal]
         if self._separate is None:
-            unseen = [_stretches(fit, unused=True) for fit in fits]
+            unseen = [_stretches(fit, hidden=True) for fit in fits]
         else:
             again = [self.fit(fit.model) for fit in fits]
             unseen = [[] if fit is None else _stretches(fit) for fit in again]
@@ -71,12 +71,12 @@ class HeldOut:
         return 0.0 if chosen < NOISE * floor else (chosen - floor) / max(nominal - floor, chosen - floor)
 
 
-def _stretches(fit: Fit, unused: bool = False) -> list[Array]:
-    """The residual where it counts, or where it does not, in stretches without a gap that are long enough to judge."""
+def _stretches(fit: Fit, hidden: bool = False) -> list[Array]:
+    """The residual where the fit saw it, or where it was hidden, in stretches without a gap that are long enough to judge."""
     parts = [
         residual[stretch]
         for residual, one in zip(fit.residuals, fit.run.series)
-        for stretch in runs(~one.used if unused else one.used)
+        for stretch in runs(one.counted(hidden))
     ]
     return [part for part in parts if len(part) > 2]
 

@@ -72,16 +72,16 @@ class Fit:
         """Steps of parameters (p,) and initial states (q,) by which the sensitivities were taken."""
         return np.abs(self.linearisation.steps), self.linearisation.state_steps
 
-    def nrmse(self, unused: bool = False) -> float:
-        """rms(simulated − measured) / std(measured) over the averages used, or over the unused ones."""
-        return normalised_error(self.residuals, self.run.series, unused)
+    def nrmse(self, hidden: bool = False) -> float:
+        """rms(simulated − measured) / std(measured) over the averages used, or over the hidden ones."""
+        return normalised_error(self.residuals, self.run.series, hidden)
 
 
-def normalised_error(residuals: Sequence[Array], series: Sequence[Series], unused: bool = False) -> float:
-    """rms(simulated − measured) / std(measured) over the averages used, or over the unused ones; nan without any."""
+def normalised_error(residuals: Sequence[Array], series: Sequence[Series], hidden: bool = False) -> float:
+    """rms(simulated − measured) / std(measured) over the averages used, or over the hidden ones; nan without any."""
     error, spread = 0.0, 0.0
     for one, residual in zip(series, residuals):
-        mask = ~one.used if unused else one.used
+        mask = one.counted(hidden)
         if not mask.any():
             continue
         error += float(np.sum(residual[mask] ** 2))

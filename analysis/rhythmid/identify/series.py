@@ -32,7 +32,8 @@ class Series:
     """One record's measurement with its inputs as functions of time.
 
     `time` (n,) [s] and `value` (n,) are the stamps and samples of the measurement; `block` samples are averaged into
-    one; `used` (n // block,) marks the averages that the fit may see; `period` [s] is the usual sample period.
+    one; `used` (n // block,) marks the averages that the fit may see, `hidden` those that are kept from it to be judged by;
+    what is in neither, like a gap, counts for nothing. `period` [s] is the usual sample period.
     `ignored` (n // block, q) are signals any multiple of which the averages may contain, so that nothing is learnt from
     them (the limit cycle's harmonics, where the cycle is not to be used). `observer` ties simulations to the record.
     """
@@ -49,6 +50,7 @@ class Series:
     measured: OutputKind = "position"
     ignored: Array | None = None
     observer: Observer | None = None
+    hidden: Mask | None = None
 
     @property
     def blocks(self) -> int:
@@ -84,6 +86,12 @@ class Series:
     def averaged(self) -> Array:
         """Block averages of the measurement."""
         return self.average(self.value)
+
+    def counted(self, hidden: bool = False) -> Mask:
+        """The averages (n // block,) that the fit sees, or those hidden from it."""
+        if not hidden:
+            return self.used
+        return np.zeros(self.blocks, bool) if self.hidden is None else self.hidden
 
     @property
     def whole(self) -> str:
@@ -204,7 +212,7 @@ def hold_out_tail(series: Sequence[Series], share: float = 0.2) -> tuple[list[Se
     seen, unseen = [], []
     for one in series:
         last = np.arange(one.blocks) >= round((1.0 - share) * one.blocks)
-        seen.append(replace(one, used=one.used & ~last))
+        seen.append(replace(one, used=one.used & ~last, hidden=one.used & last))
         unseen.append(replace(one, used=one.used & last))
     return seen, unseen
 
