@@ -176,7 +176,7 @@ def test_clipped_samples_are_left_out_and_counted(rubbing):
     clipped = [limited(one, 0.97) for one in rubbing]
     count = sum(int(clipped_samples(one.output.value).sum()) for one in clipped)
     assert count > 200
-    found = run(clipped, catalogue=CATALOGUE)
+    found = run(clipped)
     assert found.verdict == "missing_physics"
     assert [effect.element for effect in found.missing] == ["coulomb_friction"]
     said = [note for note in found.notes if "clipped" in note]

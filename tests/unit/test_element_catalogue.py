@@ -44,12 +44,7 @@ RELEASE = (0.25, 0.0)  # above the rest length, so that the hopper lifts off
 
 def starts_of(name, scales):
     element = CATALOGUE[name]
-    guesses = element.starts(scales) if element.starts else [WITHOUT_STARTS[name]]
-    if (
-        name == "switching_threshold"
-    ):  # no sharper than what the falling mass gains in a step of a millisecond
-        guesses = [guess | {"transition": 0.01} for guess in guesses]
-    return guesses
+    return element.starts(scales) if element.starts else [WITHOUT_STARTS[name]]
 
 
 def output(model: Model, max_step: float = 1e-3, command=CHIRP) -> np.ndarray:

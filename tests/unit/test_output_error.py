@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from machines import CATALOGUE, SHORT, hopper, record, records
 from rhythmid.errors import InputError
@@ -104,6 +105,23 @@ def test_block_averages_of_the_simulation_equal_averages_of_its_samples():
     series = prepare(records(hopper(), SHORT[1:2], std=0.0), block=5)[0]
     centre = series.value[2::5][: series.blocks]
     assert np.abs(series.of_block(centre) - series.averaged)[1:-1].max() < 2e-7
+
+
+@pytest.mark.parametrize("missing", ["one sample here and there", "a gap", "a little more than a block"])
+def test_block_averages_agree_where_samples_are_missing(missing):
+    one = records(hopper(), SHORT[1:2], std=0.0)[0]
+    whole = one.output
+    place = np.arange(len(whole.time))
+    lost = {
+        "one sample here and there": np.random.default_rng(1).random(len(place)) < 0.03,
+        "a gap": (place > 3000) & (place < 3037),
+        "a little more than a block": place % 500 < 6,
+    }[missing]
+    kept = replace(whole, time=whole.time[~lost], value=whole.value[~lost])
+    series = prepare([replace(one, output=kept)], block=5)[0]
+    wrong = series.of_block(CubicSpline(whole.time, whole.value)(series.centres)) - series.averaged
+    assert 0.9 < np.mean(series.used) <= 1.0
+    assert np.abs(wrong[1:-1][series.used[1:-1]]).max() < 2e-7
 
 
 def test_slow_motion_is_averaged_and_fast_motion_is_not():

@@ -20,7 +20,7 @@ LINE_SHARE = 0.05  # of the residual's power, from which a line in it is a matte
 LINE_WORTH = 0.1  # of the power that the named effects explain, below which a line is their imperfection
 # of the power that the named effects explain, beyond which a structured remainder says that they only imitate what is
 # there: true effects of the concealed proof left 0.00005 at most, imitations 0.012 to 0.03, a real circuit (Silverbox) 0.002
-LEFTOVER = 0.01
+LEFTOVER = 0.005
 UNCARRIED = 0.05  # of what was missing on held-out records, beyond which an explanation does not hold there
 PERIODS = 4  # of the dominant motion, below which a record says nothing
 

@@ -21,6 +21,7 @@ from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.signal import continuous, fast_length, spline
 
+REACH = 2  # blocks on either side from which `of_block` takes differences
 REST_LENGTH = "linear_spring.rest_length"
 FAINT = 1e-4  # of the inertia's own stiffness m ω², below which a spring sets no scale
 Array = NDArray[np.float64]
@@ -71,16 +72,35 @@ class Series:
         """Block averages (n,) of a smooth signal from its values at the blocks' centres, by central differences.
 
         The average over b samples is a sum D = 1 + a δ² + c δ⁴ + … of differences between neighbouring blocks, exact to the
-        fourth order in frequency; at the ends the differences are extrapolated.
+        fourth order in frequency; at the ends the differences are extrapolated. Where samples are missing, δ² is the divided
+        difference over the times that there are, and a the spread of those times about their mean.
         """
         if self.block == 1 or len(samples) < 8:
             return samples
         once = 1.0 / self.block**2
-        a = (1.0 - once) / 24.0
-        c = (1.0 / 120.0 - once / 36.0 + 7.0 * once**2 / 360.0) / 16.0 - a / 12.0
-        bend = np.diff(samples, 2)
-        twist = np.diff(bend, 2)
-        return samples + a * _extended(bend, 1) + c * _extended(twist, 2)
+        c = (1.0 / 120.0 - once / 36.0 + 7.0 * once**2 / 360.0) / 16.0 - (1.0 - once) / 288.0
+        bend = _extended(self._bend(samples), 1)
+        return samples + self._spread * bend + c * _extended(np.diff(bend, 2), 1)
+
+    def _bend(self, samples: Array) -> Array:
+        """δ² of values at the blocks' centres: their second derivative times the usual distance of blocks, squared."""
+        before, after = self._weights
+        slope = np.diff(samples)
+        return after * slope[1:] - before * slope[:-1]
+
+    @cached_property
+    def _weights(self) -> tuple[Array, Array]:
+        """What δ² takes of the step before a block and of the one after it; both 1 where no sample is missing."""
+        apart = np.diff(self.centres) / (self.block * self.period)
+        around = 0.5 * (apart[1:] + apart[:-1])
+        return 1.0 / (around * apart[:-1]), 1.0 / (around * apart[1:])
+
+    @cached_property
+    def _spread(self) -> Array:
+        """Half the variance of the sample times in each block, over the usual distance of blocks squared: a of D."""
+        kept = self.time[: self.blocks * self.block]
+        away = (kept - np.repeat(self.centres, self.block)) / (self.block * self.period)
+        return 0.5 * (away**2).reshape(self.blocks, self.block).mean(axis=1)
 
     @cached_property
     def averaged(self) -> Array:
@@ -199,12 +219,17 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
 
 
 def _whole_blocks(series: Series, block: int) -> Mask:
-    """Blocks that no gap runs through."""
+    """Blocks that no gap runs through, nor past their neighbours, whose differences `of_block` takes."""
     n = len(series.time) // block
     if block == 1:
         return np.ones(n, bool)
     times = series.time[: n * block].reshape(n, block)
-    return times[:, -1] - times[:, 0] < 1.5 * block * series.period
+    most = 1.5 * block * series.period
+    broken = times[:, -1] - times[:, 0] >= most
+    apart = np.flatnonzero(np.diff(times.mean(axis=1)) >= most)  # between this block and the next
+    for near in range(1 - REACH, REACH + 1):
+        broken[np.clip(apart + near, 0, n - 1)] = True
+    return ~broken
 
 
 def hold_out_tail(series: Sequence[Series], share: float = 0.2) -> tuple[list[Series], list[Series]]:

@@ -1,23 +1,22 @@
 """Switching threshold: the direction-switched damper turns on at v = v_th instead of v = 0.
 
-As an addition to the nominal damper: F = -(c_s - c_f) v ([v > v_th] - [v > 0]). The force now jumps at the switch.
-Both brackets are smoothed alike, so that the effect vanishes exactly at v_th = 0 and can be differentiated with respect
-to v_th: [v > a] = 4/3 s((v - a) / w) - 1/3 s((v - a) / 2w) with s(z) = (1 + tanh z) / 2. The second moments of the two
-cancel, so that the motion depends on w to the fourth order only, and w need not be small beside v_th.
-The effect grows with the square of small thresholds: fits need starts of physical size.
+A modifier of the leg's forces: it adds -(c_s - c_f) v ([v > v_th] - [v > 0]) to the nominal damper. The force now jumps at
+the switch; both brackets are averaged over the speed gained in one integration step, as the forces on the mass tell. So the
+effect vanishes exactly at v_th = 0, can be differentiated with respect to v_th, and stays sharp where the speed turns round
+just at the threshold. The effect grows with the square of small thresholds: fits need starts of physical size.
 """
 
 import math
 
-from rhythmid.elements.element import Element, Parameter
+from rhythmid.elements.element import STEP, Element, Parameter
 
 
-def kernel(x, v, t, f, threshold, transition, stance, flight):
-    narrow = 1.0 / max(transition, 1e-300)
-    wide = 0.5 * narrow
-    late = (math.tanh((v - threshold) * narrow) - math.tanh(v * narrow)) * 2.0 / 3.0
-    late -= (math.tanh((v - threshold) * wide) - math.tanh(v * wide)) / 6.0
-    return -(stance - flight) * v * late
+def kernel(leg, x, v, t, f, threshold, transition, stance, flight, mass, gravity, step):
+    gained = abs((leg + f) / mass - gravity) * step  # speed, in one step
+    half = max(transition, 0.5 * gained, 1e-300)
+    beyond = min(1.0, max(0.0, 0.5 + 0.5 * (v - threshold) / half))
+    upward = min(1.0, max(0.0, 0.5 + 0.5 * v / half))
+    return leg - (stance - flight) * v * (beyond - upward)
 
 
 ELEMENT = Element(
@@ -30,18 +29,23 @@ ELEMENT = Element(
         Parameter(
             "transition",
             "m/s",
-            "speed w over which it switches",
+            "speed either side of v_th over which it switches",
             bounds=(0.0, math.inf),
-            default=1e-3,
+            default=0.0,
             fixed=True,
         ),
     ),
-    borrows={"stance": ("switched_damper.stance", None), "flight": ("switched_damper.flight", None)},
+    borrows={
+        "stance": ("switched_damper.stance", None),
+        "flight": ("switched_damper.flight", None),
+        "mass": ("inertia.mass", None),
+        "gravity": ("gravity.acceleration", 0.0),
+        "step": (STEP, 1e-3),
+    },
     kernel=kernel,
+    acts="modifier",
     size="threshold",
-    starts=lambda s: [
-        {"threshold": sign * 0.3 * s.velocity, "transition": 0.005 * s.velocity} for sign in (1.0, -1.0)
-    ],
+    starts=lambda s: [{"threshold": sign * 0.3 * s.velocity} for sign in (1.0, -1.0)],
     also_known_as=("late damping", "valve opening speed"),
     family="damping",
     confusable={
