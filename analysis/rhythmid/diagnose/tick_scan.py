@@ -2,8 +2,9 @@
 
 After a time T an error dP of the period P has moved the ticks by T dP / P; once that is half a period the likelihood has
 forgotten their phase. What a hold does to the size of the response it still knows, and that tells the rate 1/P roughly: a
-coarse scan leaves a band of rates. They are tried on a grid of 1 / (4 T), over a first stretch where the whole record asks
-for too many, and the best of them followed while the grid gets finer. The mean delay, of which half a period is the
+coarse scan leaves a band of rates. Slow rates join it in any case, for their images of the command lie where the machine
+answers, and ticks of the wrong phase hide the right rate there. The rates are tried on a grid of 1 / (4 T), over a first
+stretch where the whole record asks for too many, and the best of them followed while the grid gets finer. The mean delay, of which half a period is the
 hold's, is kept at first, and shifted a little with the rate in the end: it decides which command a tick finds. What small
 changes of the other parameters and of the initial states do is projected off each residual.
 """
@@ -27,6 +28,7 @@ HOLD, PERIOD, DELAY = "command_hold", "command_hold.period", "input_delay.delay"
 COARSE = 50  # rates of the coarse scan
 # of the way from the best to the middling cost of the coarse scan, up to which a rate is in the band
 BAND = 0.5
+SLOW = 2.5  # times the slowest rate, up to which rates join the band
 MOST = 3000  # rates tried over the first stretch
 SERIES = 2  # looked at, those with the strongest command at first
 FASTEST = 100.0  # [Hz] beyond which a hold is little but a delay, and its ticks do not matter
@@ -75,9 +77,11 @@ def scanned(
         return []
     near = cases[costs <= costs[0] + BAND * (np.median(costs) - costs[0]), 0]
     low, high = near.min() / 1.05, near.max() * 1.05
-    length = min(whole, 0.25 * MOST / (high - low))
+    slow = min(SLOW * slowest, low)
+    length = min(whole, 0.25 * MOST / (high - low + slow - slowest))
     spacing, late = 0.25 / length, 0.5 * chosen[0].period
-    cases, _ = best_of(length, _unshifted(np.arange(low, high, spacing)), cases[0])
+    rates = np.concatenate([np.arange(slowest, slow, spacing), np.arange(low, high, spacing)])
+    cases, _ = best_of(length, _unshifted(rates), cases[0])
     while spacing > FINEST / longest:
         length = min(2.0 * length, whole)
         around = np.array(
