@@ -42,7 +42,8 @@ def launch_file(monkeypatch):
         for name in classes:
             setattr(made, name, type(name, (Action,), {}))
         monkeypatch.setitem(sys.modules, module, made)
-    sys.modules["launch.substitutions"].LaunchConfiguration = Configuration  # type: ignore[attr-defined]
+    substitutions = sys.modules["launch.substitutions"]
+    monkeypatch.setattr(substitutions, "LaunchConfiguration", Configuration, raising=False)
     spec = importlib.util.spec_from_file_location(
         "experiment_launch", BRINGUP / "launch" / "experiment.launch.py"
     )

@@ -1,6 +1,7 @@
 """The gate of free-run error: an effect whose size may as well be nothing is dropped, whatever it predicts."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -65,3 +66,18 @@ def test_an_effect_that_is_needed_stays_however_uncertain_its_size():
     friction = found("coulomb_friction", FRICTION, "force", 0.02, gain=10.0 * NEEDED)
     left, told = admitted(friction, None)
     assert left is friction and told == ()
+
+
+def test_an_effect_stays_where_the_model_cannot_follow_the_records_without_it(monkeypatch):
+    model = hopper().with_element(CATALOGUE["coulomb_friction"], FRICTION)
+    both = model.with_element(CATALOGUE["quadratic_drag"], {"coefficient": 0.5})
+    friction = found("coulomb_friction", FRICTION, "force", 0.02)
+    best = replace(friction.best, added=("coulomb_friction", "quadratic_drag"), model=both)
+    std = {"coulomb_friction.force": 0.02, "quadratic_drag.coefficient": 1e-3}
+    fit = SimpleNamespace(
+        **vars(friction.fit) | {"model": both, "std": std, "run": SimpleNamespace(series=(), max_step=1e-3)}
+    )
+    two = replace(friction, best=best, fit=cast(Fit, fit))
+    monkeypatch.setattr("rhythmid.diagnose.gate.run_trials", lambda *_: ([], ["coulomb_friction diverged"]))
+    left, told = admitted(two, None)
+    assert left is two and told == ()

@@ -130,6 +130,23 @@ def test_slow_motion_is_averaged_and_fast_motion_is_not():
     assert block_length(np.sin(2 * np.pi * 200.0 * t), 1e-3) == 1
 
 
+def test_a_motionless_record_is_not_averaged():
+    assert block_length(np.full(2000, 0.3), 1e-3) == 1
+
+
+@pytest.mark.parametrize("what", ["output", "input", "forcing"])
+def test_values_that_are_not_finite_are_refused_with_their_place(what):
+    one = records(hopper(), SHORT[:1])[0]
+    channel = getattr(one, what)
+    value = channel.value.copy()
+    value[[700, 900]] = np.nan, np.inf
+    broken = replace(one, **{what: replace(channel, value=value)})
+    with pytest.raises(
+        InputError, match=f"2 values of the {what} are not finite, the first of them at t = 0.7"
+    ):
+        prepare([broken])
+
+
 @pytest.mark.parametrize(
     ("name", "values"), [("backlash", {"width": 0.4}), ("actuator_rate_limit", {"rate": 6.0})]
 )

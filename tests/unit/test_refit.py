@@ -9,8 +9,8 @@ import pytest
 from machines import CATALOGUE, hopper
 from rhythmid.diagnose import refit
 from rhythmid.diagnose.refit import Proposal, Trial, propose, run_trials
+from rhythmid.identify.descent import Descent
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.output_error import Descent
 from rhythmid.identify.series import Series
 
 QUIET = NoiseModel(np.empty(0), 1.0)

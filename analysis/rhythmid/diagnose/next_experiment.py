@@ -16,8 +16,8 @@ from rhythmid.diagnose.refit import Trial, fine_enough
 from rhythmid.diagnose.search import Search
 from rhythmid.excitation.excitation import Excitation
 from rhythmid.excitation.sequence import build
+from rhythmid.identify.descent import first_guess
 from rhythmid.identify.free_run import prepare_run
-from rhythmid.identify.output_error import first_guess
 from rhythmid.identify.series import Series, dominant_frequency, scales
 from rhythmid.signal import spline, zero_order_hold
 

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.tick_scan import HOLD, scanned
 from rhythmid.elements.element import ELAPSED, STEP, Element
 from rhythmid.errors import InputError
+from rhythmid.identify.descent import Descent, descend
 from rhythmid.identify.free_run import FreeRun, prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.output_error import Descent, Fit, descend, minimise
+from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.identify.series import Series, scales
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
@@ -186,11 +187,19 @@ def _fit_proposal(
         back = best.model.with_values({name: proposal.guesses[0][name] for name in flat})
         again = descend(back, run, names, noise, best.starts, BRIEF, None, TOLERANCE)
         best = min(best, again, key=lambda end: end.chi2)
-    element, label = proposal.model.terms[-1].element, proposal.added[-1] if proposal.added else ""
-    if element.hops is not None and proposal.model.terms[-1].label == label and best.chi2 < proposal.ceiling:
-        for name, distance in element.hops(scales(series, proposal.model)).items():
-            best = _hopped(best, run, names, noise, f"{label}.{name}", distance)
+    hops = _hops(proposal, series) if best.chi2 < proposal.ceiling else {}
+    for name, distance in hops.items():
+        best = _hopped(best, run, names, noise, name, distance)
     return _outcome(best)
+
+
+def _hops(proposal: Proposal, series: Sequence[Series]) -> dict[str, float]:
+    """Parameters of the newest effect that have many minima, and how far these lie apart."""
+    newest = proposal.model.term(proposal.added[-1]) if proposal.added else None
+    if newest is None or newest.element.hops is None:
+        return {}
+    apart = newest.element.hops(scales(series, proposal.model))
+    return {f"{newest.label}.{name}": distance for name, distance in apart.items()}
 
 
 def _hopped(

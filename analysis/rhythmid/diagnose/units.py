@@ -12,8 +12,9 @@ import numpy as np
 from scipy.interpolate import PPoly
 
 from rhythmid.errors import InputError
+from rhythmid.identify.descent import WHITE, first_guess
 from rhythmid.identify.free_run import prepare_run
-from rhythmid.identify.output_error import WHITE, estimate, first_guess
+from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import Model
 

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import PPoly
 
+from rhythmid.identify.descent import first_guess
 from rhythmid.identify.free_run import prepare_run
-from rhythmid.identify.output_error import first_guess
 from rhythmid.identify.series import Array, Series, dominant_frequency
 from rhythmid.model import Model
 from rhythmid.signal import first_order_hold

@@ -1,9 +1,4 @@
-"""Output-error estimation in the time domain: parameters and initial states that make the free run fit the records.
-
-The initial state of every series is a nuisance: it is eliminated from each Levenberg-Marquardt step by projection
-(variable projection, G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, in the form of L. Kaufman, BIT 15 (1975) 49),
-so the normal equations stay as small as the number of parameters however many series there are.
-"""
+"""Output-error estimation in the time domain: a fit of the free run to the records, with its sensitivities and covariance."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -13,20 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.errors import InputError
 from rhythmid.identify.covariance import covariance_of, on_the_edge
+from rhythmid.identify.descent import WHITE, Descent, descend, first_guess
 from rhythmid.identify.faint_directions import faint, with_faint_directions
-from rhythmid.identify.free_run import FreeRun, accurate, prepare_run, start_of
+from rhythmid.identify.free_run import FreeRun, accurate, prepare_run
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
-from rhythmid.identify.sensitivity import Linearisation, Problem, state_update
-from rhythmid.identify.series import Series, dominant_frequency
-from rhythmid.identify.start_memory import sought
+from rhythmid.identify.sensitivity import Linearisation, Problem
+from rhythmid.identify.series import Series
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-WHITE = NoiseModel(np.empty(0), 1.0)
-STAY = 0.1  # share of its distance from a lower bound that one step leaves a parameter: a width of zero is hard to leave
-BRINK = 1e-3  # share of its first distance within which it may reach the bound
 LOST = 0.3  # error, as a share of the motion, above which a model has lost the machine
 # chi2 that it may cost to put a parameter on its bound where the fit says that it cannot tell
 FALSE_EDGE = 25.0
@@ -89,73 +80,6 @@ def normalised_error(residuals: Sequence[Array], series: Sequence[Series], hidde
     return math.sqrt(error / spread) if spread > 0 else math.nan
 
 
-def first_guess(model: Model, run: FreeRun) -> list[Array]:
-    """State at the first block of each series: position and slope of a straight line through its first samples."""
-    found: list[Array] = []
-    for index, one in enumerate(run.series):
-        span = 0.05 / max(dominant_frequency(one), 1e-9)
-        n = int(np.clip(round(span / one.period), 3, max(len(one.time) // 4, 3)))
-        slope, level = np.polyfit(one.time[:n] - one.time[0], one.value[:n], 1)
-        begin = {"position": (level, slope), "velocity": (0.0, level), "acceleration": (0.0, 0.0)}[
-            one.measured
-        ]
-        if one.kind == "base_displacement" and one.command is not None and one.measured != "position":
-            begin = float(one.command(one.centres[0])) + begin[0], begin[1]
-        found.append(start_of(model, run, index, float(begin[0]), float(begin[1])))
-    return found
-
-
-def _first_steps(model: Model, names: Sequence[str], run: FreeRun) -> Array:
-    steps = []
-    for name in names:
-        value = model.parameters[name]
-        low, high = value.bounds
-        size = abs(value.value)
-        if size == 0.0:
-            size = min(run.series[0].period, 1.0) if value.unit == "s" else 1e-2
-            if math.isfinite(high) and math.isfinite(low):
-                size = 0.1 * (high - low)
-        steps.append(1e-4 * size)
-    return np.array(steps)
-
-
-def _step(jacobian: Array, residual: Array, damping: float, blocked: NDArray[np.bool_]) -> Array:
-    """Levenberg-Marquardt step in the parameters that are not blocked at a bound."""
-    free = ~blocked
-    step = np.zeros(jacobian.shape[1])
-    if not free.any():
-        return step
-    j = jacobian[:, free]
-    norms = np.linalg.norm(j, axis=0)
-    norms[norms == 0.0] = 1.0
-    scaled = j / norms
-    hessian = scaled.T @ scaled
-    step[free] = -np.linalg.lstsq(
-        hessian + damping * np.eye(len(hessian)), scaled.T @ residual, rcond=1e-13
-    )[0] / norms  # fmt: skip
-    return step
-
-
-@dataclass(frozen=True)
-class Descent:
-    """Where a search for the best parameters ended: what a `Fit` holds, without the sensitivities there.
-
-    `differences` are the steps (p,) and (q,) of parameters and initial states by which sensitivities are taken;
-    `linearisation` is there where the last one was taken at the end itself.
-    """
-
-    model: Model
-    starts: tuple[Array, ...]
-    residuals: tuple[Array, ...]
-    chi2: float
-    samples: int
-    converged: bool
-    message: str
-    at_bound: tuple[str, ...]
-    differences: tuple[Array, Array]
-    linearisation: Linearisation | None
-
-
 def minimise(
     model: Model,
     run: FreeRun,
@@ -215,137 +139,6 @@ def _fit(
         message=end.message,
         linearisation=linearisation,
         at_bound=end.at_bound,
-    )
-
-
-def descend(
-    model: Model,
-    run: FreeRun,
-    names: Sequence[str],
-    noise: NoiseModel = WHITE,
-    starts: Sequence[Array] | None = None,
-    iterations: int = 30,
-    pool: ThreadPoolExecutor | None = None,
-    tolerance: float = 1e-3,
-    differences: tuple[Array, Array] | None = None,
-) -> Descent:
-    """Levenberg-Marquardt from the model's own values.
-
-    Stops when a further step lowers chi2, or promises to lower it, by less than `tolerance` (less where the noise model turns
-    out to be too wide) or 1e-7 of itself. `differences` are steps known from another descent of the same structure; without
-    them they are sought. Raises InputError when the model diverges at its initial values.
-    """
-    problem = Problem(run, names, noise, pool)
-    current = [np.array(s) for s in (starts if starts is not None else first_guess(model, run))]
-    problem.learn_hidden(model, current)
-    residuals = problem.residuals(model, current)
-    cost = problem.cost(model, residuals, current)
-    if residuals is None or not math.isfinite(cost):
-        raise InputError(
-            "the model diverges when simulated over the records with its initial values; check its parameters and units"
-        )
-    if differences is None:
-        velocity = 2 * np.pi * max(dominant_frequency(one) for one in run.series) * problem.spread
-        state_steps = 1e-4 * np.array([problem.spread, velocity, *([problem.spread] * (run.states - 2))])
-        steps, state_steps = problem.settle_steps(
-            model, current, residuals, _first_steps(model, names, run), state_steps
-        )
-    else:
-        steps, state_steps = differences
-    held = np.array([float(place in run.compiled.layout.memories) for place in range(run.states)])
-    damping, converged, searched = 1e-6, False, not held.any()
-    low = np.array([model.parameters[name].bounds[0] for name in names])
-    high = np.array([model.parameters[name].bounds[1] for name in names])
-    brink = [a + BRINK * (model.value(n) - a) if math.isfinite(a) else math.inf for n, a in zip(names, low)]
-    priors = [model.parameters[name].prior for name in names]
-    blocked = np.zeros(len(names), bool)
-    here: Linearisation | None = None
-    samples = sum(len(problem.whitened(i, r)) for i, r in enumerate(residuals))
-    for _ in range(iterations):
-        here, states, steps, state_steps_next = problem.linearise(
-            model, current, residuals, steps, state_steps
-        )
-        jacobian, residual = here.jacobian, here.residual
-        values = np.array([model.value(name) for name in names])
-        weight = [(i, prior) for i, prior in enumerate(priors) if prior is not None]
-        if weight:
-            extra = np.zeros((len(weight), len(names)))
-            for row, (i, prior) in enumerate(weight):
-                extra[row, i] = 1.0 / prior.std
-            jacobian = np.vstack([jacobian, extra])
-            residual = np.concatenate(
-                [residual, [(values[i] - prior.mean) / prior.std for i, prior in weight]]
-            )
-        gradient = jacobian.T @ residual
-        blocked = ((values <= low) & (gradient > 0)) | ((values >= high) & (gradient < 0))
-        improved = False
-        for _ in range(12):
-            step = _step(jacobian, residual, damping, blocked)
-            floor = np.array([a + STAY * (v - a) if v > b else a for v, a, b in zip(values, low, brink)])
-            proposed = np.clip(values + step, floor, high)
-            whole = bool(np.all(proposed == values + step))
-            step = proposed - values
-            trial = model.with_values(dict(zip(names, proposed)))
-            moved, promised = [], _prior_cost(priors, proposed)
-            for start, (error, slope, state) in zip(current, states):
-                ahead = error + slope @ step
-                change = state_update(state, ahead, held * damping)
-                moved.append(start + change * state_steps)
-                promised += float(np.sum((ahead + state @ change) ** 2))
-            enough = max(tolerance * min(1.0, cost / samples), 1e-7 * cost)
-            if whole and damping <= 1e-6 and cost - promised < enough:
-                converged = True
-                break
-            trial_residuals = problem.residuals(trial, moved)
-            trial_cost = problem.cost(trial, trial_residuals, moved)
-            if trial_cost < cost:
-                gain = cost - trial_cost
-                model, current, cost = trial, moved, trial_cost
-                residuals, here = trial_residuals, None
-                damping = max(damping * 0.1, 1e-12)
-                improved = True
-                converged = gain < enough
-                break
-            damping = max(damping * 10.0, 1e-6)
-            if damping > 1e8:
-                break
-        converged = converged or not improved  # no direction lowers the cost any more
-        if converged and not searched:
-            searched, moved = True, sought(problem, model, current, states, state_steps)
-            trial_residuals = problem.residuals(model, moved)
-            trial_cost = problem.cost(model, trial_residuals, moved)
-            if trial_cost < cost - enough:
-                current, cost, residuals, here, damping, converged = (
-                    moved,
-                    trial_cost,
-                    trial_residuals,
-                    None,
-                    1e-6,
-                    False,
-                )
-        state_steps = state_steps_next
-        assert residuals is not None
-        if converged:
-            break
-    assert residuals is not None
-    white = [problem.whitened(i, r) for i, r in enumerate(residuals)]
-    return Descent(
-        model=model,
-        starts=tuple(current),
-        residuals=tuple(residuals),
-        chi2=float(sum(np.sum(w**2) for w in white)),
-        samples=samples,
-        converged=converged,
-        message="converged" if converged else f"no convergence in {iterations} iterations",
-        at_bound=tuple(name for name, stuck in zip(names, blocked) if stuck),
-        differences=(steps, state_steps),
-        linearisation=here,
-    )
-
-
-def _prior_cost(priors: Sequence, values: Array) -> float:
-    return sum(
-        ((value - prior.mean) / prior.std) ** 2 for prior, value in zip(priors, values) if prior is not None
     )
 
 

@@ -178,10 +178,11 @@ def _held_before(time: Array, value: Array) -> tuple[Array, Array]:
 def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]:
     """Series of all records. With `block` None the averaging is chosen from the records' bandwidth.
 
-    Raises InputError for a record too short to say anything.
+    Raises InputError for a record too short to say anything, or with values that are not finite.
     """
     made: list[Series] = []
     for record in records:
+        _check(record)
         time, value = record.output.time, record.output.value
         if len(time) < 16:
             raise InputError(
@@ -216,6 +217,17 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
     if block is None:
         block = min(block_length(s.value, s.period) for s in made)
     return [replace(s, block=block, used=_whole_blocks(s, block)) for s in made]
+
+
+def _check(record: Record) -> None:
+    for what, channel in (("output", record.output), ("input", record.input), ("forcing", record.forcing)):
+        if channel is None or np.isfinite(channel.value).all():
+            continue
+        bad = np.flatnonzero(~np.isfinite(channel.value))
+        raise InputError(
+            f"{record.name}: {len(bad)} values of the {what} are not finite, the first of them at "
+            f"t = {channel.time[bad[0]]:g} s; take these samples out"
+        )
 
 
 def _whole_blocks(series: Series, block: int) -> Mask:

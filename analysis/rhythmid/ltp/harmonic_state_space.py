@@ -17,9 +17,8 @@ from rhythmid.ltp.linearisation import Linearisation
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 TRUNCATION = 20  # harmonics kept on either side
-INTEGRATES = (
-    1e-9  # of the fastest mode, nearer than which to a frequency that is asked for a pole lies upon it
-)
+# of the fastest mode, nearer than which to a frequency that is asked for a pole lies upon it
+INTEGRATES = 1e-9
 
 
 def toeplitz_blocks(coefficients: Complex) -> Complex:
