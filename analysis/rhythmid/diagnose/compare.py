@@ -23,6 +23,7 @@ from rhythmid.identify.output_error import estimate, start_only
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
+from rhythmid.record.stray import without_stray
 from rhythmid.report.comparison import LABELS
 from rhythmid.report.run import Run
 
@@ -225,7 +226,8 @@ def compare(
                 f"{simulation.name} holds a {simulation.output_kind}, {one.name} a {one.output_kind}; name the same quantity under 'output:'"
             )
     tell("aligning simulation and recording")
-    aligned = [(align(simulation, one), one) for one in recordings]
+    tidy = [without_stray(one) for one in recordings]
+    aligned = [(align(simulation, one), one) for one, _ in tidy]
     alignment, recording = min(aligned, key=lambda pair: (bool(pair[0].mismatch), pair[0].difference or 0.0))
     known, through = simulation, False
     if model is not None and (alignment.mismatch or alignment.turn != 0.0):
@@ -234,7 +236,7 @@ def compare(
     pair, notes = pair_of(
         known, recording, replace(alignment, offset=0.0, turn=0.0) if through else alignment
     )
-    notes = [*notes, *_unit_notes(simulation, recording)]
+    notes = [*(note for _, said in tidy for note in said), *notes, *_unit_notes(simulation, recording)]
     difference = pair.recording - pair.simulation
     tell("explaining the difference")
     if alignment.mismatch and not through:

@@ -48,6 +48,7 @@ from rhythmid.identify.series import Series, prepare, scales
 from rhythmid.model import Model
 from rhythmid.parallel import cores
 from rhythmid.record.record import Record
+from rhythmid.record.stray import without_stray
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
@@ -94,13 +95,18 @@ def diagnose(
         raise InputError("no record is given; name at least one bag or table")
     known = catalogue or load_catalogue()
     remark = check_driven((*records, *holdout), model)
-    cleaned = [without_clipped(record) for record in (*records, *holdout)]
+    tidy = [without_stray(record) for record in (*records, *holdout)]
+    cleaned = [without_clipped(record) for record, _ in tidy]
     given = [driven(record, model) for record, _ in cleaned]
     everything = prepare(given)
     check_comparable(everything)
     count = len(records)
     notes = dict.fromkeys(
-        (remark, *(note for _, note in cleaned), *(drive_of(a, b) for (a, _), b in zip(cleaned, given)))
+        (
+            remark,
+            *(note for _, said in (*tidy, *cleaned) for note in said),
+            *(drive_of(a, b) for (a, _), b in zip(cleaned, given)),
+        )
     )
     # the matrices are tall and thin, and workers run side by side: threads inside linear algebra only get in the way
     with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:

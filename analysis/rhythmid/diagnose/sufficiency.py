@@ -29,15 +29,15 @@ MOSTLY = 0.5  # share of clipped samples beyond which a record is useless
 DECAYS = 0.7  # of the motion's size that a free decay keeps at most from its first quarter to its last
 
 
-def without_clipped(record: Record) -> tuple[Record, str | None]:
-    """The record without samples of the output at a limit of its sensor, and a sentence about them.
+def without_clipped(record: Record) -> tuple[Record, tuple[str, ...]]:
+    """The record without samples of the output at a limit of its sensor, and what there is to say of them.
 
     Raises InputError when most of the record is clipped.
     """
     channel = record.output
     bad = clipped_samples(channel.value)
     if not bad.any():
-        return record, None
+        return record, ()
     share = float(bad.mean())
     limits = " and ".join(f"{v:.6g}" for v in np.unique(channel.value[bad]))
     if share > MOSTLY:
@@ -48,7 +48,7 @@ def without_clipped(record: Record) -> tuple[Record, str | None]:
     near = bad | np.concatenate([[False], bad[:-1]]) | np.concatenate([bad[1:], [False]])
     kept = replace(channel, time=channel.time[~near], value=channel.value[~near])
     note = f"{record.name}: {int(bad.sum())} samples of the output ({100 * share:.2g} %) are clipped at {limits} {channel.unit} and left out"
-    return replace(record, output=kept), note
+    return replace(record, output=kept), (note,)
 
 
 def check_driven(records: Sequence[Record], model: Model) -> str | None:

@@ -13,6 +13,7 @@ from rhythmid.diagnose.search import LEVEL, Search
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import Model
+from rhythmid.record.quality import resolution
 
 TWINS = 2  # a family of this many is an answer; a larger one is undecided
 REMAINDER_LEVEL = 1e-6  # p-value of a structured remainder
@@ -69,7 +70,8 @@ def verdict_of(
     too_big = False
     if repeats is not None and repeats.variance > 0:
         residual = np.concatenate([r[one.used] for r, one in zip(fit.residuals, series)])
-        ratio = float(np.mean(residual**2)) / repeats.variance
+        rounding = max(resolution(one.value) for one in series) ** 2 / 12.0  # repeats with the motion
+        ratio = float(np.mean(residual**2)) / (repeats.variance + rounding)
         colour = max(repeats.long_run_variance / repeats.variance, 1.0)
         too_big = ratio > 1.1 + 6.0 * math.sqrt(2.0 * colour / len(residual))
     line = strongest_line(fit)
@@ -81,9 +83,7 @@ def verdict_of(
             f"a line at {line.frequency:.3g} Hz remains that nothing in the catalogue explains",
         )
     if not found.best.added:
-        if (
-            too_big and p_value < REMAINDER_LEVEL
-        ):  # rounding repeats, too, and makes repeats look better than they are
+        if too_big and p_value < REMAINDER_LEVEL:
             return "unknown_physics", "no element of the catalogue explains what the nominal model leaves"
         if remains and remains[0].explained > 0.2 and p_value < LEVEL:
             return "unknown_physics", "no element of the catalogue explains what the nominal model leaves"

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from importlib.resources import files
 from typing import Any, Literal
 
@@ -22,6 +23,7 @@ from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, s
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
 from rhythmid.record.record import Record
+from rhythmid.record.stray import without_stray
 from rhythmid.signal import continuous, spline
 from rhythmid.simulate import simulate
 
@@ -180,6 +182,20 @@ def identify(
     given = (records,) if isinstance(records, Record) else tuple(records)
     if not given:
         raise InputError("nothing to identify from: give at least one record")
+    tidy = [without_stray(record) for record in given]
+    found = _identified(tuple(record for record, _ in tidy), model, harmonics, method, forcing, offset, htf)
+    return replace(found, notes=(*(note for _, said in tidy for note in said), *found.notes))
+
+
+def _identified(
+    given: tuple[Record, ...],
+    model: Model | None,
+    harmonics: int,
+    method: Method,
+    forcing: Forcing | None,
+    offset: Offset | None,
+    htf: HtfMethod,
+) -> Identification:
     nominal = model or paper_hopper()
     results: list[PaperResult] = []
     pumpings: list[Pumping] = []

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rhythmid.record.timing import Timing
 
 CLIPPED_RUN = 4  # samples in a row at the extreme value
+HAIR = 1e-7  # of a signal's range, what lies nearer together than this is one value
 CLIPPED_EXCESS = 5  # times as many samples in such runs as at the next value
 
 
@@ -135,6 +136,18 @@ def clipped_samples(value: NDArray[np.float64]) -> NDArray[np.bool_]:
     if len(value) < CLIPPED_RUN:
         return np.zeros(len(value), dtype=bool)
     return _at_limit(value) | _at_limit(-value)
+
+
+def resolution(value: NDArray[np.float64]) -> float:
+    """Step of the grid that values (n,) were rounded to, in their unit; 0 where they lie on none."""
+    steps = np.diff(np.unique(value))
+    steps = steps[steps > HAIR * np.ptp(value)]  # finer ones are the representation of numbers
+    if len(steps) < 2:
+        return 0.0
+    step = float(np.median(steps[steps < 1.5 * steps.min()]))
+    multiples = steps / step
+    on_grid = np.abs(multiples - np.round(multiples)) < 0.05
+    return step if on_grid.mean() > 0.99 else 0.0
 
 
 def _at_limit(value: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -1,0 +1,90 @@
+"""Samples that do not say where the machine was: strays, which a smooth signal cannot have taken, such as a bit that fell
+over or a lost echo, and repeats, where a sensor is read more often than it measures or has stood still for a while."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from rhythmid.record.quality import resolution
+from rhythmid.record.record import Record
+
+WIDEST = 3  # samples in a row that may be stray
+FAR = 12.0  # times the usual unevenness, from which a sample is suspected
+PASSING = (
+    0.25  # of its distance, that the slopes before and after may differ from the line past a stray sample
+)
+NEAR = 101  # samples over which the usual unevenness is taken
+MOST = 0.02  # share of a signal beyond which such samples are no exception and belong to it
+USUAL = 1.4826  # standard deviations in a median absolute deviation
+LEAP = 1.5  # times the step after it, that the step out of repeats is at least: the motion went on meanwhile
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def stray_samples(value: Array) -> Mask:
+    """Whether samples (n,) stand far off the line that the samples before and after them make, at most three in a row.
+
+    A kink in the signal, such as an impact makes, changes the slope and is none; nor is what happens too often.
+    """
+    found = np.zeros(len(value), dtype=bool)
+    if len(value) < NEAR:
+        return found
+    uneven = np.abs(value[1:-1] - 0.5 * (value[:-2] + value[2:]))
+    usual = USUAL * np.maximum(median_filter(uneven, NEAR), np.median(uneven))
+    limit = FAR * np.maximum(np.concatenate([usual[:1], usual, usual[-1:]]), resolution(value))
+    for width in range(1, WIDEST + 1):
+        first = np.arange(
+            2, len(value) - width - 1
+        )  # of `width` samples between two good ones on either side
+        last = first + width
+        slope = (value[last] - value[first - 1]) / (width + 1)
+        off = np.stack([value[first + k] - value[first - 1] - slope * (k + 1) for k in range(width)])
+        least = np.abs(off).min(axis=0)
+        bent = np.maximum(
+            np.abs(value[first - 1] - value[first - 2] - slope), np.abs(value[last + 1] - value[last] - slope)
+        )
+        stray = (least > limit[first]) & (bent < PASSING * least)
+        for k in range(width):
+            found[first[stray] + k] = True
+    return found if found.mean() <= MOST else np.zeros(len(value), dtype=bool)
+
+
+def repeated_samples(value: Array) -> Mask:
+    """Whether samples (n,) repeat the one before though the motion went on, which shows in a leap after them.
+
+    A machine at rest repeats values, too, but does not leap; where values are rounded, repeats say nothing.
+    """
+    found = np.zeros(len(value), dtype=bool)
+    step = np.diff(value)
+    if len(value) < NEAR or not np.any(step == 0.0) or resolution(value) > 0.0:
+        return found
+    edges = np.diff(np.concatenate([[False], step == 0.0, [False]]).astype(int))
+    for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)):  # of steps of zero
+        if end + 1 < len(step) and abs(step[end]) > LEAP * abs(step[end + 1]):
+            found[begin + 1 : end + 1] = True
+    return found
+
+
+def without_stray(record: Record) -> tuple[Record, tuple[str, ...]]:
+    """The record without stray and repeated samples of the output, and what there is to say of them.
+
+    An acceleration keeps its strays: impacts do make such peaks there.
+    """
+    notes: list[str] = []
+    for find, said in (
+        (stray_samples, "stand far off their neighbours"),
+        (repeated_samples, "repeat the one before while the motion goes on"),
+    ):
+        channel = record.output
+        bad = find(channel.value)
+        if not bad.any() or (find is stray_samples and record.output_kind == "acceleration"):
+            continue
+        notes.append(
+            f"{record.name}: samples of the output that {said} are left out, {int(bad.sum())} of {len(bad)}, the first at "
+            f"t = {channel.time[bad][0]:.6g} s"
+        )
+        record = replace(record, output=replace(channel, time=channel.time[~bad], value=channel.value[~bad]))
+    return record, tuple(notes)
