@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rhythmid.errors import InputError
-from rhythmid.ltp.pumping import Pumping, active_pumping, pumping_of_channel
+from rhythmid.ltp.pumping import Pumping, active_pumping, fundamental_frequency, pumping_of_channel
 from rhythmid.record.record import Channel, Record
 
 TIME = np.arange(12_000) * 1e-3
@@ -51,6 +51,22 @@ def test_irregular_stamps_do_not_matter() -> None:
     time = np.sort(TIME + np.random.default_rng(1).uniform(0, 8e-4, len(TIME)))
     found = pumping_of_channel(channel(np.cos(2 * np.pi * 1.1 * time - 0.2), time))
     assert found.frequency == pytest.approx(1.1, rel=1e-10)
+
+
+@pytest.mark.parametrize("frequency", [0.7, 1.25, 2.0])
+@pytest.mark.parametrize("late", [0.0, 0.05, 0.2])
+@pytest.mark.parametrize("duration", [7.0, 13.0, 30.0])
+def test_a_forcing_that_stands_still_at_the_ends_keeps_its_frequency(frequency, late, duration) -> None:
+    time = np.arange(0.003, duration, 0.007)
+    value = np.cos(2 * np.pi * frequency * np.clip(time, late, duration - late) + 2.9)
+    assert fundamental_frequency(time, value) == pytest.approx(frequency, rel=0.02)
+
+
+def test_a_constant_with_a_hair_of_noise_has_some_frequency_within_its_band() -> None:
+    time = 0.007 * np.arange(1000)
+    for seed in range(20):
+        value = 1.0 + 1e-9 * np.random.default_rng(seed).standard_normal(len(time))
+        assert 0.0 < fundamental_frequency(time, value) < 0.5 / 0.007
 
 
 def test_the_signal_over_a_period_is_the_forcing() -> None:

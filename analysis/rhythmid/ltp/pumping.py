@@ -116,8 +116,12 @@ def _refined(time: Array, value: Array, frequency: float) -> tuple[float, float]
 
 
 def _fourier_fit(time: Array, value: Array, frequency: float, harmonics: int) -> tuple[float, float]:
-    """Gauss-Newton on the frequency of a Fourier series with so many harmonics; and the rms of what it leaves."""
-    left = 0.0
+    """Gauss-Newton on the frequency of a Fourier series with so many harmonics; and the rms of what it leaves.
+
+    It ends where a step leaves the line that it began on, as it does where there is none.
+    """
+    left, begin = 0.0, frequency
+    near = min(1.0 / (time[-1] - time[0]), 0.25 * begin)
     h = np.arange(1, harmonics + 1)
     columns = np.ones((2 * harmonics + 2, len(time)))
     for _ in range(8):
@@ -136,6 +140,8 @@ def _fourier_fit(time: Array, value: Array, frequency: float, harmonics: int) ->
         size = np.sqrt(np.sum(columns**2, axis=1))
         scaled = columns / size[:, None]
         step = float(np.linalg.solve(scaled @ scaled.T, scaled @ value)[-1] / size[-1])
+        if not abs(frequency + step - begin) < near:
+            break
         frequency += step
         if abs(step) < 1e-13 * frequency:
             break
