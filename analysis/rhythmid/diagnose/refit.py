@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
 PROMISING = 0.3  # share of the spread of chi2 within which a model is carried to convergence
 HOPS = 12  # at most, from one minimum to the next
+WAYS = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minima, that one hop goes
 FAINTER = (0.1, 0.01)  # shares of a guess that led nowhere, tried in its place
 TOLERANCE = 0.05  # of chi2, at which a trial has converged: far below what an element has to earn
 
@@ -209,7 +210,7 @@ def _hopped(
     low, high = best.model.parameters[name].bounds
     for _ in range(HOPS):
         before = best
-        for value in (before.model.value(name) + way * distance for way in (0.5, -0.5, 1.0, -1.0)):
+        for value in (before.model.value(name) + way * distance for way in WAYS):
             if not low < value < high:
                 continue
             moved = before.model.with_values({name: value})

@@ -106,7 +106,7 @@ class Element:
     `confusable` maps another element's name to what tells the two apart. A `rotational` effect needs an angle for x, a
     `controlled` one a controller in the model.
     `ranges` bounds parameters by the record's scales to where the effect still is what its name says: a ripple repeats
-    within the travel, or it is but another spring. `hops` says how far apart the minima lie that a fit has in a parameter.
+    within the travel, or it is but another spring. `hops` says how far apart the minima lie at most that a fit has in a parameter.
     """
 
     name: str

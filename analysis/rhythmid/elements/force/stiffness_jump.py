@@ -1,7 +1,7 @@
 """Stiffness jump: the linear spring's stiffness becomes k (1 + delta) at the time t_s (a crack, a slipped clamp).
 
 The step is spread over one integration step, so that the motion depends smoothly on t_s. A fit in t_s has a minimum for
-every period of the motion: it needs a grid of starts, and hops from there.
+every period of the motion or of the forcing: it needs a grid of starts, and hops from there.
 """
 
 from math import inf
@@ -31,7 +31,7 @@ ELEMENT = Element(
     kernel=kernel,
     size="change",
     starts=lambda s: [{"change": 0.005, "time": k / 12.0 * s.duration} for k in range(1, 12)],
-    hops=lambda s: {"time": 1.0 / s.frequency},
+    hops=lambda s: {"time": 1.0 / min(s.frequency, s.forcing_frequency or s.frequency)},
     also_known_as=("crack", "sudden softening", "slipped clamp"),
     family="drift",
     confusable={"stiffness_drift": "a step against a ramp"},
