@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.compiled import compile_model
+from rhythmid.diagnose.defend import defend
 from rhythmid.diagnose.refit import (
     Proposal,
     Trial,
@@ -24,6 +24,7 @@ from rhythmid.diagnose.refit import (
     under_noise,
     whole_fit,
 )
+from rhythmid.diagnose.round import Round, distinct
 from rhythmid.diagnose.screen import (
     Change,
     Score,
@@ -36,7 +37,6 @@ from rhythmid.diagnose.screen import (
     under,
 )
 from rhythmid.elements.catalogue import Catalogue
-from rhythmid.elements.element import Element
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.free_run import accurate
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
@@ -63,15 +63,6 @@ MISFIT = 0.1  # error, as a share of the motion, and
 PREDICTED = 25.0
 # of the noise: integration error of an element with corners beyond which all steps are made finer
 ROUGH = 0.1
-RIVALS = 4  # elements that scored best at first, tried again in the place of each of several effects
-
-
-@dataclass(frozen=True)
-class Round:
-    """One round of the search: the scores, best first, and the probability of such a best score by chance."""
-
-    scores: tuple[Score, ...]
-    p_value: float
 
 
 @dataclass(frozen=True)
@@ -142,21 +133,11 @@ def _one_round(
     return Round(tuple(scores), p_value(scores)), fit
 
 
-def _distinct(scores: Sequence[Score], count: int) -> list[tuple[Score, list[Score]]]:
-    """The best score of each of the first `count` elements, with all scores of that element."""
-    found: dict[str, list[Score]] = {}
-    for one in scores:
-        if one.statistic <= 0.0:
-            continue
-        found.setdefault(one.element.name, []).append(one)
-    return [(group[0], group) for group in list(found.values())[:count]]
-
-
 def _proposals(
     base: Model, added: tuple[str, ...], scores: Sequence[Score], count: int, chi2: float
 ) -> tuple[list[Proposal], list[float]]:
     """Structures worth a refit, with chi2 below which one start of each is enough."""
-    chosen = _distinct(scores, count)
+    chosen = distinct(scores, count)
     made, enough = [], []
     for best, group in chosen:
         starts = [one.start for one in group[: 3 if len(group) > MANY else 2]]
@@ -237,7 +218,7 @@ def search(
         rounds.append(now)
     if best.added:
         margin = max(WORTH, SHARE * gained)
-        defended, more = _defend(best, series, catalogue, trials, noise, step, rounds, margin, tell)
+        defended, more = defend(best, series, catalogue, trials, noise, step, rounds, margin, tell)
         trials |= more
         if defended is not best:
             best = defended
@@ -284,115 +265,3 @@ def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial, count: int = 
     kept = {tuple(sorted(t.added)): t for t in [trials[()], *rivals]}
     kept[tuple(sorted(best.added))] = best
     return list(kept.values())
-
-
-def _defend(
-    best: Trial,
-    series: Sequence[Series],
-    catalogue: Catalogue,
-    trials: dict[tuple[str, ...], Trial],
-    noise: NoiseModel,
-    step: float,
-    rounds: Sequence[Round],
-    margin: float,
-    tell: Tell,
-) -> tuple[Trial, dict[tuple[str, ...], Trial]]:
-    """Let every added element defend its place; returns the survivor and the models that were tried on the way.
-
-    First whether it can be left out, then whether another one does better in its place: a simpler member of its family,
-    or, where there are several effects, an element that scored well before the others were known. A model that says less
-    may be worse by the `margin` in the criterion.
-    """
-    tried: dict[tuple[str, ...], Trial] = {}
-
-    def run(proposals: list[Proposal]) -> list[Trial]:
-        fresh = [p for p in proposals if tuple(sorted(p.added)) not in tried]
-        if not fresh:
-            return []
-        tell(f"testing {', '.join(' + '.join(p.added) for p in fresh)}")
-        found, _ = run_trials(fresh, series, best.starts, _states(best), noise, step)
-        tried.update({tuple(sorted(t.added)): t for t in found})
-        return found
-
-    while len(best.added) > 1:
-        dropped = run(
-            [Proposal(_rest(best, label), best.model.without(label), ({},)) for label in best.added]
-        )
-        kept = [t for t in dropped if t.bic() < best.bic() + margin]
-        if not kept:
-            break
-        best = min(kept, key=lambda t: t.bic())
-    swaps: list[Proposal] = []
-    for label in best.added:
-        element = best.element(label)
-        family = {e.name for e in catalogue.values() if element.name in e.special_case_of and e.candidate}
-        names = set(family)
-        if len(best.added) > 1:
-            names |= {score.element.name for score, _ in _distinct(rounds[0].scores, RIVALS)}
-        rest = _rest(best, label)
-        slim = best.model.without(label)
-        for name in sorted(names - {best.element(other).name for other in best.added}):
-            starts = _starts_for(catalogue, name, series, slim, rounds, 8 if name in family else 1)
-            if starts and name in family:  # a special case of the best is at its best close to it
-                starts.insert(0, starts[0] | _shared(best, label, catalogue[name]))
-            elif not starts or tuple(sorted((*rest, name))) in trials:
-                continue
-            swaps.append(propose(slim, catalogue[name], starts, rest))
-    found = run(swaps)
-    earlier = [t for t in trials.values() if t.added and _stands_for(t, best)]
-    plainer = [t for t in [*found, *under_noise(earlier, series, noise, step)] if _stands_for(t, best)]
-    simpler = [t for t in plainer if t.bic() < best.bic() + margin]
-    better = [t for t in found if t.bic() < best.bic()]
-    if better:
-        best = min(better, key=lambda t: t.bic())
-    elif simpler:
-        best = min(simpler, key=lambda t: (t.free, t.bic()))
-    return best, tried
-
-
-def _shared(trial: Trial, label: str, element: Element) -> dict[str, float]:
-    """Values of the parameters that another element has by the same names as the one under the label."""
-    own = {parameter.name for parameter in element.parameters}
-    return {
-        p.name: trial.model.value(f"{label}.{p.name}")
-        for p in trial.element(label).parameters
-        if p.name in own
-    }
-
-
-def _rest(trial: Trial, label: str) -> tuple[str, ...]:
-    return tuple(name for name in trial.added if name != label)
-
-
-def _stands_for(trial: Trial, best: Trial) -> bool:
-    """Whether a model says less than the best: some of its effects, or a special case in the place of one of them."""
-    if trial.free >= best.free:
-        return False
-    if set(trial.added) < set(best.added):
-        return True
-    extra = [trial.element(label) for label in trial.added if label not in best.added]
-    gone = [best.element(label) for label in best.added if label not in trial.added]
-    return len(extra) == len(gone) == 1 and gone[0].name in extra[0].special_case_of
-
-
-def _states(trial: Trial) -> tuple[str, ...]:
-    return compile_model(trial.model).layout.states
-
-
-def _starts_for(
-    catalogue: Catalogue,
-    name: str,
-    series: Sequence[Series],
-    model: Model,
-    rounds: Sequence[Round],
-    count: int,
-) -> list[dict[str, float]]:
-    """First guesses of an element for a refit: those that scored best in any round, or its own."""
-    scored = sorted(
-        (s for r in rounds for s in r.scores if s.element.name == name and s.statistic > 0.0),
-        key=lambda s: -s.statistic,
-    )
-    if scored:
-        return [one.start for one in scored[:count]]
-    element = catalogue[name]
-    return [dict(s) for s in element.starts(scales(series, model))][:count] if element.starts else []
