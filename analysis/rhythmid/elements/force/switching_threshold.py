@@ -1,9 +1,10 @@
 """Switching threshold: the direction-switched damper turns on at v = v_th instead of v = 0.
 
 A modifier of the leg's forces: it adds -(c_s - c_f) v ([v > v_th] - [v > 0]) to the nominal damper. The force now jumps at
-the switch; both brackets are averaged over the speed gained in one integration step, as the forces on the mass tell. So the
-effect vanishes exactly at v_th = 0, can be differentiated with respect to v_th, and stays sharp where the speed turns round
-just at the threshold. The effect grows with the square of small thresholds: fits need starts of physical size.
+the switch; both brackets rise over the transition and the speed gained in one integration step, as the forces on the mass
+tell. So the effect vanishes exactly at v_th = 0 and can be differentiated with respect to v_th. Where the speed turns round
+near the threshold a sharp switch has many minima: fits begin with a wide transition, which they estimate.
+The effect grows with the square of small thresholds: fits need starts of physical size.
 """
 
 import math
@@ -13,7 +14,7 @@ from rhythmid.elements.element import STEP, Element, Parameter
 
 def kernel(leg, x, v, t, f, threshold, transition, stance, flight, mass, gravity, step):
     gained = abs((leg + f) / mass - gravity) * step  # speed, in one step
-    half = max(transition, 0.5 * gained, 1e-300)
+    half = transition + max(0.5 * gained, 1e-300)
     beyond = min(1.0, max(0.0, 0.5 + 0.5 * (v - threshold) / half))
     upward = min(1.0, max(0.0, 0.5 + 0.5 * v / half))
     return leg - (stance - flight) * v * (beyond - upward)
@@ -32,7 +33,6 @@ ELEMENT = Element(
             "speed either side of v_th over which it switches",
             bounds=(0.0, math.inf),
             default=0.0,
-            fixed=True,
         ),
     ),
     borrows={
@@ -45,7 +45,11 @@ ELEMENT = Element(
     kernel=kernel,
     acts="modifier",
     size="threshold",
-    starts=lambda s: [{"threshold": sign * 0.3 * s.velocity} for sign in (1.0, -1.0)],
+    starts=lambda s: [
+        {"threshold": sign * share * s.velocity, "transition": 0.01 * s.velocity}
+        for share in (0.3, 1.0)
+        for sign in (1.0, -1.0)
+    ],
     also_known_as=("late damping", "valve opening speed"),
     family="damping",
     confusable={
