@@ -89,8 +89,8 @@ def _swaps(
         if len(best.added) > 1:
             names |= _rivals(element, catalogue, rounds)
         rest = _rest(best, label)
-        slim = _without(best, trials, label)
         for name in sorted(names - {best.element(other).name for other in best.added}):
+            slim = best.model.without(label) if name in family else _without(best, trials, label)
             starts = _starts_for(catalogue, name, series, slim, rounds, 8 if name in family else 1)
             if starts and name in family:  # a special case of the best is at its best close to it
                 starts.insert(0, starts[0] | _shared(best, label, catalogue[name]))
