@@ -1,7 +1,6 @@
 """The chosen effects defend their places: against being left out, and against others in their place."""
 
 from collections.abc import Callable, Sequence
-from itertools import combinations
 
 from rhythmid.compiled import compile_model
 from rhythmid.diagnose.refit import Proposal, Trial, propose, run_trials, under_noise
@@ -30,8 +29,8 @@ def defend(
     """Let every added element defend its place; returns the survivor and the models that were tried on the way.
 
     First whether it can be left out, then whether another one does better in its place: a simpler member of its family,
-    or, where there are several effects, an element that scored well before the others were known or one that it is
-    confused with; and again, until nothing changes. A model that says less may be worse by the `margin` in the criterion.
+    or, where there are several effects, an element that scored well before the others were known. A model that says less
+    may be worse by the `margin` in the criterion.
     """
     tried: dict[tuple[str, ...], Trial] = {}
 
@@ -44,21 +43,17 @@ def defend(
         tried.update({tuple(sorted(t.added)): t for t in found})
         return found
 
-    while True:
-        best = _without_idle(best, run, margin)
-        others = _swaps(best, series, catalogue, trials, rounds)
-        found = run(best, [*others, *_for_two(best, series, catalogue, trials, rounds)])
-        earlier = [t for t in trials.values() if t.added and _stands_for(t, best)]
-        plainer = [t for t in [*found, *under_noise(earlier, series, noise, step)] if _stands_for(t, best)]
-        plainer += [t for t in found if len(t.added) < len(best.added)]
-        simpler = [t for t in plainer if t.bic() < best.bic() + margin]
-        better = [t for t in found if t.bic() < best.bic()]
-        if better:
-            best = min(better, key=lambda t: t.bic())
-        elif simpler:
-            best = min(simpler, key=lambda t: (t.free, t.bic()))
-        if not better or len(best.added) == 1:  # beside another element than before one may be idle
-            return best, tried
+    best = _without_idle(best, run, margin)
+    found = run(best, _swaps(best, series, catalogue, trials, rounds))
+    earlier = [t for t in trials.values() if t.added and _stands_for(t, best)]
+    plainer = [t for t in [*found, *under_noise(earlier, series, noise, step)] if _stands_for(t, best)]
+    simpler = [t for t in plainer if t.bic() < best.bic() + margin]
+    better = [t for t in found if t.bic() < best.bic()]
+    if better:
+        best = min(better, key=lambda t: t.bic())
+    elif simpler:
+        best = min(simpler, key=lambda t: (t.free, t.bic()))
+    return best, tried
 
 
 def _without_idle(best: Trial, run: Callable[[Trial, list[Proposal]], list[Trial]], margin: float) -> Trial:
@@ -87,10 +82,10 @@ def _swaps(
         family = {e.name for e in catalogue.values() if element.name in e.special_case_of and e.candidate}
         names = set(family)
         if len(best.added) > 1:
-            names |= _rivals(element, catalogue, rounds)
+            names |= {score.element.name for score, _ in distinct(rounds[0].scores, RIVALS)}
         rest = _rest(best, label)
+        slim = best.model.without(label)
         for name in sorted(names - {best.element(other).name for other in best.added}):
-            slim = best.model.without(label) if name in family else _without(best, trials, label)
             starts = _starts_for(catalogue, name, series, slim, rounds, 8 if name in family else 1)
             if starts and name in family:  # a special case of the best is at its best close to it
                 starts.insert(0, starts[0] | _shared(best, label, catalogue[name]))
@@ -98,43 +93,6 @@ def _swaps(
                 continue
             swaps.append(propose(slim, catalogue[name], starts, rest))
     return swaps
-
-
-def _for_two(
-    best: Trial,
-    series: Sequence[Series],
-    catalogue: Catalogue,
-    trials: dict[tuple[str, ...], Trial],
-    rounds: Sequence[Round],
-) -> list[Proposal]:
-    """Models with one other element in the place of two of at least three effects: where the wrong one came first, a
-    further one mends what it leaves."""
-    made: list[Proposal] = []
-    known = {best.element(label).name for label in best.added}
-    for one, two in combinations(best.added, 2) if len(best.added) > 2 else ():
-        rest = tuple(label for label in best.added if label not in (one, two))
-        slim = _without(best, trials, one, two)
-        names = _rivals(best.element(one), catalogue, rounds) | _rivals(best.element(two), catalogue, rounds)
-        for name in sorted(names - known):
-            starts = _starts_for(catalogue, name, series, slim, rounds, 1)
-            if starts and tuple(sorted((*rest, name))) not in trials:
-                made.append(propose(slim, catalogue[name], starts, rest))
-    return made
-
-
-def _without(best: Trial, trials: dict[tuple[str, ...], Trial], *labels: str) -> Model:
-    """The model without these effects and the delays that it took on with them: a lag on the wrong side of the forcing
-    drives both delays far off, from where another one does not find back."""
-    slim, nominal = best.model, trials[()].model
-    for label in labels:
-        slim = slim.without(label)
-    return slim.with_values({name: nominal.value(name) for name in nominal.free if name.endswith(".delay")})
-
-
-def _rivals(element: Element, catalogue: Catalogue, rounds: Sequence[Round]) -> set[str]:
-    """Elements that scored best at first, and those that this one is confused with."""
-    first = {score.element.name for score, _ in distinct(rounds[0].scores, RIVALS)}
-    return first | {name for name in element.confusable if name in catalogue and catalogue[name].candidate}
 
 
 def _shared(trial: Trial, label: str, element: Element) -> dict[str, float]:
