@@ -101,7 +101,7 @@ def fundamental_frequency(time: Array, value: Array) -> float:
     for divisor in (2, 3):  # the strongest line may be a harmonic: then a multiple of its period leaves less
         if left > HARMONIC * np.std(value) and line * span > 1.5 * divisor:
             lower, rest = _refined(time - time.mean(), value, line / divisor)
-            if rest < 0.7 * left:
+            if rest < 0.7 * left and lower * span > 1.0:
                 frequency, left = lower, rest
     return frequency
 
@@ -121,7 +121,7 @@ def _fourier_fit(time: Array, value: Array, frequency: float, harmonics: int) ->
     It ends where a step leaves the line that it began on, as it does where there is none.
     """
     left, begin = 0.0, frequency
-    near = min(1.0 / (time[-1] - time[0]), 0.25 * begin)
+    near = min(1.0 / (time[-1] - time[0]), 0.5 * begin)
     h = np.arange(1, harmonics + 1)
     columns = np.ones((2 * harmonics + 2, len(time)))
     for _ in range(8):

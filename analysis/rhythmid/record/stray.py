@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from rhythmid.record.quality import resolution
+from rhythmid.record.quality import clipped_samples, resolution
 from rhythmid.record.record import Record
 
 WIDEST = 3  # samples in a row that may be stray
@@ -55,7 +55,8 @@ def stray_samples(value: Array) -> Mask:
 def repeated_samples(value: Array) -> Mask:
     """Whether samples (n,) repeat the one before though the motion went on, which shows in a leap after them.
 
-    A machine at rest repeats values, too, but does not leap; where values are rounded, repeats say nothing.
+    A machine at rest repeats values, too, but does not leap; where values are rounded, repeats say nothing, and what is
+    clipped is another matter.
     """
     found = np.zeros(len(value), dtype=bool)
     step = np.diff(value)
@@ -65,7 +66,7 @@ def repeated_samples(value: Array) -> Mask:
     for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)):  # of steps of zero
         if end + 1 < len(step) and abs(step[end]) > LEAP * abs(step[end + 1]):
             found[begin + 1 : end + 1] = True
-    return found
+    return found & ~clipped_samples(value)
 
 
 def without_stray(record: Record) -> tuple[Record, tuple[str, ...]]:
