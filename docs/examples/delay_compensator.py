@@ -96,7 +96,8 @@ def main(path: str) -> tuple[float, float]:
     gain = (0.0, 40.0)  # damping injection: stable without delay, unstable with it
     plain = DelayCompensator(latency.model, 0.0, gain, target)
     ahead = DelayCompensator(latency.model, latency.sum, gain, target)
-    return tuple(ring_down(latency.model, c, latency.sum) for c in (plain, ahead))  # type: ignore[return-value]
+    late = latency.sum
+    return ring_down(latency.model, plain, late), ring_down(latency.model, ahead, late)
 
 
 if __name__ == "__main__":

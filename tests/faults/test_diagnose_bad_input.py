@@ -183,6 +183,23 @@ def test_clipped_samples_are_left_out_and_counted(rubbing):
     assert len(said) == 2 and sum(int(note.split(": ")[1].split()[0]) for note in said) == count
 
 
+@pytest.mark.parametrize("flaw", ["strays", "repeats"])
+def test_a_sensors_flaws_do_not_pass_for_physics_and_are_told(rubbing, flaw):
+    given = []
+    for one in rubbing:
+        value = one.output.value.copy()
+        if flaw == "strays":
+            value[500::700] += 0.5
+        else:
+            value = np.repeat(value[::5], 5)[: len(value)]
+        given.append(replace(one, output=replace(one.output, value=value)))
+    found = run(given)
+    assert found.verdict == "missing_physics"
+    assert [effect.element for effect in found.missing] == ["coulomb_friction"]
+    said = {"strays": "stand far off their neighbours", "repeats": "repeat the one before"}[flaw]
+    assert sum(said in note for note in found.notes) == len(rubbing)
+
+
 EXPLOSIVE = '''
 """A spring that pushes the further it is stretched, without limit."""
 

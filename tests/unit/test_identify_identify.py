@@ -87,6 +87,15 @@ def test_a_command_that_does_not_repeat_is_noted(paper_record) -> None:
     assert any("does not repeat" in note for note in notes)
 
 
+def test_stray_samples_are_left_out_and_told(paper_record) -> None:
+    clean = paper_record()
+    value = clean.output.value.copy()
+    value[1000::5000] += 0.5
+    found = identify(replace(clean, output=replace(clean.output, value=value)), method="paper")
+    assert found.delays.sum.value == pytest.approx(identify(clean, method="paper").delays.sum.value, abs=1e-5)
+    assert sum("stand far off their neighbours" in note for note in found.notes) == 1
+
+
 def test_delays_are_added_to_a_model_that_has_none() -> None:
     bare = paper_hopper().without("input_delay")
     made = with_delays(bare, 0.01, 0.02)

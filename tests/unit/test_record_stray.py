@@ -73,6 +73,12 @@ def test_values_that_were_not_rounded_have_no_step():
     assert resolution(np.full(50, 0.3)) == 0.0
 
 
+def test_two_values_are_the_coarsest_rounding_and_lose_no_sample():
+    value = np.where(np.sin(2 * np.pi * TIME) > 0.0, 0.1, 0.3)
+    assert resolution(value) == pytest.approx(0.2)
+    assert not stray_samples(value).any() and not repeated_samples(value).any()
+
+
 def test_what_is_left_out_is_said_and_peaks_of_an_acceleration_are_kept():
     one = records(hopper(), SHORT[:1])[0]
     value = one.output.value.copy()

@@ -123,3 +123,13 @@ def test_more_than_repeats_show_is_unknown_physics_only_where_the_catalogue_sees
     repeats = NoiseModel(np.empty(0), 0.8 * 0.01 * float(np.std(SERIES.value)))
     verdict, _ = verdict_of(nothing, p_value, [], [], repeats, [SERIES], 0.0)
     assert verdict == expected
+
+
+@pytest.mark.parametrize(("rounded", "expected"), [(False, "unknown_physics"), (True, "missing_physics")])
+def test_what_rounding_may_leave_is_no_unknown_physics(rounded, expected):
+    """A remainder of a hundredth of the motion, of which repeats show a quarter; rounding to 4 % leaves as much."""
+    step = 0.04 * float(np.std(SERIES.value))
+    value = step * np.round(SERIES.value / step) if rounded else SERIES.value
+    repeats = NoiseModel(np.empty(0), 0.25 * 0.01 * float(np.std(SERIES.value)))
+    seen = [replace(SERIES, value=value, used=TIME < 7.0)]
+    assert verdict_of(explained(0.1, 0.01), 1e-9, [], [], repeats, seen, 0.0)[0] == expected

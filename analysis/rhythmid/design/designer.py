@@ -1,6 +1,6 @@
 """Design an experiment: a signal whose responses stay apart, as large as the machine bears, and what it will tell."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,10 +25,10 @@ from rhythmid.identify.joint import without_forcing
 from rhythmid.ltp.htf import LinearisedModel, linearised
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
+from rhythmid.progress import Tell
 from rhythmid.settings import Delay, Forcing, Noise, TimeMode
 
 Array = NDArray[np.float64]
-Progress = Callable[[str], None]
 LOOKED_AT = range(1, 9)  # harmonics that may stand out of the noise
 STRONG = 0.05  # distortion, as a share of the response, that deserves a word
 BIASED = 1.0  # standard deviations of bias that deserve a word
@@ -153,7 +153,7 @@ def design(
     model: Model,
     requirements: Requirements,
     catalogue: Catalogue | None = None,
-    progress: Progress | None = None,
+    progress: Tell | None = None,
 ) -> Design:
     """Design a run of the `model`, whose values are taken for the truth.
 

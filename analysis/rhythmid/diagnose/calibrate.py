@@ -5,7 +5,7 @@ otherwise than by holding it: those are found here and told apart from effects.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -17,10 +17,10 @@ from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
 from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import Model
+from rhythmid.progress import Tell
 from rhythmid.signal import band_limited, first_order_hold
 
 INPUT_DELAY = "input_delay.delay"
-Tell = Callable[[str], None]
 EVEN = 1e-3  # of the period; spread of the times between samples that still counts as even
 
 

@@ -7,7 +7,7 @@ with the recording's inputs.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,13 +22,13 @@ from rhythmid.errors import InputError
 from rhythmid.identify.output_error import estimate, start_only
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
+from rhythmid.progress import Tell
 from rhythmid.record.record import Channel, Record
 from rhythmid.record.stray import without_stray
 from rhythmid.report.comparison import LABELS
 from rhythmid.report.run import Run
 
 Array = NDArray[np.float64]
-Tell = Callable[[str], None]
 HARMONICS = 6  # that are listed
 LOUD = 4.0  # times the noise's variance: from there the motions have parted
 SMOOTHED = 4  # bins on either side over which a coherence is averaged
@@ -227,8 +227,10 @@ def compare(
             )
     tell("aligning simulation and recording")
     tidy = [without_stray(one) for one in recordings]
-    aligned = [(align(simulation, one), one) for one, _ in tidy]
-    alignment, recording = min(aligned, key=lambda pair: (bool(pair[0].mismatch), pair[0].difference or 0.0))
+    aligned = [(align(simulation, one), one, said) for one, said in tidy]
+    alignment, recording, left_out = min(
+        aligned, key=lambda case: (bool(case[0].mismatch), case[0].difference or 0.0)
+    )
     known, through = simulation, False
     if model is not None and (alignment.mismatch or alignment.turn != 0.0):
         tell("fitting the model to the simulation and running it with the recording's inputs")
@@ -236,7 +238,7 @@ def compare(
     pair, notes = pair_of(
         known, recording, replace(alignment, offset=0.0, turn=0.0) if through else alignment
     )
-    notes = [*(note for _, said in tidy for note in said), *notes, *_unit_notes(simulation, recording)]
+    notes = [*left_out, *notes, *_unit_notes(simulation, recording)]
     difference = pair.recording - pair.simulation
     tell("explaining the difference")
     if alignment.mismatch and not through:

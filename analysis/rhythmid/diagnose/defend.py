@@ -10,8 +10,8 @@ from rhythmid.elements.element import Element
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series, scales
 from rhythmid.model import Model
+from rhythmid.progress import Tell
 
-Tell = Callable[[str], None]
 RIVALS = 4  # elements that scored best at first, tried again in the place of each of several effects
 
 

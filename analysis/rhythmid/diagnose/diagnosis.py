@@ -5,7 +5,7 @@ lacks, the winner is held against noise, rivals and records that no fit has seen
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -47,11 +47,11 @@ from rhythmid.identify.repeats import noise_from_repeats
 from rhythmid.identify.series import Series, prepare, scales
 from rhythmid.model import Model
 from rhythmid.parallel import cores
+from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 from rhythmid.record.stray import without_stray
 
 Array = NDArray[np.float64]
-Tell = Callable[[str], None]
 SHOWN = 8  # alternatives listed
 TIED_SENSOR = "Scored by force: effects in the sensor are not among the candidates, the measurement is taken for the motion."
 

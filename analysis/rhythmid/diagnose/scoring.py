@@ -21,6 +21,7 @@ from rhythmid.identify.multiple_shooting import LEAST, forgets, periods_long, wi
 from rhythmid.identify.output_error import Fit
 from rhythmid.identify.series import Series, bandwidth, hold_out_tail
 from rhythmid.model import Model
+from rhythmid.progress import Tell
 
 FOLLOWS = 0.3  # error below which it follows the machine well enough for a free run
 GAIN = 0.9  # share to which a step to shorter windows has to lower the error
@@ -34,7 +35,6 @@ INTEGRATES = (
 FREE_RUN = "free run"
 TIED = "the balance of forces, the model tied to the recorded motion by an observer of {0:.2g} Hz: "
 LOSES = "in free run the nominal model loses the machine"
-Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)

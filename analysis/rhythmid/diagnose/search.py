@@ -6,7 +6,7 @@ a simpler member of its family, and, where there are several, against the other 
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -44,9 +44,9 @@ from rhythmid.identify.output_error import Fit, noise_of
 from rhythmid.identify.series import Series, scales
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
+from rhythmid.progress import Tell
 
 Array = NDArray[np.float64]
-Tell = Callable[[str], None]
 
 # difference of the information criterion below which two models are told apart by nothing but hope
 WORTH = 10.0

@@ -1,7 +1,7 @@
 """Output-error estimation in the time domain: a fit of the free run to the records, with its sensitivities and covariance."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -16,12 +16,12 @@ from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.sensitivity import Linearisation, Problem
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
+from rhythmid.progress import Tell
 
 Array = NDArray[np.float64]
 LOST = 0.3  # error, as a share of the motion, above which a model has lost the machine
 # chi2 that it may cost to put a parameter on its bound where the fit says that it cannot tell
 FALSE_EDGE = 25.0
-Progress = Callable[[str], None]
 # of the residual, below which an error of integration has to stay: it must not count among models
 INTEGRATION = 0.02
 
@@ -162,7 +162,7 @@ def estimate(
     pool: ThreadPoolExecutor | None = None,
     max_step: float | None = None,
     iterations: int = 30,
-    progress: Progress | None = None,
+    progress: Tell | None = None,
 ) -> Fit:
     """Maximum-likelihood estimate of the model's free parameters (or of `names`) from all series.
 

@@ -142,7 +142,7 @@ def resolution(value: NDArray[np.float64]) -> float:
     """Step of the grid that values (n,) were rounded to, in their unit; 0 where they lie on none."""
     steps = np.diff(np.unique(value))
     steps = steps[steps > HAIR * np.ptp(value)]  # finer ones are the representation of numbers
-    if len(steps) < 2:
+    if len(steps) == 0:
         return 0.0
     step = float(np.median(steps[steps < 1.5 * steps.min()]))
     multiples = steps / step

@@ -12,9 +12,8 @@ from rhythmid.record.record import Record
 
 WIDEST = 3  # samples in a row that may be stray
 FAR = 12.0  # times the usual unevenness, from which a sample is suspected
-PASSING = (
-    0.25  # of its distance, that the slopes before and after may differ from the line past a stray sample
-)
+# of its distance, that the slopes before and after may differ from the line past a stray sample
+PASSING = 0.25
 NEAR = 101  # samples over which the usual unevenness is taken
 MOST = 0.02  # share of a signal beyond which such samples are no exception and belong to it
 USUAL = 1.4826  # standard deviations in a median absolute deviation
@@ -36,9 +35,7 @@ def stray_samples(value: Array) -> Mask:
     usual = USUAL * np.maximum(median_filter(uneven, NEAR), np.median(uneven))
     limit = FAR * np.maximum(np.concatenate([usual[:1], usual, usual[-1:]]), resolution(value))
     for width in range(1, WIDEST + 1):
-        first = np.arange(
-            2, len(value) - width - 1
-        )  # of `width` samples between two good ones on either side
+        first = np.arange(2, len(value) - width - 1)  # between two good samples on either side
         last = first + width
         slope = (value[last] - value[first - 1]) / (width + 1)
         off = np.stack([value[first + k] - value[first - 1] - slope * (k + 1) for k in range(width)])
