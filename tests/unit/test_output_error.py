@@ -156,3 +156,13 @@ def test_what_an_actuator_remembers_at_a_records_start_is_found(name, values):
     for start in (1.3, 1.5, 1.7):
         fit = start_only(machine, prepare([whole.cut(start, 9.0)]), noise, 5e-4)
         assert np.sqrt(fit.chi2 / fit.samples) < 1.1
+
+
+def test_the_start_of_a_record_without_command_is_found_beside_a_lag_that_stays_at_rest():
+    """The lag has nothing to remember there, and is kept at rest as firmly as ever; position and velocity are still sought."""
+    machine = hopper().with_element(CATALOGUE["command_lag"], {"time_constant": 0.03})
+    noise = NoiseModel(np.empty(0), 1e-4)
+    for silent in records(machine, SHORT[2:], delays=(0.0, 0.0)):
+        fit = start_only(machine, prepare([silent.cut(2.13, 6.0)]), noise, 5e-4)
+        assert np.sqrt(fit.chi2 / fit.samples) < 1.05
+        assert abs(fit.starts[0][2]) < 1e-9

@@ -213,8 +213,7 @@ class Problem:
 
 def state_update(sensitivity: Array, target: Array, damping: Array | None = None) -> Array:
     """Least-squares change of a series' initial state (in units of its difference steps), each part of it damped (q,)."""
-    norms = np.linalg.norm(sensitivity, axis=0)
-    live = norms > 1e-9 * max(norms.max(initial=0.0), 1e-300)
+    norms, live = _felt(sensitivity)
     change = np.zeros(sensitivity.shape[1])
     if live.any():
         scaled = sensitivity[:, live] / norms[live]
@@ -227,9 +226,18 @@ def state_update(sensitivity: Array, target: Array, damping: Array | None = None
 
 def _basis(columns: Array) -> Array:
     """Orthonormal basis of the columns' span; dependent ones are dropped."""
-    norms = np.linalg.norm(columns, axis=0)
-    live = norms > 1e-9 * max(norms.max(initial=0.0), 1e-300)
+    norms, live = _felt(columns)
     if not live.any():
         return np.zeros((len(columns), 0))
     left, singular, _ = np.linalg.svd(columns[:, live] / norms[live], full_matrices=False)
     return left[:, singular > 1e-7 * singular[0]]
+
+
+def _felt(columns: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Norms of the columns, and which are more than rounding.
+
+    The first two, of position and velocity, set the scale: what keeps a hidden state that never moves in its place outweighs
+    them by any power of ten, and would pass them off for rounding.
+    """
+    norms = np.linalg.norm(columns, axis=0)
+    return norms, norms > 1e-9 * max(norms[:2].max(initial=0.0), 1e-300)
