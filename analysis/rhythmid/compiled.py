@@ -215,24 +215,26 @@ def generate(
     piece_u = "tu = ku[i]; c0 = cu[0, i]; c1 = cu[1, i]; c2 = cu[2, i]; c3 = cu[3, i]"
     piece_w = "tw = kw[j]; e0 = cw[0, j]; e1 = cw[1, j]; e2 = cw[2, j]; e3 = cw[3, j]"
     piece_d = "td = kd[l]; g0 = cd[0, l]; g1 = cd[1, l]; g2 = cd[2, l]; g3 = cd[3, l]"
-    following = [
-        "while kw[j + 1] <= t:",
-        "    j += 1",
-        piece_w,
-    ]  # smooth signals: no step ends at their knots
-    if smooth:
-        following += ["while ku[i + 1] <= t:", "    i += 1", piece_u]
-    if disturbed:
-        following += ["while kd[l + 1] <= t:", "    l += 1", piece_d]
-    find = ["while ku[i + 1] <= t:", "    i += 1", piece_u, *following]
+
+    def following(at: str) -> list[str]:
+        """Find the pieces of smooth signals at a time: no step ends at their knots."""
+        found = [f"while kw[j + 1] <= {at}:", "    j += 1", piece_w]
+        if smooth:
+            found += [f"while ku[i + 1] <= {at}:", "    i += 1", piece_u]
+        if disturbed:
+            found += [f"while kd[l + 1] <= {at}:", "    l += 1", piece_d]
+        return found
+
+    find = ["while ku[i + 1] <= t:", "    i += 1", piece_u, *following("t")]
     step = [  # the stages at the half step share their inputs, and so do the end of a step and the next one's begin
         stage(1, "t", "", "0.0"),
         *remember,  # a jump of the command
+        *following("t + half"),
         *inputs("t + half"),
         stage(2, "t + half", "half", "half"),
         stage(3, "t + half", "half", "half"),
         "t = begin + (substep + 1) * h",
-        *following,
+        *following("t"),
         *inputs("t"),
         stage(4, "t", "h", "h"),
         *(

@@ -82,6 +82,20 @@ def test_what_remembers_no_extreme_is_driven_by_the_smooth_stand_in(name, values
     assert run.inputs[0].smooth is not None
 
 
+@pytest.mark.parametrize("step", [PERIOD, 0.5625 * PERIOD])
+def test_wherever_a_jump_of_the_command_falls_within_a_step_it_acts_in_full(step):
+    jump = zero_order_hold(TIME, 8.0 * (TIME >= 0.4))
+    model, one = machine(sensor_lag={"time_constant": 0.017}), series(9, command=jump)
+    start = np.array([0.15, 0.0, 0.15])
+    for late in DELAYED["input_delay.delay"] + PERIOD * np.linspace(0.0, 1.0, 12):
+        delayed = model.with_values({"input_delay.delay": late})
+        outputs = prepare_run(delayed, [one], step).outputs(delayed, [start])
+        assert outputs is not None
+        exact = one.of_block(simulate(delayed, one.centres, jump, FORCING, start, 1e-4).output)
+        assert np.ptp(exact) > 0.05
+        np.testing.assert_allclose(outputs[0][4:-4], exact[4:-4], atol=1.5e-6)
+
+
 @pytest.mark.parametrize(
     ("name", "values", "state", "forced"),
     [
