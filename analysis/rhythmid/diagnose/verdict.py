@@ -22,6 +22,9 @@ LINE_WORTH = 0.1  # of the power that the named effects explain, below which a l
 # of the power that the named effects explain, beyond which a structured remainder says that they only imitate what is
 # there: true effects of the concealed proof left 0.00005 at most, imitations 0.012 to 0.03, a real circuit (Silverbox) 0.002
 LEFTOVER = 0.005
+# of what the least of several named effects explains, beyond which a structured remainder says the same: as much again is
+# missing as that effect was brought in for
+RIVALLING = 0.5
 UNCARRIED = 0.05  # of what was missing on held-out records, beyond which an explanation does not hold there
 PERIODS = 4  # of the dominant motion, below which a record says nothing
 
@@ -94,7 +97,7 @@ def verdict_of(
         return "consistent", ""
     improvement = found.nominal.chi2 - fit.chi2
     leftover = max((d.gain for d in remains), default=0.0)
-    if too_big or leftover > LEFTOVER * max(improvement, 1.0):
+    if too_big or leftover > min(LEFTOVER * max(improvement, 1.0), RIVALLING * _least_worth(found)):
         return "unknown_physics", "the best elements of the catalogue leave a structured remainder"
     if uncarried > UNCARRIED:
         return (
@@ -104,6 +107,13 @@ def verdict_of(
     if any(len(group) > TWINS for group in twins):
         return "undecided", "several effects explain the records equally well"
     return "missing_physics", ""
+
+
+def _least_worth(found: Search) -> float:
+    """What the chosen model loses in chi2 without the least of its effects, as far as that was tried."""
+    best = set(found.best.added)
+    without = [t.chi2 for t in found.trials if set(t.added) < best and len(t.added) == len(best) - 1]
+    return max(min(without, default=math.inf) - found.best.chi2, 1.0)
 
 
 def _weak(series: Sequence[Series]) -> bool:
