@@ -108,6 +108,13 @@ class Model:
             self.value(name)
         return self.with_parameters({n: replace(current[n], value=float(v)) for n, v in values.items()})
 
+    def unwound(self) -> "Model":
+        """A copy whose free phases lie within half a turn of zero; the model is the same."""
+        turns = {f"{t.label}.{p.name}": p.turn for t in self.terms for p in t.element.parameters}
+        return self.with_values(
+            {name: math.remainder(self.value(name), turns[name]) for name in self.free if name in turns}
+        )
+
     def with_element(
         self,
         element: Element,

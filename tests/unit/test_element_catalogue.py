@@ -6,6 +6,7 @@ from math import isfinite
 import numpy as np
 import pytest
 
+from machines import hopper
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.model import Model
 from rhythmid.plant import Plant
@@ -185,3 +186,27 @@ def test_runs_in_the_plant_alike_in_whatever_chunks(name, rig, scales):
         runs.append(np.concatenate(parts))
     assert len(runs[0]) == 400 and np.isfinite(runs[0]).all()
     assert np.array_equal(runs[0], runs[1])
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter"),
+    [(e.name, p.name) for e in CATALOGUE.values() for p in e.parameters if isfinite(p.turn)],
+)
+def test_a_phase_is_told_within_half_a_turn_and_the_effect_is_the_same(name, parameter):
+    element = CATALOGUE[name]
+    turn = next(p.turn for p in element.parameters if p.name == parameter)
+    values = {p.name: 0.7 for p in element.parameters} | {parameter: 2.0 + 3.0 * turn}
+    model = hopper().with_element(element, values)
+    told = model.unwound()
+    assert told.value(f"{name}.{parameter}") == pytest.approx(2.0)
+    assert element.kernel is not None
+    ahead = (0.3, 0.1, 0.2, 0.4)[: 1 if element.acts == "drive" else 4]
+    others = [model.value(f"{name}.{p.name}") for p in element.parameters]
+    wound = [told.value(f"{name}.{p.name}") for p in element.parameters]
+    assert element.kernel(*ahead, *wound) == pytest.approx(element.kernel(*ahead, *others))
+
+
+def test_what_is_no_phase_or_is_known_is_not_unwound():
+    values = {"amplitude": 9.0, "wavelength": 8.0, "phase": 7.0}
+    known = hopper().with_element(CATALOGUE["position_ripple"], values, fixed=True)
+    assert known.unwound() == known and hopper().unwound() == hopper()

@@ -40,7 +40,8 @@ class Parameter:
 
     `unit` is written for a translational machine (kg, m, s, N); a rotational or otherwise scaled model translates it.
     `default` is what a model file may leave out; None makes the parameter mandatory. A parameter that is `fixed` is not
-    estimated unless a model file says `fixed: false`: a seed, a side, an exponent.
+    estimated unless a model file says `fixed: false`: a seed, a side, an exponent. The effect is the same again a `turn`
+    further on: a phase.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Parameter:
     bounds: tuple[float, float] = (-inf, inf)
     default: float | None = None
     fixed: bool = False
+    turn: float = inf
 
 
 @dataclass(frozen=True)

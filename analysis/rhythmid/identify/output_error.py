@@ -122,10 +122,11 @@ def _fit(
         if linearisation is None:
             linearisation, *_ = problem.linearise(end.model, end.starts, end.residuals, *end.differences)
         linearisation = with_faint_directions(linearisation, problem, end.model, end.starts)
+    model = end.model.unwound()
     return Fit(
-        model=end.model,
+        model=model,
         names=tuple(names),
-        values=np.array([end.model.value(name) for name in names]),
+        values=np.array([model.value(name) for name in names]),
         covariance=covariance_of(
             linearisation.jacobian, [end.model.parameters[name].prior for name in names]
         ),

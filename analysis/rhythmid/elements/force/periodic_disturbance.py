@@ -32,7 +32,7 @@ ELEMENT = Element(
     parameters=(
         Parameter("amplitude", "N", "amplitude a", bounds=(0.0, math.inf)),
         Parameter("frequency", "Hz", "frequency f", bounds=(0.0, math.inf)),
-        Parameter("phase", "rad", "phase φ at t = 0", default=0.0),
+        Parameter("phase", "rad", "phase φ at t = 0", default=0.0, turn=2.0 * math.pi),
     ),
     kernel=kernel,
     acts="body",

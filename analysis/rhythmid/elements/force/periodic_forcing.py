@@ -20,7 +20,7 @@ ELEMENT = Element(
     parameters=(
         Parameter("amplitude", "N", "amplitude A"),
         Parameter("frequency", "Hz", "pumping frequency f = 1/T", bounds=(0.0, math.inf)),
-        Parameter("phase", "rad", "phase φ at t = 0", default=0.0),
+        Parameter("phase", "rad", "phase φ at t = 0", default=0.0, turn=2.0 * math.pi),
     ),
     kernel=kernel,
     acts="drive",

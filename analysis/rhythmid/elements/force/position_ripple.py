@@ -30,7 +30,7 @@ ELEMENT = Element(
     parameters=(
         Parameter("amplitude", "N", "amplitude A", bounds=(0.0, math.inf)),
         Parameter("wavelength", "m", "period λ in position", bounds=(1e-9, math.inf)),
-        Parameter("phase", "rad", "phase φ at x = 0", default=0.0),
+        Parameter("phase", "rad", "phase φ at x = 0", default=0.0, turn=2.0 * math.pi),
     ),
     kernel=kernel,
     acts="body",
