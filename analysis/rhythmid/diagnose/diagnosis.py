@@ -21,6 +21,7 @@ from rhythmid.diagnose.gate import admitted
 from rhythmid.diagnose.heldout import HeldOut, tail_error
 from rhythmid.diagnose.locate import Dependence, dependences
 from rhythmid.diagnose.next_experiment import next_experiment
+from rhythmid.diagnose.profile import profiled
 from rhythmid.diagnose.result import (
     Alternative,
     Detection,
@@ -130,6 +131,7 @@ def diagnose(
         found = search(seen, calibration.fit, known, pool, tell)
         tell("judging on held-out records")
         found, harmful = admitted(found, unseen if holdout else None, pool)
+        found = profiled(found, pool)
         tell("locating the mismatch")
         before = dependences(trajectories(found.nominal), pool)
         after = dependences(trajectories(found.fit), pool) if found.best.added else before
@@ -273,7 +275,7 @@ def _conclude(
 def _estimate(fit: Fit, name: str) -> Estimate:
     value = fit.model.parameters[name]
     std = fit.std.get(name)
-    if std is not None and (not math.isfinite(std) or std > 1e9 * max(abs(value.value), 1e-12)):
+    if std is not None and (not math.isfinite(std) or std > max(1e6 * abs(value.value), 1e-3)):
         std = None
     return Estimate(value.value, 0.0 if name not in fit.names else std, value.unit)
 

@@ -22,9 +22,9 @@ LINE_WORTH = 0.1  # of the power that the named effects explain, below which a l
 # of the power that the named effects explain, beyond which a structured remainder says that they only imitate what is
 # there: true effects of the concealed proof left 0.00005 at most, imitations 0.012 to 0.03, a real circuit (Silverbox) 0.002
 LEFTOVER = 0.005
-# of what the least of several named effects explains, beyond which a structured remainder says the same: as much again is
-# missing as that effect was brought in for
-RIVALLING = 0.5
+# of what the least of several named effects explains, beyond which a structured remainder says the same: pairs of true
+# effects of the concealed proof left none, imitations 0.15 and 1.2
+RIVALLING = 0.1
 UNCARRIED = 0.05  # of what was missing on held-out records, beyond which an explanation does not hold there
 PERIODS = 4  # of the dominant motion, below which a record says nothing
 

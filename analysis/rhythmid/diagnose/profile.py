@@ -1,0 +1,187 @@
+"""Do the intervals of the named effects hold? The likelihood is followed to their ends, and beyond where it asks for it.
+
+A covariance knows the likelihood's curvature at one point. An effect with a corner (a stop that is touched for a moment, a play
+whose far edge is never reached) can be curved there and flat or falling further on. So every parameter of an effect is
+moved to both ends of its 95 % interval, the others along with it as their covariance says: chi2 has to rise by four. Where
+it does not, the others are fitted again for the moved parameter. If chi2 then falls, the descent goes on from there; if it
+hardly rises, the interval is widened until it does, or is open.
+(Profile likelihood: S. A. Murphy, A. W. van der Vaart, J. Am. Stat. Assoc. 95 (2000) 449.)
+"""
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.diagnose.refit import whole_fit
+from rhythmid.diagnose.search import Search
+from rhythmid.errors import InputError
+from rhythmid.identify.descent import descend
+from rhythmid.identify.output_error import Fit
+from rhythmid.identify.sensitivity import Problem
+from rhythmid.model import Model
+
+Array = NDArray[np.float64]
+END = 2.0  # standard deviations at which chi2 should have risen by their square
+FLAT = 0.25  # of that rise, below which an interval is too narrow
+FALLS = 2.0  # by how much chi2 has to be lower elsewhere to go there
+WIDEST = 2.0**20  # standard deviations up to which the rise is sought,
+BEYOND = 30.0  # but no further than this times the parameter's value
+DESCENTS = 3  # to lower minima, at most
+TIED = 0.5  # share of its variance that a parameter of the machine has in common with one of an effect, to be tried, too
+AGAIN = 6  # iterations of the other parameters for a moved one
+
+
+@dataclass(frozen=True)
+class _Way:
+    """From a fit along one of its parameters, to this many standard deviations (negative: downwards) or beyond."""
+
+    place: int
+    deviations: float
+
+    def further(self, factor: float) -> "_Way":
+        return replace(self, deviations=factor * self.deviations)
+
+
+def profiled(found: Search, pool: ThreadPoolExecutor | None = None) -> Search:
+    """The search with its fit at the lowest minimum within sight, and intervals of its effects that the likelihood bears out.
+
+    A parameter whose likelihood does not rise before its bound, or before it has lost all relation to its value, is
+    undetermined: its variance is infinite.
+    """
+    flat: list[_Way] = []
+    for _ in range(DESCENTS):
+        flat, lower = _flat(found.fit, _places(found), pool)
+        better = None if lower is None else _descended(found, lower, pool)
+        if better is None:
+            break
+        found = better
+    return replace(found, fit=_widened(found.fit, flat, pool))
+
+
+def _places(found: Search) -> list[int]:
+    """Where the named effects' determined parameters stand among the fit's, and those of the machine that move with them."""
+    fit = found.fit
+    std = np.array([fit.std[name] for name in fit.names])
+    known = (std > 0.0) & np.isfinite(std)
+    own = known & np.array([name.rpartition(".")[0] in found.best.added for name in fit.names])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        alike = (fit.covariance / np.outer(std, std)) ** 2
+    return [int(i) for i in np.flatnonzero(known) if own[i] or np.any(alike[i, own] > TIED)]
+
+
+def _flat(
+    fit: Fit, places: Sequence[int], pool: ThreadPoolExecutor | None
+) -> tuple[list[_Way], Model | None]:
+    """The ways along which chi2 hardly rises, up to one that leads to a lower minimum, and the model there."""
+    ways = [_Way(place, sign * END) for place in places for sign in (-1.0, 1.0)]
+    found: list[_Way] = []
+    for way, rise in zip(ways, _rises(fit, ways, pool)):
+        if rise >= FLAT * END**2:
+            continue
+        rise, model = _again(fit, way, pool)
+        if rise < -FALLS:
+            return found, model
+        if rise < FLAT * END**2:
+            found.append(way)
+    return found, None
+
+
+def _moved(fit: Fit, way: _Way) -> Model | None:
+    """The model with one parameter moved, and with it the others; None where a bound is in the way."""
+    column = fit.covariance[:, way.place]
+    values = fit.values + way.deviations * column / math.sqrt(column[way.place])
+    bounds = [fit.model.parameters[name].bounds for name in fit.names]
+    if not bounds[way.place][0] < values[way.place] < bounds[way.place][1]:
+        return None
+    clipped = [float(np.clip(value, *bound)) for value, bound in zip(values, bounds)]
+    return fit.model.with_values(dict(zip(fit.names, clipped)))
+
+
+def _rises(fit: Fit, ways: Sequence[_Way], pool: ThreadPoolExecutor | None) -> list[float]:
+    """By how much chi2 rises along each way, less what small changes of initial states and other parameters can do about
+    it; infinite beyond a bound and where the model diverges."""
+    models = [_moved(fit, way) for way in ways]
+    outputs = iter(fit.run.many([(model, fit.starts) for model in models if model is not None], pool))
+    problem = Problem(fit.run, fit.names, fit.noise, pool)
+    rises = []
+    for way, model in zip(ways, models):
+        given = None if model is None else next(outputs)
+        left = None if given is None else [o - one.averaged for o, one in zip(given, fit.run.series)]
+        rises.append(math.inf if left is None else _rise(problem, fit, way.place, left))
+    return rises
+
+
+def _rise(problem: Problem, fit: Fit, place: int, residuals: Sequence[Array]) -> float:
+    columns = np.delete(fit.linearisation.jacobian, place, axis=1)
+    norms = np.linalg.norm(columns, axis=0)
+    others, _ = np.linalg.qr(columns / np.where(norms > 0.0, norms, 1.0))
+
+    def left(given: Sequence[Array]) -> float:
+        white = [problem.whitened(index, residual) for index, residual in enumerate(given)]
+        rest = np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])
+        return float(np.sum((rest - others @ (others.T @ rest)) ** 2))
+
+    with np.errstate(over="ignore", invalid="ignore"):
+        rise = left(residuals) - left(fit.residuals)
+    return rise if math.isfinite(rise) else math.inf
+
+
+def _within(fit: Fit, way: _Way) -> bool:
+    """Whether a way ends before its parameter's bound, and nearer than where it has lost all relation to its value."""
+    far = abs(way.deviations) * math.sqrt(fit.covariance[way.place, way.place])
+    near = far < BEYOND * abs(fit.values[way.place]) and abs(way.deviations) <= WIDEST
+    return near and _moved(fit, way) is not None
+
+
+def _again(fit: Fit, way: _Way, pool: ThreadPoolExecutor | None) -> tuple[float, Model]:
+    """By how much chi2 rises along a way with the other parameters fitted again, and the model there."""
+    model = _moved(fit, way)
+    if model is None:
+        return math.inf, fit.model
+    others = [name for place, name in enumerate(fit.names) if place != way.place]
+    steps, state_steps = fit.differences
+    try:
+        end = descend(
+            model, fit.run, others, fit.noise, fit.starts, AGAIN, pool,
+            differences=(np.delete(steps, way.place), state_steps),
+        )  # fmt: skip
+    except InputError:
+        return math.inf, fit.model
+    return end.chi2 - fit.chi2, end.model
+
+
+def _descended(found: Search, model: Model, pool: ThreadPoolExecutor | None) -> Search | None:
+    """The search with its fit descended anew from a model; None where that ends no lower."""
+    fit = found.fit
+    trial = replace(found.best, model=model, starts=fit.starts, converged=False, differences=None)
+    try:
+        again = whole_fit(trial, fit.run.series, found.noise, fit.run.max_step, pool=pool)
+    except InputError:
+        return None
+    if again.chi2 > fit.chi2 - FALLS:
+        return None
+    best = replace(
+        found.best, model=again.model, starts=again.starts, chi2=again.chi2, converged=again.converged
+    )
+    trials = tuple(best if trial is found.best else trial for trial in found.trials)
+    return replace(found, fit=again, best=best, trials=trials)
+
+
+def _widened(fit: Fit, ways: Sequence[_Way], pool: ThreadPoolExecutor | None) -> Fit:
+    """The fit with the standard deviations along these ways as wide as it takes for chi2 to rise."""
+    factors = np.ones(len(fit.names))
+    for way in ways:
+        factor = 2.0
+        while _within(fit, way.further(factor)) and _again(fit, way.further(factor), pool)[0] < END**2:
+            factor *= 2.0
+        inside = _within(fit, way.further(factor))
+        factors[way.place] = max(factors[way.place], factor if inside else math.inf)
+    open_ones = np.isinf(factors)
+    factors[open_ones] = 0.0
+    covariance = fit.covariance * np.outer(factors, factors)
+    covariance[open_ones, open_ones] = math.inf
+    return replace(fit, covariance=covariance)
