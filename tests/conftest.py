@@ -21,16 +21,6 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.setdefault("RHYTHMID_CACHE", str(config.cache.mkdir("compiled")))
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Where processes share the tests, a file stays with one of them, and so do all files that run nodes or a browser."""
-    if config.pluginmanager.hasplugin("xdist"):
-        for item in items:
-            folder = item.path.parent.name
-            group = folder if folder in ("ros", "browser") else item.path.name
-            item.add_marker(pytest.mark.xdist_group(group))
-
-
 @pytest.fixture
 def rhythmid(tmp_path: Path) -> Command:
     """The command line, run in `tmp_path`: rhythmid("check", bag) -> completed process with its output as text."""
