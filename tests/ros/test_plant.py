@@ -60,6 +60,8 @@ def test_a_command_acts_at_its_stamp_and_a_late_one_at_once(graph):
     now = time.time_ns()
     send(graph.joint_state(now, effort=0.3))
     graph.until(lambda: node.figures()["commands"] == "1", "the command")
+    reached = len(states) + 10
+    graph.until(lambda: len(states) > reached, "samples under the command")
     send(graph.joint_state(now - 1_000_000_000, effort=0.7))
     graph.until(lambda: node.figures()["commands"] == "2", "the late command")
     assert int(node.figures()["late_commands"]) >= 1

@@ -91,11 +91,15 @@ def undetermined(fit: Fit) -> list[Direction]:
             information[i, i] += (size[i] / prior.std) ** 2
     values, vectors = np.linalg.eigh(information)
     floor = max(1.0, 1e-11 * float(values[-1]))  # below this lies the error of the differences
-    return [_direction(fit.names, vectors[:, i], size) for i in range(p) if values[i] < floor]
+    felt = np.linalg.norm(fit.linearisation.jacobian, axis=0)
+    return [_direction(fit.names, vectors[:, i], size, felt) for i in range(p) if values[i] < floor]
 
 
-def _direction(names: Sequence[str], vector: Array, size: Array) -> Direction:
-    large = np.flatnonzero(np.abs(vector) > 0.05 * np.abs(vector).max())
+def _direction(names: Sequence[str], vector: Array, size: Array, felt: Array) -> Direction:
+    """In words, with the parameters that take part: as their sizes go, or as they are `felt`, by their effect a unit, for the
+    value of one that nothing determines may be anything."""
+    share, part = np.abs(vector) / np.abs(vector).max(), np.abs(vector * size * felt)
+    large = np.flatnonzero((share > 0.05) | ((share > 1e-6) & (part > 0.05 * part.max())))
     moved = [names[int(i)] for i in large]
     step = (vector * size)[large]
     if len(moved) == 1:
