@@ -56,6 +56,9 @@ LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalo
 REFITTED = 6
 # difference of the criterion within which models are compared again under the noise that they leave
 NEAR = 60.0
+# gain in the criterion from which a model is worth a second look where a better one does not hold under the noise that it
+# leaves; and how many of them get it
+PLAIN, SECOND = 100.0, 2
 MOST = 4  # effects at once
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
 MISFIT = 0.1  # error, as a share of the motion, and
@@ -193,19 +196,24 @@ def search(
             break
         trials |= {tuple(sorted(t.added)): t for t in found}
         near = [t for t in found if t.bic() - found[0].bic() < NEAR]
-        top = _most_likely(near, series, noise, step, floor)
-        fit = whole_fit(top, series, noise, step, pool=pool)
-        finer = accurate(fit.run, fit.model, fit.starts, ROUGH * fit.noise.variance**0.5, 2)
-        if finer.max_step < 0.45 * fine_enough(top.model, step):
-            step = finer.max_step
-            fit = whole_fit(replace(top, converged=False), series, noise, step, pool=pool)
-        settled = noise_of(fit.residuals, series, floor)
-        compared = under_noise([*near, best], series, settled, step)
-        trials |= {tuple(sorted(t.added)): t for t in compared}
-        winner = compared[0]
-        before = next((t for t in compared if t.added == best.added), best)
-        gain = before.bic() - winner.bic()
-        if winner.added == best.added or gain < max(WORTH, SHARE * gained):
+        margin = max(WORTH, SHARE * gained)
+        hopeful = [[t] for t in found[len(near) :] if best.bic() - t.bic() > PLAIN][:SECOND]
+        for candidates in (near, *hopeful):
+            top = _most_likely(candidates, series, noise, step, floor)
+            fit = whole_fit(top, series, noise, step, pool=pool)
+            finer = accurate(fit.run, fit.model, fit.starts, ROUGH * fit.noise.variance**0.5, 2)
+            if finer.max_step < 0.45 * fine_enough(top.model, step):
+                step = finer.max_step
+                fit = whole_fit(replace(top, converged=False), series, noise, step, pool=pool)
+            settled = noise_of(fit.residuals, series, floor)
+            compared = under_noise([*candidates, best], series, settled, step)
+            trials |= {tuple(sorted(t.added)): t for t in compared}
+            winner = compared[0]
+            before = next((t for t in compared if t.added == best.added), best)
+            gain = before.bic() - winner.bic()
+            if winner.added != best.added and gain >= margin:
+                break
+        else:  # what the noise model of the round saw in them, the noise that they leave does not bear out
             break
         gained += gain
         noise = settled
