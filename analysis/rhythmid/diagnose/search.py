@@ -116,22 +116,21 @@ def noise_without(fit: Fit, changes: Sequence[Change], most: int = 60) -> NoiseM
     return estimate_noise(stretches, floor=fit.noise.std * 1e-6)
 
 
-def _one_round(
-    fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None, colour: bool
-) -> tuple[Round, Fit]:
-    """Score the catalogue at a fit; with `colour` the noise model is settled first, and the fit returned under it."""
+def _one_round(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> tuple[Round, Fit]:
+    """Score the catalogue at a fit, under the noise that its best guesses leave; returns the fit under that noise, too.
+
+    What is missing, such as a slow drift, would otherwise pass for the colour of the noise, in later rounds as in the first.
+    """
     known = trajectories(fit)
     sizes = replace(scales(fit.run.series, fit.model), residual_frequency=residual_line(fit))
     if controlled(fit.model):  # the actuator's force is the controller's, which only the simulation knows
         sizes = replace(sizes, effort=max(float(np.std(path.effort)) for path in known.paths) or sizes.effort)
     changes = changes_of(known, guesses(catalogue, fit.model, sizes), pool)
-    if colour:
-        noise = noise_without(fit, changes)
-        if fit.nrmse() > MISFIT and noise.variance > PREDICTED * noise.std**2:
-            noise = NoiseModel(
-                np.empty(0), noise.variance**0.5
-            )  # motion that is missed, not noise: do not whiten it away
-        fit = under(fit, noise, pool)
+    noise = noise_without(fit, changes)
+    if fit.nrmse() > MISFIT and noise.variance > PREDICTED * noise.std**2:
+        # motion that is missed, not noise: do not whiten it away
+        noise = NoiseModel(np.empty(0), noise.variance**0.5)
+    fit = under(fit, noise, pool)
     scores = score(fit, changes)
     return Round(tuple(scores), p_value(scores)), fit
 
@@ -163,7 +162,7 @@ def search(
     step = nominal.run.max_step
     floor = 1e-9 * max(float(np.std(one.averaged)) for one in series)
     tell("scoring the catalogue")
-    first, nominal = _one_round(nominal, catalogue, pool, colour=True)
+    first, nominal = _one_round(nominal, catalogue, pool)
     current, noise = nominal, nominal.noise
     base = Trial(
         (),
@@ -177,7 +176,8 @@ def search(
         nominal.differences,
     )
     trials: dict[tuple[str, ...], Trial] = {(): base}
-    best = base
+    # the same model under the noise that it leaves, and under a round's, out of which the catalogue's guesses are taken
+    best = here = base
     rounds, excluded = [first], []
     now = first
     gained = 0.0
@@ -185,26 +185,26 @@ def search(
         now.p_value < LEVEL and _could_pay(now, best, max(WORTH, SHARE * gained)) and len(best.added) < most
     ):
         count = REFITTED if not best.added else REFITTED - 2
-        proposals, enough = _proposals(best.model, best.added, now.scores, count, best.chi2)
+        proposals, enough = _proposals(here.model, here.added, now.scores, count, here.chi2)
         tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
         found, failed = run_trials(
-            proposals, series, best.starts, current.run.compiled.layout.states, noise, step, enough
+            proposals, series, here.starts, current.run.compiled.layout.states, here.noise, step, enough
         )
         excluded += failed
-        found = [t for t in found if t.chi2 < best.chi2]  # a richer model that does worse got lost
+        found = [t for t in found if t.chi2 < here.chi2]  # a richer model that does worse got lost
         if not found:
             break
         trials |= {tuple(sorted(t.added)): t for t in found}
         near = [t for t in found if t.bic() - found[0].bic() < NEAR]
         margin = max(WORTH, SHARE * gained)
-        hopeful = [[t] for t in found[len(near) :] if best.bic() - t.bic() > PLAIN][:SECOND]
+        hopeful = [[t] for t in found[len(near) :] if here.bic() - t.bic() > PLAIN][:SECOND]
         for candidates in (near, *hopeful):
-            top = _most_likely(candidates, series, noise, step, floor)
-            fit = whole_fit(top, series, noise, step, pool=pool)
+            top = _most_likely(candidates, series, here.noise, step, floor)
+            fit = whole_fit(top, series, here.noise, step, pool=pool)
             finer = accurate(fit.run, fit.model, fit.starts, ROUGH * fit.noise.variance**0.5, 2)
             if finer.max_step < 0.45 * fine_enough(top.model, step):
                 step = finer.max_step
-                fit = whole_fit(replace(top, converged=False), series, noise, step, pool=pool)
+                fit = whole_fit(replace(top, converged=False), series, here.noise, step, pool=pool)
             settled = noise_of(fit.residuals, series, floor)
             compared = under_noise([*candidates, best], series, settled, step)
             trials |= {tuple(sorted(t.added)): t for t in compared}
@@ -222,7 +222,8 @@ def search(
         current = whole_fit(best, series, noise, step, pool=pool)
         if len(best.added) >= most:
             break
-        now, _ = _one_round(current, catalogue, pool, colour=False)
+        now, current = _one_round(current, catalogue, pool)
+        here = under_noise([best], series, current.noise, step, 0)[0]
         rounds.append(now)
     if best.added:
         margin = max(WORTH, SHARE * gained)
