@@ -36,7 +36,9 @@ $(VENV)/.warm: $(VENV)/.packages
 	@touch $@
 
 test: lint ## Run the linters and all tests, fast ones first
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder --ignore tests/ros
+	@# what runs in real time has the machine to itself
+	$(BIN)/python -m pytest tests/ros
 
 lint: $(VENV)/.packages ## Run ruff and pyright
 	$(BIN)/ruff check .
