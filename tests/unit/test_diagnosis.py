@@ -67,3 +67,13 @@ def test_all_parameters_fixed_is_refused_with_the_mend():
     fixed = model.with_parameters({n: replace(v, fixed=True) for n, v in model.parameters.items()})
     with pytest.raises(InputError, match="fixed"):
         diagnose(records(hopper())[:1], fixed, catalogue=CATALOGUE)
+
+
+def test_a_drift_beside_a_strong_effect_does_not_pass_for_the_colour_of_the_noise():
+    damped = hopper().with_element(CATALOGUE["flight_damping"], {"damping": 5.0})
+    machine = damped.with_element(CATALOGUE["sensor_drift"], {"rate": 2e-5})
+    found = diagnose(records(machine), hopper()).diagnosis
+    assert found.verdict == "missing_physics"
+    assert {effect.element for effect in found.missing} == {"flight_damping", "sensor_drift"}
+    drift = next(effect for effect in found.missing if effect.element == "sensor_drift").parameters["rate"]
+    assert drift.std is not None and abs(drift.value - 2e-5) < 4.0 * drift.std < 1e-5

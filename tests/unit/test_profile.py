@@ -15,7 +15,7 @@ from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 
-NOISE = NoiseModel(np.empty(0), 1e-4)
+NOISE = NoiseModel(np.empty(0), 0.5e-4)  # of averages of four samples
 
 
 def search_of(fit: Fit, label: str) -> Search:
@@ -30,8 +30,7 @@ def fitted(truth: Model, begin: Model) -> Fit:
     """A fit of large chirps that the true machine made, from the model to begin with."""
     loud = SHORT[1][0] | {"amplitude": 1.7}
     series = prepare(records(truth, [(loud, 1.0)], delays=(0.0, 0.0)), 4)
-    noise = replace(NOISE, std=NOISE.std / 2.0)
-    return estimate(begin, series, noise=noise, max_step=1e-3)
+    return estimate(begin, series, noise=NOISE, max_step=1e-3)
 
 
 def test_an_effect_that_the_records_determine_keeps_its_intervals():
