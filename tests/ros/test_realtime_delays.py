@@ -66,7 +66,9 @@ def recorded(rhythmid, tmp_path) -> tuple[Path, dict[str, dict[str, str]]]:
     return tmp_path / "bag", figures(done.stderr)
 
 
-def test_delays_of_a_busy_machine_lie_between_what_was_asked_for_and_the_mean_of_what_was_applied(recorded, rhythmid, tmp_path):
+def test_delays_of_a_busy_machine_lie_between_what_was_asked_for_and_the_mean_of_what_was_applied(
+    recorded, rhythmid, tmp_path
+):
     bag, told = recorded
     done = rhythmid("identify", bag, "--json", "result.json")
     assert done.returncode == 0, done.stderr

@@ -52,6 +52,62 @@ def test_a_rival_that_replaces_an_effect_is_its_twin_once_and_never_one_that_con
     assert twins_of(best, rivals) == [("flight_damping", "viscous_damper", "quadratic_drag")]
 
 
+def several(base: Model, chi2: float = 100.0, **elements: dict[str, float]) -> Trial:
+    """A model with several more elements, as if it had been fitted."""
+    for name, values in elements.items():
+        base = base.with_element(CATALOGUE[name], values)
+    return Trial(tuple(elements), base, (), chi2, 2000, len(base.free), True, QUIET)
+
+
+CURVED = {
+    "cubic_stiffness": {"coefficient": 10.0},
+    "quadratic_stiffness": {"coefficient": 10.0},
+    "quintic_stiffness": {"coefficient": 10.0},
+    "position_ripple": {"amplitude": 5.0, "wavelength": 0.5, "phase": 0.0},
+}
+
+
+def test_effects_that_one_element_can_replace_each_are_one_family_and_too_many_models_to_name_one():
+    terms = {name: CURVED[name] for name in ("quadratic_stiffness", "quintic_stiffness")}
+    best = several(hopper(), **terms)
+    ripple = CURVED["position_ripple"]
+    rivals = [several(hopper(), **{name: terms[name]}, position_ripple=ripple) for name in terms]
+    twins = twins_of(best, rivals)
+    assert twins == [("quadratic_stiffness", "quintic_stiffness", "position_ripple")]
+    found = replace(explained(0.1, 0.01), best=best, trials=(best, *rivals))
+    assert verdict_of(found, 1e-9, [], twins, None, [SERIES], 0.0)[0] == "undecided"
+    # one replacement for one of two effects leaves two models: that is an answer
+    twins = twins_of(best, rivals[:1])
+    assert twins == [("quintic_stiffness", "position_ripple")]
+    assert verdict_of(found, 1e-9, [], twins, None, [SERIES], 0.0)[0] == "missing_physics"
+
+
+@pytest.mark.parametrize(
+    ("terms", "better", "expected"),
+    [
+        (("quadratic_stiffness", "quintic_stiffness"), 0.0, "missing_physics"),
+        (("quadratic_stiffness", "quintic_stiffness"), 100.0, "unknown_physics"),
+        (("quadratic_stiffness", "quintic_stiffness", "position_ripple"), 0.0, "unknown_physics"),
+        (("cubic_stiffness", "coulomb_friction"), 100.0, "missing_physics"),
+        (("cubic_stiffness", "faint_quadratic"), 100.0, "missing_physics"),  # which corrects the cubic one
+    ],
+)
+def test_laws_of_one_quantity_that_leave_more_to_say_or_are_many_are_a_series_and_not_named(
+    terms, better, expected
+):
+    values = CURVED | {"coulomb_friction": {"force": 0.1, "transition": 0.01}}
+    given = {name: values[name] for name in terms if name in values}
+    if "faint_quadratic" in terms:
+        given["quadratic_stiffness"] = {"coefficient": 1.0}
+    best = several(hopper(), **given)
+    kink = {"change": 1.0, "kink": 0.5}  # two parameters more cost 15
+    richer = several(hopper(), best.chi2 - better, **given, bilinear_stiffness=kink)
+    found = replace(explained(0.1, 0.01), best=best, trials=(best, richer))
+    verdict, why = verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)
+    assert verdict == expected
+    assert ("a series for one law of the position" in why) is (expected == "unknown_physics")
+
+
 def fit_of(rest: float, line: float) -> Fit:
     """A fit that leaves noise of size `rest`, as a share of the motion, and in it a line of this size, at 3.7 Hz."""
     noise = rest * np.random.default_rng(2).standard_normal(len(TIME))

@@ -60,6 +60,7 @@ NEAR = 60.0
 # leaves; and how many of them get it
 PLAIN, SECOND = 100.0, 2
 MOST = 4  # effects at once
+OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
 MISFIT = 0.1  # error, as a share of the motion, and
 # power of the residual over what its own past leaves of it, beyond both of which it is no noise
@@ -232,12 +233,16 @@ def search(
         if defended is not best:
             best = defended
             noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
-    ranked = near_under_noise(_contenders(trials, best), series, noise, step, NEAR)
-    best = next(t for t in ranked if set(t.added) == set(best.added))
-    ahead = max(WORTH, SHARE * gained) if ranked[0].free > best.free else WORTH
-    if ranked[0].bic() < best.bic() - ahead and ranked[0].added:
+    ranked = _contenders(trials, best)
+    for _ in range(OVERTAKEN):
+        ranked = near_under_noise(ranked, series, noise, step, NEAR)
+        best = next(t for t in ranked if set(t.added) == set(best.added))
+        ahead = max(WORTH, SHARE * gained) if ranked[0].free > best.free else WORTH
+        if ranked[0].bic() >= best.bic() - ahead or not ranked[0].added:
+            break
         best = ranked[0]  # a model set aside under an earlier noise model has overtaken the chosen one
         noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
+    else:
         ranked = near_under_noise(ranked, series, noise, step, NEAR)
         best = next(t for t in ranked if set(t.added) == set(best.added))
     fit = whole_fit(best, series, noise, step, pool=pool)

@@ -9,13 +9,14 @@ from rhythmid.diagnose.line_test import strongest_line
 from rhythmid.diagnose.locate import Dependence
 from rhythmid.diagnose.refit import Trial
 from rhythmid.diagnose.result import Verdict
-from rhythmid.diagnose.search import LEVEL, Search
+from rhythmid.diagnose.search import LEVEL, WORTH, Search
+from rhythmid.diagnose.static_law import series_in
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.series import Series, dominant_frequency
+from rhythmid.identify.series import Series, dominant_frequency, scales
 from rhythmid.model import Model
 from rhythmid.record.quality import resolution
 
-TWINS = 2  # a family of this many is an answer; a larger one is undecided
+TWINS = 2  # as many models that cannot be told apart are an answer; more are undecided
 REMAINDER_LEVEL = 1e-6  # p-value of a structured remainder
 LINE_SHARE = 0.05  # of the residual's power, from which a line in it is a matter
 LINE_WORTH = 0.1  # of the power that the named effects explain, below which a line is their imperfection
@@ -27,6 +28,12 @@ LEFTOVER = 0.005
 # 0.15 and 1.2 of the least (0.0022 and 0.0044 of all); beside the corrections that a real circuit needs 0.0016 of all are left
 RIVALLING, REAL = 0.1, 0.002
 UNCARRIED = 0.05  # of what was missing on held-out records, beyond which an explanation does not hold there
+QUANTITIES = {
+    "position": "position",
+    "velocity": "velocity",
+    "effort": "actuator's force",
+    "signal": "signal",
+}
 PERIODS = 4  # of the dominant motion, below which a record says nothing
 
 
@@ -35,7 +42,10 @@ def significant(dependence: Dependence) -> bool:
 
 
 def twins_of(best: Trial, rivals: Sequence[Trial]) -> list[tuple[str, ...]]:
-    """Families within which the records cannot tell: elements that replace one another in equally good models."""
+    """Families within which the records cannot tell: elements that replace one another in equally good models.
+
+    Every family begins with what the best model has of it. Where one element can replace several, all are one family.
+    """
     groups: list[tuple[str, ...]] = []
     for label in best.added:
         element = best.element(label)
@@ -52,7 +62,21 @@ def twins_of(best: Trial, rivals: Sequence[Trial]) -> list[tuple[str, ...]]:
                     others.append(other)
         if others:
             groups.append((element.name, *others))
-    return groups
+    named = {best.element(label).name for label in best.added}
+    order = [name for group in groups for name in group]
+    return [
+        tuple(sorted(family, key=lambda name: (name not in named, order.index(name))))
+        for family in _joined(groups)
+    ]
+
+
+def _joined(groups: Sequence[tuple[str, ...]]) -> list[set[str]]:
+    """Unions of the groups that share a member."""
+    joined: list[set[str]] = []
+    for group in groups:
+        apart = [one for one in joined if one.isdisjoint(group)]
+        joined = [*apart, set(group).union(*(one for one in joined if one not in apart))]
+    return joined
 
 
 def _estimated(model: Model, name: str) -> bool:
@@ -107,7 +131,16 @@ def verdict_of(
             "unknown_physics",
             f"with the best elements of the catalogue {100.0 * uncarried:.0f} % of what is missing on held-out data remains",
         )
-    if any(len(group) > TWINS for group in twins):
+    sum_of_laws = series_in(found.best, found.trials, scales(series, found.best.model), WORTH)
+    if sum_of_laws is not None:
+        quantity, labels = sum_of_laws
+        terms = " and ".join(found.best.element(label).name.replace("_", " ") for label in labels)
+        return (
+            "unknown_physics",
+            f"{terms} are needed at once, a series for one law of the {QUANTITIES[quantity]}",
+        )
+    named = {found.best.element(label).name for label in found.best.added}
+    if any(math.comb(len(group), len(named.intersection(group))) > TWINS for group in twins):
         return "undecided", "several effects explain the records equally well"
     return "missing_physics", ""
 

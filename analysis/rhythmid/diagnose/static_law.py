@@ -1,0 +1,86 @@
+"""Static laws: effects whose force, or change of a signal, is a curved function of one quantity of the instant.
+
+Several of them in one quantity are a series: their sum is one law again, and can stand for a law that the catalogue
+does not have, as powers of x do for any smooth spring.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.diagnose.refit import Trial
+from rhythmid.effect import Path, effect_along
+from rhythmid.elements.element import Element, Scales
+from rhythmid.model import Model
+
+Array = NDArray[np.float64]
+POINTS = 400  # instants at which an effect is tried
+SPREAD = 3.0  # standard deviations of velocity and force that they cover
+TERMS = 2  # as many laws of one quantity may be causes of their own; more are a series
+CORRECTION = 0.3  # of a sum of laws, up to which the others only correct the one that it mostly is
+SAME = 1e-9  # change, as a share of the effect, below which a quantity does not matter
+
+
+def law_of(
+    element: Element, values: Mapping[str, float], model: Model, sizes: Scales
+) -> tuple[str, Array] | None:
+    """The one quantity of which the effect is a curved function: position, velocity, effort (the actuator's force) or
+    signal (what enters a command, actuator or sensor element), and the curved part of it (POINTS,), at the same instants
+    for every effect. None where the effect is straight, remembers, or takes several quantities."""
+    if element.kernel is None or element.own:
+        return None
+    rng = np.random.default_rng(0)
+    width = {"velocity": SPREAD * sizes.velocity, "effort": SPREAD * sizes.effort, "leg": sizes.force}
+    drawn = {name: rng.uniform(-half, half, POINTS) for name, half in width.items()}
+    drawn["position"] = rng.uniform(sizes.low, sizes.high, POINTS)
+    drawn["signal"] = drawn["position" if element.slot == "sensor" else "effort"]
+    path = Path(time=np.linspace(0.0, sizes.duration, POINTS), **drawn)
+    effect = effect_along(element, values, model, path)
+    size = float(np.ptp(effect))
+    for name in ("signal",) if element.slot != "force" else ("position", "velocity", "effort"):
+        others = {other: rng.permutation(value) for other, value in drawn.items() if other != name}
+        again = effect_along(element, values, model, replace(path, time=path.time + 1.0, **others))
+        if np.abs(again - effect).max() > SAME * size:
+            continue
+        straight = np.column_stack([np.ones(POINTS), drawn[name] / np.abs(drawn[name]).max()])
+        curved = effect - straight @ np.linalg.lstsq(straight, effect, rcond=None)[0]
+        return (name, curved) if np.abs(curved).max() > SAME * size else None
+    return None
+
+
+def laws_of(trial: Trial, sizes: Scales) -> dict[tuple[str, str], dict[str, Array]]:
+    """The static laws among a model's added effects: their curved parts by label, by (slot, quantity)."""
+    found: dict[tuple[str, str], dict[str, Array]] = {}
+    for label in trial.added:
+        term = trial.model.term(label)
+        assert term is not None
+        values = {name: value.value for name, value in term.values.items()}
+        law = law_of(term.element, values, trial.model, sizes)
+        if law is not None:
+            found.setdefault((term.element.slot, law[0]), {})[label] = law[1]
+    return found
+
+
+def series_in(
+    best: Trial, trials: Sequence[Trial], sizes: Scales, worth: float
+) -> tuple[str, tuple[str, ...]] | None:
+    """A quantity with the labels of the laws that only together make the one law of it that is there.
+
+    None of them is nearly all of their sum, and they are more than `TERMS`, or a richer one of the `trials` with one more
+    of them is better by `worth` in the criterion: the series would go on.
+    """
+    for key, laws in laws_of(best, sizes).items():
+        total = np.sum(list(laws.values()), axis=0)
+        if any(np.std(total - law) < CORRECTION * np.std(total) for law in laws.values()):
+            continue
+        goes_on = any(
+            set(t.added) > set(best.added)
+            and t.bic() < best.bic() - worth
+            and len(laws_of(t, sizes).get(key, {})) > len(laws)
+            for t in trials
+        )
+        if len(laws) > TERMS or (len(laws) == TERMS and goes_on):
+            return key[1], tuple(laws)
+    return None
