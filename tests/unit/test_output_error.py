@@ -158,6 +158,16 @@ def test_what_an_actuator_remembers_at_a_records_start_is_found(name, values):
         assert np.sqrt(fit.chi2 / fit.samples) < 1.1
 
 
+@pytest.mark.parametrize("start", [1.3, 1.5, 1.7, 2.0])
+def test_how_far_a_hysteresis_is_stretched_at_a_records_start_is_found(start):
+    values = {"stiffness": 190.0, "yield_displacement": 1e-3}
+    machine = hopper().with_element(CATALOGUE["elastoplastic_hysteresis"], values)
+    machine = machine.with_element(CATALOGUE["sensor_lag"], {"time_constant": 0.03})
+    whole = records(machine, SHORT[1:2], std=1e-5, delays=(0.0, 0.0))[0]
+    fit = start_only(machine, prepare([whole.cut(start, 9.0)]), NoiseModel(np.empty(0), 1e-5), 5e-4)
+    assert np.sqrt(fit.chi2 / fit.samples) < 1.1
+
+
 def test_the_start_of_a_record_without_command_is_found_beside_a_lag_that_stays_at_rest():
     """The lag has nothing to remember there, and is kept at rest as firmly as ever; position and velocity are still sought."""
     machine = hopper().with_element(CATALOGUE["command_lag"], {"time_constant": 0.03})

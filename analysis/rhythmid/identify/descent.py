@@ -23,6 +23,10 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 WHITE = NoiseModel(np.empty(0), 1.0)
+LEAST, STATES = (
+    1e-6,
+    0.01,
+)  # damping up to which a step counts as a full one, and beyond which it holds every state back
 STAY = 0.1  # share of its distance from a lower bound that one step leaves a parameter: a width of zero is hard to leave
 BRINK = 1e-3  # share of its first distance within which it may reach the bound
 
@@ -129,7 +133,7 @@ def descend(
     else:
         steps, state_steps = differences
     held = np.array([float(place in run.compiled.layout.memories) for place in range(run.states)])
-    damping, converged, searched = 1e-6, False, not held.any()
+    damping, converged, searched = LEAST, False, not held.any()
     low = np.array([model.parameters[name].bounds[0] for name in names])
     high = np.array([model.parameters[name].bounds[1] for name in names])
     brink = [a + BRINK * (model.value(n) - a) if math.isfinite(a) else math.inf for n, a in zip(names, low)]
@@ -165,11 +169,12 @@ def descend(
             moved, promised = [], _prior_cost(priors, proposed)
             for start, (error, slope, state) in zip(current, states):
                 ahead = error + slope @ step
-                change = state_update(state, ahead, held * damping)
+                # the other states are held back only where that of the parameters and memories did not help
+                change = state_update(state, ahead, damping * np.where(damping > STATES, 1.0, held))
                 moved.append(start + change * state_steps)
                 promised += float(np.sum((ahead + state @ change) ** 2))
             enough = max(tolerance * min(1.0, cost / samples), 1e-7 * cost)
-            if whole and damping <= 1e-6 and cost - promised < enough:
+            if whole and damping <= LEAST and cost - promised < enough:
                 converged = True
                 break
             trial_residuals = problem.residuals(trial, moved)
@@ -182,7 +187,7 @@ def descend(
                 improved = True
                 converged = gain < enough
                 break
-            damping = max(damping * 10.0, 1e-6)
+            damping = max(damping * 10.0, LEAST)
             if damping > 1e8:
                 break
         converged = converged or not improved  # no direction lowers the cost any more
@@ -196,7 +201,7 @@ def descend(
                     trial_cost,
                     trial_residuals,
                     None,
-                    1e-6,
+                    LEAST,
                     False,
                 )
         state_steps = state_steps_next

@@ -202,7 +202,7 @@ def estimate(
 def start_only(model: Model, series: Sequence[Series], noise: NoiseModel, max_step: float) -> Fit:
     """Free run over records that the model has not seen: only their initial states are estimated."""
     run = prepare_run(model, series, max_step)
-    return minimise(model, run, (), noise, None, 8)
+    return minimise(model, run, (), noise)
 
 
 def with_bounds(model: Model, bounds: Mapping[str, tuple[float, float]]) -> Model:
