@@ -67,6 +67,12 @@ CURVED = {
 }
 
 
+CURVED_AND_DRY = {
+    "cubic_stiffness": CURVED["cubic_stiffness"],
+    "coulomb_friction": {"force": 0.1, "transition": 0.01},
+}
+
+
 def test_effects_that_one_element_can_replace_each_are_one_family_and_too_many_models_to_name_one():
     terms = {name: CURVED[name] for name in ("quadratic_stiffness", "quintic_stiffness")}
     best = several(hopper(), **terms)
@@ -114,7 +120,11 @@ def fit_of(rest: float, line: float) -> Fit:
     residuals = (np.std(SERIES.value) * (noise + np.sqrt(2.0) * line * np.sin(2 * np.pi * 3.7 * TIME)),)
     run, power = SimpleNamespace(series=(SERIES,)), float(np.sum(residuals[0] ** 2))
     made = SimpleNamespace(
-        run=run, residuals=residuals, chi2=power, nrmse=lambda: normalised_error(residuals, run.series)
+        run=run,
+        residuals=residuals,
+        chi2=power,
+        std={},
+        nrmse=lambda: normalised_error(residuals, run.series),
     )
     return cast(Fit, made)
 
@@ -141,7 +151,14 @@ def explained(nominal: float, left: float, held: float = 0.0) -> Search:
         series = replace(SERIES, used=used, hidden=~used)
         chi2 = float(np.sum((residual[used] / (0.01 * np.std(SERIES.value))) ** 2))
         run = SimpleNamespace(series=(series,))
-        fits.append(SimpleNamespace(run=run, residuals=(residual,), chi2=chi2, nrmse=lambda size=size: size))
+        made = {
+            "run": run,
+            "residuals": (residual,),
+            "chi2": chi2,
+            "nrmse": lambda size=size: size,
+            "std": {},
+        }
+        fits.append(SimpleNamespace(**made))
     return Search(cast(Fit, fits[0]), best, cast(Fit, fits[1]), QUIET, (best,), (), ())
 
 
@@ -153,6 +170,24 @@ def test_effects_that_leave_a_structured_remainder_are_not_named_unless_it_is_fa
     verdict, why = verdict_of(found, 1e-9, remains, [], None, [SERIES], 0.0)
     assert verdict == expected
     assert ("structured remainder" in why) is (expected == "unknown_physics")
+
+
+@pytest.mark.parametrize(
+    ("stds", "expected"),
+    [
+        ({"cubic_stiffness.coefficient": 1.0, "coulomb_friction.force": 0.01}, "missing_physics"),
+        ({"cubic_stiffness.coefficient": 9.0, "coulomb_friction.force": 0.01}, "missing_physics"),
+        ({"cubic_stiffness.coefficient": 9.0, "coulomb_friction.force": 0.08}, "unknown_physics"),
+        ({"cubic_stiffness.coefficient": np.inf, "coulomb_friction.force": np.inf}, "unknown_physics"),
+    ],
+)
+def test_effects_of_which_only_the_sum_is_determined_are_not_named(stds, expected):
+    best = several(hopper(), **CURVED_AND_DRY)
+    found = replace(explained(0.1, 0.01), best=best, trials=(best,))
+    found.fit.__dict__.update(std=stds, model=best.model)
+    verdict, why = verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)
+    assert verdict == expected
+    assert ("only the sum of cubic stiffness and coulomb friction" in why) is (expected == "unknown_physics")
 
 
 def test_effects_that_do_not_hold_on_held_out_data_are_not_named():

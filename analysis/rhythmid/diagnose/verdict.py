@@ -34,6 +34,7 @@ QUANTITIES = {
     "effort": "actuator's force",
     "signal": "signal",
 }
+TOLD = 2.0  # standard deviations from nothing, from which the records determine the size of an effect
 PERIODS = 4  # of the dominant motion, below which a record says nothing
 
 
@@ -139,10 +140,29 @@ def verdict_of(
             "unknown_physics",
             f"{terms} are needed at once, a series for one law of the {QUANTITIES[quantity]}",
         )
+    together = _undetermined(found)
+    if len(together) > 1:  # one alone is determined by what else it does: a stop touched once by where it is
+        return (
+            "unknown_physics",
+            f"only the sum of {' and '.join(together)} is determined, none of them by itself",
+        )
     named = {found.best.element(label).name for label in found.best.added}
     if any(math.comb(len(group), len(named.intersection(group))) > TWINS for group in twins):
         return "undecided", "several effects explain the records equally well"
     return "missing_physics", ""
+
+
+def _undetermined(found: Search) -> list[str]:
+    """The effects, in words, whose sizes the records do not tell from nothing."""
+    names: list[str] = []
+    for label in found.best.added:
+        element = found.best.element(label)
+        size = f"{label}.{element.size}"
+        if element.size and found.fit.std.get(size, 0.0) > 0.0:
+            value, std = found.fit.model.value(size), found.fit.std[size]
+            if abs(value - (element.absent if math.isfinite(element.absent) else 0.0)) < TOLD * std:
+                names.append(element.name.replace("_", " "))
+    return names
 
 
 def _least_worth(found: Search) -> float:
