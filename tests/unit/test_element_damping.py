@@ -50,6 +50,17 @@ def test_switching_threshold_moves_the_switch_of_the_nominal_damper(rig, thresho
     assert np.abs(run.position - exact.y[0]).max() < 0.01 * np.abs(without.y[0] - exact.y[0]).max()
 
 
+def test_a_switch_is_no_wider_than_half_its_threshold(rig):
+    def run(transition):
+        values = {"threshold": 0.1, "transition": transition}
+        return rig.run(
+            rig.model("switching_threshold", values, spring=100.0, stance=4.0, flight=1.0), 0.9, (0.05, 0.0)
+        )
+
+    assert np.array_equal(run(10.0).position, run(0.05).position)
+    assert np.abs(run(0.05).position - run(0.02).position).max() > 1e-6
+
+
 @pytest.mark.parametrize("exponent", [1, 2])
 def test_position_dependent_damping_takes_speed_by_the_way_travelled(rig, exponent):
     values = {"coefficient": 3.0, "reference": -0.2, "exponent": exponent}
