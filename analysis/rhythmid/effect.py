@@ -11,9 +11,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.compiled import kernel_source
 from rhythmid.elements.element import ELAPSED, STEP, Element
 from rhythmid.errors import InputError
+from rhythmid.generated_source import kernel_source
 from rhythmid.machine_code import load_module
 from rhythmid.model import Model
 

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
-from rhythmid.compiled import Compiled, InputKind, OutputKind, compile_model
+from rhythmid.compiled import Compiled, compile_model
 from rhythmid.elements.element import STEP
 from rhythmid.errors import InputError
+from rhythmid.generated_source import InputKind, OutputKind
 from rhythmid.identify.observer import tied, with_observer
 from rhythmid.identify.series import Series
 from rhythmid.model import Model

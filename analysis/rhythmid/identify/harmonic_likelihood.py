@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from rhythmid.compiled import InputKind
 from rhythmid.errors import InputError
+from rhythmid.generated_source import InputKind
 from rhythmid.ltp.htf import LinearisedModel, linearised
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.ltp.spectra import Spectra, spectra

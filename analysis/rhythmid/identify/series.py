@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import PPoly
 
-from rhythmid.compiled import InputKind, OutputKind
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
+from rhythmid.generated_source import InputKind, OutputKind
 from rhythmid.identify.observer import Observer
 from rhythmid.model import Model
 from rhythmid.record.record import Record

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.compiled import InputKind
 from rhythmid.errors import InputError
+from rhythmid.generated_source import InputKind
 from rhythmid.ltp.harmonic_state_space import HarmonicStateSpace, harmonic_state_space
 from rhythmid.ltp.limit_cycle import LimitCycle, limit_cycle
 from rhythmid.ltp.linearisation import linearise

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from rhythmid.compiled import Compiled, InputKind, compile_model, compile_rates
+from rhythmid.compiled import Compiled, compile_model, compile_rates
 from rhythmid.elements.element import ELAPSED, STEP
 from rhythmid.errors import InputError
+from rhythmid.generated_source import InputKind
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
 from rhythmid.signal import pieces
