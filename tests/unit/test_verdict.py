@@ -85,13 +85,16 @@ def test_effects_that_one_element_can_replace_each_are_one_family_and_too_many_m
     # one replacement for one of two effects leaves two models: that is an answer
     twins = twins_of(best, rivals[:1])
     assert twins == [("quintic_stiffness", "position_ripple")]
+    found = replace(found, best=several(hopper(), **CURVED_AND_DRY))
+    twins = [("cubic_stiffness", "position_ripple")]
     assert verdict_of(found, 1e-9, [], twins, None, [SERIES], 0.0)[0] == "missing_physics"
 
 
 @pytest.mark.parametrize(
     ("terms", "better", "expected"),
     [
-        (("quadratic_stiffness", "quintic_stiffness"), 0.0, "missing_physics"),
+        (("quadratic_stiffness", "quintic_stiffness"), 0.0, "undecided"),
+        (("quadratic_stiffness", "position_ripple"), 0.0, "missing_physics"),  # of two families
         (("quadratic_stiffness", "quintic_stiffness"), 100.0, "unknown_physics"),
         (("quadratic_stiffness", "quintic_stiffness", "position_ripple"), 0.0, "unknown_physics"),
         (("cubic_stiffness", "coulomb_friction"), 100.0, "missing_physics"),
@@ -112,6 +115,7 @@ def test_laws_of_one_quantity_that_leave_more_to_say_or_are_many_are_a_series_an
     verdict, why = verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)
     assert verdict == expected
     assert ("a series for one law of the position" in why) is (expected == "unknown_physics")
+    assert ("one law of the position that the catalogue does not have" in why) is (expected == "undecided")
 
 
 def fit_of(rest: float, line: float) -> Fit:

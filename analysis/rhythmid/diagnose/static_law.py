@@ -5,7 +5,7 @@ does not have, as powers of x do for any smooth spring.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,24 +63,33 @@ def laws_of(trial: Trial, sizes: Scales) -> dict[tuple[str, str], dict[str, Arra
     return found
 
 
-def series_in(
-    best: Trial, trials: Sequence[Trial], sizes: Scales, worth: float
-) -> tuple[str, tuple[str, ...]] | None:
-    """A quantity with the labels of the laws that only together make the one law of it that is there.
+@dataclass(frozen=True)
+class SumOfLaws:
+    """Laws of one `quantity`, by their labels, that do together what none of them nearly does alone: a `series` for one law
+    that is not among them; or, where that is not sure, their sum is one model and such a law another."""
 
-    None of them is nearly all of their sum, and they are more than `TERMS`, or a richer one of the `trials` with one more
-    of them is better by `worth` in the criterion: the series would go on.
+    quantity: str
+    labels: tuple[str, ...]
+    series: bool
+
+
+def sum_of_laws(best: Trial, trials: Sequence[Trial], sizes: Scales, worth: float) -> SumOfLaws | None:
+    """The first sum of static laws in which no law is nearly all, if it is a series or all its laws are of one family.
+
+    It is a series where there are more than `TERMS`, or where a richer one of the `trials`, with one more of them, is better
+    by `worth` in the criterion: the series would go on.
     """
-    for key, laws in laws_of(best, sizes).items():
+    for (_, quantity), laws in laws_of(best, sizes).items():
         total = np.sum(list(laws.values()), axis=0)
         if any(np.std(total - law) < CORRECTION * np.std(total) for law in laws.values()):
             continue
         goes_on = any(
             set(t.added) > set(best.added)
             and t.bic() < best.bic() - worth
-            and len(laws_of(t, sizes).get(key, {})) > len(laws)
+            and any(key[1] == quantity and len(more) > len(laws) for key, more in laws_of(t, sizes).items())
             for t in trials
         )
-        if len(laws) > TERMS or (len(laws) == TERMS and goes_on):
-            return key[1], tuple(laws)
+        series = len(laws) > TERMS or goes_on
+        if series or len({best.element(label).family for label in laws}) == 1:
+            return SumOfLaws(quantity, tuple(laws), series)
     return None

@@ -10,7 +10,7 @@ from rhythmid.diagnose.locate import Dependence
 from rhythmid.diagnose.refit import Trial
 from rhythmid.diagnose.result import Verdict
 from rhythmid.diagnose.search import LEVEL, WORTH, Search
-from rhythmid.diagnose.static_law import series_in
+from rhythmid.diagnose.static_law import sum_of_laws
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series, dominant_frequency, scales
 from rhythmid.model import Model
@@ -134,13 +134,15 @@ def verdict_of(
             "unknown_physics",
             f"with the best elements of the catalogue {100.0 * uncarried:.0f} % of what is missing on held-out data remains",
         )
-    sum_of_laws = series_in(found.best, found.trials, scales(series, found.best.model), WORTH)
-    if sum_of_laws is not None:
-        quantity, labels = sum_of_laws
-        terms = " and ".join(found.best.element(label).name.replace("_", " ") for label in labels)
+    summed = sum_of_laws(found.best, found.trials, scales(series, found.best.model), WORTH)
+    if summed is not None:
+        terms = " and ".join(found.best.element(label).name.replace("_", " ") for label in summed.labels)
+        law = f"one law of the {QUANTITIES[summed.quantity]}"
+        if summed.series:
+            return "unknown_physics", f"{terms} are needed at once, a series for {law}"
         return (
-            "unknown_physics",
-            f"{terms} are needed at once, a series for one law of the {QUANTITIES[quantity]}",
+            "undecided",
+            f"{terms} do it together, and {law} that the catalogue does not have would do it, too",
         )
     together = _undetermined(found)
     if len(together) > 1:  # one alone is determined by what else it does: a stop touched once by where it is

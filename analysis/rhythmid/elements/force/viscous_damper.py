@@ -20,7 +20,7 @@ ELEMENT = Element(
     starts=lambda s: [{"damping": 0.02 * (s.stiffness * s.mass) ** 0.5}],
     also_known_as=("dashpot", "linear damper"),
     family="damping",
-    special_case_of=("viscoelastic_relaxation",),  # for τ_m → 0
+    special_case_of=("viscoelastic_relaxation", "second_mode"),  # for τ_m → 0; of a mode far below the motion
     needless_with=("switched_damper",),  # flight damping and a free stance damping make it up
     confusable={
         "coulomb_friction": "one amplitude only: Coulomb's apparent damping falls as 1/amplitude",
