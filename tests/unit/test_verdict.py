@@ -11,6 +11,8 @@ from machines import CATALOGUE, hopper
 from rhythmid.diagnose.heldout import HeldOut
 from rhythmid.diagnose.locate import Dependence
 from rhythmid.diagnose.refit import Trial
+from rhythmid.diagnose.round import Round
+from rhythmid.diagnose.screen import Score
 from rhythmid.diagnose.search import Search
 from rhythmid.diagnose.verdict import twins_of, verdict_of
 from rhythmid.identify.noise import NoiseModel
@@ -174,6 +176,25 @@ def test_effects_that_leave_a_structured_remainder_are_not_named_unless_it_is_fa
     verdict, why = verdict_of(found, 1e-9, remains, [], None, [SERIES], 0.0)
     assert verdict == expected
     assert ("structured remainder" in why) is (expected == "unknown_physics")
+
+
+@pytest.mark.parametrize(
+    ("share", "p_value", "rounds", "expected"),
+    [
+        (0.004, 1e-6, 2, "unknown_physics"),
+        (0.001, 1e-6, 2, "missing_physics"),  # no more than real machines leave
+        (0.004, 0.02, 2, "missing_physics"),  # may be chance
+        (0.004, 1e-6, 1, "missing_physics"),  # from before the effect was there
+    ],
+)
+def test_effects_that_leave_what_a_further_one_explains_in_part_are_not_named(
+    share, p_value, rounds, expected
+):
+    found = explained(0.1, 0.01)
+    statistic = share * (found.nominal.chi2 - found.fit.chi2)
+    score = Score(0, CATALOGUE["quadratic_drag"], {"coefficient": 0.1}, statistic, 1.0)
+    found = replace(found, rounds=(Round((score,), p_value),) * rounds)
+    assert verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)[0] == expected
 
 
 @pytest.mark.parametrize(

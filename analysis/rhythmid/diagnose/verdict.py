@@ -30,6 +30,7 @@ RIVALLING, REAL = 0.1, 0.002
 # of what was missing on held-out records, beyond which an explanation does not hold there: right names of the concealed
 # proof left 0.015 at most, wrong ones 0.02 to 0.11
 UNCARRIED = 0.03
+CHANCE = 1e-3  # p-value of a last round from which its score is no chance
 QUANTITIES = {
     "position": "position",
     "velocity": "velocity",
@@ -129,6 +130,8 @@ def verdict_of(
         LEFTOVER * max(improvement, 1.0), max(REAL * improvement, RIVALLING * _least_worth(found))
     ):
         return "unknown_physics", "the best elements of the catalogue leave a structured remainder"
+    if _more_to_say(found) > REAL * improvement:
+        return "unknown_physics", "the best elements of the catalogue leave what further ones explain in part"
     if uncarried > UNCARRIED:
         return (
             "unknown_physics",
@@ -154,6 +157,17 @@ def verdict_of(
     if any(math.comb(len(group), len(named.intersection(group))) > TWINS for group in twins):
         return "undecided", "several effects explain the records equally well"
     return "missing_physics", ""
+
+
+def _more_to_say(found: Search) -> float:
+    """What further effects would gain: in the criterion, of a richer model that was tried and is worth its parameters; in
+    chi2, of the best score of a round that began with no less than what was chosen, where that is no chance. 0 without."""
+    best, last = found.best, found.rounds[-1] if found.rounds else None
+    richer = min((t.bic() for t in found.trials if set(t.added) > set(best.added)), default=math.inf)
+    gain = best.bic() - richer if best.bic() - richer > WORTH else 0.0
+    if last is not None and len(found.rounds) > len(best.added) and last.p_value < CHANCE and last.scores:
+        gain = max(gain, last.scores[0].statistic)
+    return gain
 
 
 def _undetermined(found: Search) -> list[str]:
