@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from rhythmid.generated_source import InputKind, Layout, OutputKind, generate, generate_rates
-from rhythmid.machine_code import load_module
+from rhythmid.machine_code import load_run
 from rhythmid.model import Model, Term
 
 
@@ -43,8 +43,8 @@ def _key(terms: tuple[Term, ...]) -> Hashable:
 def _structure(
     key: Hashable, terms: "_Terms", disturbed: bool, excited: InputKind, smooth: bool, measured: OutputKind
 ) -> Compiled:
-    text, layout = generate(terms.terms, disturbed, excited, smooth, measured)
-    return Compiled(layout, load_module(text))
+    module, layout = generate(terms.terms, disturbed, excited, smooth, measured)
+    return Compiled(layout, load_run(module))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +78,8 @@ def compile_model(
 
 @lru_cache(maxsize=256)
 def _rates(key: Hashable, terms: "_Terms", excited: InputKind) -> Compiled:
-    text, layout = generate_rates(terms.terms, excited)
-    return Compiled(layout, load_module(text))
+    module, layout = generate_rates(terms.terms, excited)
+    return Compiled(layout, load_run(module))
 
 
 def compile_rates(model: Model, excited: InputKind = "force") -> Compiled:

@@ -1,7 +1,7 @@
 """Machine code of generated modules, kept on disk.
 
 A module's name is a hash of its text: change an element and a new module is compiled, use the same combination again and
-the machine code comes from disk.
+the machine code comes from disk. A module names those that it imports in its text, so it changes with them.
 """
 
 import hashlib
@@ -11,7 +11,8 @@ import re
 import sys
 import threading
 from collections.abc import Callable
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 from numba.core.errors import NumbaError
@@ -19,6 +20,13 @@ from numba.core.errors import NumbaError
 from rhythmid.errors import InputError
 
 _LOCK = threading.Lock()
+OURS = {
+    "rhs",
+    "run",
+    "piece_at",
+    "value_at",
+    "slope_at",
+}  # functions of generated modules that are no kernels
 
 
 def cache_folder() -> Path:
@@ -29,39 +37,62 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rhythmid"
 
 
+@dataclass(frozen=True)
+class Module:
+    """Source text of a generated module, with the generated modules that it imports by their names."""
+
+    text: str
+    imports: tuple["Module", ...] = ()
+
+    @cached_property
+    def name(self) -> str:
+        return f"rhythmid_kernel_{hashlib.sha256(self.text.encode()).hexdigest()[:24]}"
+
+
 @lru_cache(maxsize=256)
-def load_module(text: str) -> Callable[..., int]:
-    """`run` of a generated module, compiled or, where this text was compiled before, from the cache on disk."""
-    name = f"rhythmid_kernel_{hashlib.sha256(text.encode()).hexdigest()[:24]}"
+def load_run(module: Module) -> Callable[..., int]:
+    """`run` of a generated module, compiled or, where its text was compiled before, from the cache on disk.
+
+    Raises InputError where the cache cannot be written, or where an element's kernel does not compile.
+    """
+    for needed in (*module.imports, module):
+        with _LOCK:
+            if needed is module or needed.name not in sys.modules:
+                _load(needed)
+    return sys.modules[module.name].run
+
+
+def _load(module: Module) -> None:
+    """Write a module's text where it is not there yet, and import it."""
     folder = cache_folder()
-    path = folder / f"{name}.py"
-    with _LOCK:
-        if not path.exists():
-            try:
-                folder.mkdir(parents=True, exist_ok=True)
-                partial = folder / f".{name}.{os.getpid()}"
-                partial.write_text(text, encoding="utf-8")
-                os.replace(partial, path)
-            except OSError as error:
-                raise InputError(
-                    f"{folder}: compiled models cannot be kept there ({error.strerror}); "
-                    "set RHYTHMID_CACHE to a writable folder"
-                ) from None
-        spec = importlib.util.spec_from_file_location(name, path)
-        assert spec is not None and spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[name] = module
+    path = folder / f"{module.name}.py"
+    if not path.exists():
         try:
-            spec.loader.exec_module(module)
-        except NumbaError as error:
-            raise InputError(_complaint(text, str(error))) from None
-    return module.run
+            folder.mkdir(parents=True, exist_ok=True)
+            partial = folder / f".{module.name}.{os.getpid()}"
+            partial.write_text(module.text, encoding="utf-8")
+            os.replace(partial, path)
+        except OSError as error:
+            raise InputError(
+                f"{folder}: compiled models cannot be kept there ({error.strerror}); "
+                "set RHYTHMID_CACHE to a writable folder"
+            ) from None
+    spec = importlib.util.spec_from_file_location(module.name, path)
+    assert spec is not None and spec.loader is not None
+    made = importlib.util.module_from_spec(spec)
+    sys.modules[module.name] = made
+    try:
+        spec.loader.exec_module(made)
+    except NumbaError as error:
+        del sys.modules[module.name]
+        texts = "\n".join(one.text for one in (*module.imports, module))
+        raise InputError(_complaint(texts, str(error))) from None
 
 
 def _complaint(text: str, complaint: str) -> str:
     """One line of the compiler's page of complaint, with the elements that it mentions."""
-    kernels = set(re.findall(r"^def (\w+)\(", text, re.MULTILINE)) - {"rhs", "run"}
-    named = sorted(kernel for kernel in kernels if re.search(rf"\b{kernel}\(", complaint))
+    kernels = set(re.findall(r"^def (\w+)\(", text, re.MULTILINE)) - OURS
+    named = sorted(one for one in kernels if len(kernels) == 1 or re.search(rf"\b{one}\(", complaint))
     lines = [line.strip() for line in complaint.splitlines()]
     lines = [
         line

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper
-from rhythmid.diagnose.gate import NEEDED, _faint, admitted
+from rhythmid.diagnose.gate import NEEDED, admitted, faint
 from rhythmid.diagnose.refit import Trial
 from rhythmid.diagnose.search import Search
 from rhythmid.identify.noise import NoiseModel
@@ -30,26 +30,26 @@ def found(name: str, values: dict[str, float], size: str, std: float, gain: floa
     return Search(cast(Fit, nominal), best, cast(Fit, fit), QUIET, (best, none), (), ())
 
 
-@pytest.mark.parametrize(("std", "faint"), [(0.011, True), (0.2, True), (0.009, False), (1e-4, False)])
-def test_a_size_within_three_standard_deviations_of_absence_is_faint(std, faint):
+@pytest.mark.parametrize(("std", "near"), [(0.011, True), (0.2, True), (0.009, False), (1e-4, False)])
+def test_a_size_within_three_standard_deviations_of_absence_is_faint(std, near):
     assert (
-        _faint(
+        faint(
             found("coulomb_friction", {"force": 0.03, "transition": 0.01}, "force", std), "coulomb_friction"
         )
-        is faint
+        is near
     )
 
 
-@pytest.mark.parametrize(("std", "faint"), [(0.011, True), (0.009, False)])
-def test_a_gain_is_measured_from_the_one_that_it_has_where_it_is_absent(std, faint):
+@pytest.mark.parametrize(("std", "near"), [(0.011, True), (0.009, False)])
+def test_a_gain_is_measured_from_the_one_that_it_has_where_it_is_absent(std, near):
     gain = CATALOGUE["actuator_gain"]
     assert gain.absent == 1.0
-    assert _faint(found("actuator_gain", {gain.size: 0.97}, gain.size, std), "actuator_gain") is faint
+    assert faint(found("actuator_gain", {gain.size: 0.97}, gain.size, std), "actuator_gain") is near
 
 
 @pytest.mark.parametrize("std", [100.0, math.inf])
 def test_a_limit_that_is_absent_at_infinity_is_not_judged_by_its_distance(std):
-    assert not _faint(found("actuator_saturation", {"limit": 2.0}, "limit", std), "actuator_saturation")
+    assert not faint(found("actuator_saturation", {"limit": 2.0}, "limit", std), "actuator_saturation")
 
 
 FRICTION = {"force": 0.03, "transition": 0.01}

@@ -28,6 +28,8 @@ SIZES = Scales(
         ("load_dependent_friction", ""),
         ("ground_contact_loss", ""),
         ("periodic_disturbance", ""),  # of time
+        ("stiffness_drift", ""),  # of time, too
+        ("actuator_fade", ""),
         ("elastoplastic_hysteresis", ""),  # remembers
         ("sensor_lag", ""),
         ("input_delay_drift", ""),
@@ -38,3 +40,10 @@ def test_a_static_law_is_a_curved_function_of_one_quantity(name, argument):
     assert element.starts is not None
     law = law_of(element, element.starts(SIZES)[0], hopper(), SIZES)
     assert (law[0] if law else "") == argument
+
+
+def test_a_stop_that_damps_a_little_is_a_law_of_the_position_all_the_same():
+    stop = {"stiffness": 1e4, "damping_ratio": 0.1, "position": 0.08, "side": -1.0}
+    law = law_of(CATALOGUE["end_stop_contact"], stop | {"mass": 1.0}, hopper(), SIZES)
+    assert law is not None and law[0] == "position"
+    assert law_of(CATALOGUE["end_stop_contact"], stop | {"damping_ratio": 5.0}, hopper(), SIZES) is None

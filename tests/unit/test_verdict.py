@@ -14,7 +14,8 @@ from rhythmid.diagnose.refit import Trial
 from rhythmid.diagnose.round import Round
 from rhythmid.diagnose.screen import Score
 from rhythmid.diagnose.search import Search
-from rhythmid.diagnose.verdict import twins_of, verdict_of
+from rhythmid.diagnose.twins import twins_of
+from rhythmid.diagnose.verdict import verdict_of
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, normalised_error
 from rhythmid.identify.series import Series
@@ -96,7 +97,11 @@ def test_effects_that_one_element_can_replace_each_are_one_family_and_too_many_m
     ("terms", "better", "expected"),
     [
         (("quadratic_stiffness", "quintic_stiffness"), 0.0, "undecided"),
-        (("quadratic_stiffness", "position_ripple"), 0.0, "missing_physics"),  # of two families
+        (
+            ("quadratic_stiffness", "position_ripple"),
+            0.0,
+            "undecided",
+        ),  # of two families: one law all the same
         (("quadratic_stiffness", "quintic_stiffness"), 100.0, "unknown_physics"),
         (("quadratic_stiffness", "quintic_stiffness", "position_ripple"), 0.0, "unknown_physics"),
         (("cubic_stiffness", "coulomb_friction"), 100.0, "missing_physics"),

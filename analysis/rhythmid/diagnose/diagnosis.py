@@ -34,9 +34,11 @@ from rhythmid.diagnose.result import (
 from rhythmid.diagnose.scoring import settle
 from rhythmid.diagnose.screen import trajectories
 from rhythmid.diagnose.search import WORTH, Search, search
+from rhythmid.diagnose.stand_ins import stand_ins
 from rhythmid.diagnose.sufficiency import check_driven, tempered, without_clipped
+from rhythmid.diagnose.twins import twins_of
 from rhythmid.diagnose.units import check_units
-from rhythmid.diagnose.verdict import significant, twins_of, verdict_of
+from rhythmid.diagnose.verdict import significant, verdict_of
 from rhythmid.diagnose.wording import location_of, recalibrated, summary_of
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
@@ -208,7 +210,11 @@ def _conclude(
         if len(t.added) == len(found.best.added) and t.bic() - found.best.bic() < WORTH
     ]
     twins = twins_of(found.best, rivals)
-    verdict, reason = verdict_of(found, p_value, remains, twins, repeats, series, judge.uncarried())
+    known, sizes = trajectories(found.fit), scales(series, found.fit.model)
+    imitating = stand_ins(known, found.best.added, sizes)
+    verdict, reason = verdict_of(
+        found, p_value, remains, twins, repeats, series, judge.uncarried(), imitating
+    )
     chance = probabilities(found)
     best = found.best
     missing: list[MissingEffect] = []

@@ -32,11 +32,11 @@ def admitted(
     """
     dropped: list[str] = []
     while found.best.added:
-        faint = next((label for label in found.best.added if _faint(found, label)), None)
-        slim = _without(found, faint, pool) if faint is not None else None
+        least = next((label for label in found.best.added if faint(found, label)), None)
+        slim = _without(found, least, pool) if least is not None else None
         if slim is not None and slim.fit.chi2 - found.fit.chi2 < NEEDED:
             found = slim
-            dropped.append(f"{faint}: its size is within {FAINT:g} standard deviations of its absence")
+            dropped.append(f"{least}: its size is within {FAINT:g} standard deviations of its absence")
             continue
         seen, error = found.fit.nrmse(), _held_out(found, separate)
         if error is None:
@@ -54,19 +54,20 @@ def admitted(
         ]
         if not doubtful:
             break
-        least, label, found = min(doubtful, key=lambda case: case[0])
-        dropped.append(f"{label}: the held-out error is {least:.3g} without it and {error:.3g} with it")
+        other, label, found = min(doubtful, key=lambda case: case[0])
+        dropped.append(f"{label}: the held-out error is {other:.3g} without it and {error:.3g} with it")
     return found, tuple(dropped)
 
 
-def _faint(found: Search, label: str) -> bool:
+def faint(found: Search, label: str) -> bool:
     """Whether the size of an effect of the chosen model cannot be told from its absence."""
     element = found.best.element(label)
     if not element.size:
         return False
     name = f"{label}.{element.size}"
-    distance = abs(found.fit.model.value(name) - element.absent)
-    return name in found.fit.std and distance < FAINT * found.fit.std[name]
+    if name not in found.fit.std:
+        return False
+    return abs(found.fit.model.value(name) - element.absent) < FAINT * found.fit.std[name]
 
 
 def _held_out(found: Search, separate: Sequence[Series] | None) -> float | None:

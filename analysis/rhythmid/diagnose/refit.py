@@ -7,7 +7,7 @@ that is missing from the others must not be taken for coloured noise.
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -229,7 +229,8 @@ def _flat(model: Model, steps: Array, names: Sequence[str]) -> list[str]:
 
 
 def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
-    """The trial with flat parameters of its effects tried again from the elements' own guesses, where that is better."""
+    """The trial with flat parameters of its effects tried again from the elements' own guesses, where that is better: a
+    few iterations from each, more from the best."""
     best = trial
     if trial.differences is None:
         return best
@@ -241,16 +242,28 @@ def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
             continue
         guesses = element.starts(scales(series, trial.model))
         known = {tuple(guess[name.rpartition(".")[2]] for name in flat) for guess in guesses}
-        for values in [
-            tuple(share * value for value in one) for one in sorted(known) for share in (1.0, *FAINTER)
-        ]:
-            again = replace(trial, model=trial.model.with_values(dict(zip(flat, values))), differences=None)
-            try:
-                end = _outcome(_end(again, series, trial.noise, max_step, THOROUGH))
-            except InputError:
-                continue
-            if end.chi2 < best.chi2:
-                best = _trial(trial.added, again.model, end, trial.noise)
+        run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
+        free = tuple(trial.model.free)
+        found: list[Descent] = []
+        for share in (1.0, *FAINTER):
+            for values in sorted(known):
+                moved = trial.model.with_values(dict(zip(flat, (share * value for value in values))))
+                try:
+                    found.append(
+                        descend(moved, run, free, trial.noise, trial.starts, SKETCH, tolerance=TOLERANCE)
+                    )
+                except InputError:
+                    continue
+        if not found:
+            continue
+        lead = min(found, key=lambda end: end.chi2)
+        end = _outcome(
+            descend(
+                lead.model, run, free, trial.noise, lead.starts, THOROUGH, None, TOLERANCE, lead.differences
+            )
+        )
+        if end.chi2 < best.chi2:
+            best = _trial(trial.added, trial.model, end, trial.noise)
     return best
 
 

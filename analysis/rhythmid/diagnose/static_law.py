@@ -20,7 +20,16 @@ POINTS = 400  # instants at which an effect is tried
 SPREAD = 3.0  # standard deviations of velocity and force that they cover
 TERMS = 2  # as many laws of one quantity may be causes of their own; more are a series
 CORRECTION = 0.3  # of a sum of laws, up to which the others only correct the one that it mostly is
-SAME = 1e-9  # change, as a share of the effect, below which a quantity does not matter
+MOSTLY = 0.3  # change, as a share of the effect, below which other quantities only correct it, as the damping of a stop
+SAME = 1e-9  # share of the effect below which what is left of it is rounding
+
+
+def curved(effect: Array, *quantities: Array) -> Array:
+    """The effect (n,) without its best straight line in the quantities (n,)."""
+    straight = np.column_stack(
+        [np.ones(len(effect)), *(one / (np.abs(one).max() or 1.0) for one in quantities)]
+    )
+    return effect - straight @ np.linalg.lstsq(straight, effect, rcond=None)[0]
 
 
 def law_of(
@@ -28,7 +37,10 @@ def law_of(
 ) -> tuple[str, Array] | None:
     """The one quantity of which the effect is a curved function: position, velocity, effort (the actuator's force) or
     signal (what enters a command, actuator or sensor element), and the curved part of it (POINTS,), at the same instants
-    for every effect. None where the effect is straight, remembers, or takes several quantities."""
+    for every effect. None where the effect is straight, remembers, or takes several quantities. Raises nothing of its own.
+
+    `values` and `sizes` are in SI units (those of the sensor for a sensor element), the curved part in the unit of the
+    effect. A quantity is the one if exchanging all others between the instants leaves most of the effect as it was."""
     if element.kernel is None or element.own:
         return None
     rng = np.random.default_rng(0)
@@ -38,15 +50,14 @@ def law_of(
     drawn["signal"] = drawn["position" if element.slot == "sensor" else "effort"]
     path = Path(time=np.linspace(0.0, sizes.duration, POINTS), **drawn)
     effect = effect_along(element, values, model, path)
-    size = float(np.ptp(effect))
+    size = float(np.abs(effect).max())
     for name in ("signal",) if element.slot != "force" else ("position", "velocity", "effort"):
         others = {other: rng.permutation(value) for other, value in drawn.items() if other != name}
-        again = effect_along(element, values, model, replace(path, time=path.time + 1.0, **others))
-        if np.abs(again - effect).max() > SAME * size:
+        again = effect_along(element, values, model, replace(path, time=rng.permutation(path.time), **others))
+        if np.std(again - effect) > MOSTLY * np.std(effect):
             continue
-        straight = np.column_stack([np.ones(POINTS), drawn[name] / np.abs(drawn[name]).max()])
-        curved = effect - straight @ np.linalg.lstsq(straight, effect, rcond=None)[0]
-        return (name, curved) if np.abs(curved).max() > SAME * size else None
+        bent = curved(effect, drawn[name])
+        return (name, bent) if np.abs(bent).max() > SAME * size else None
     return None
 
 
@@ -74,7 +85,7 @@ class SumOfLaws:
 
 
 def sum_of_laws(best: Trial, trials: Sequence[Trial], sizes: Scales, worth: float) -> SumOfLaws | None:
-    """The first sum of static laws in which no law is nearly all, if it is a series or all its laws are of one family.
+    """The first sum of static laws in which no law is nearly all.
 
     It is a series where there are more than `TERMS`, or where a richer one of the `trials`, with one more of them, is better
     by `worth` in the criterion: the series would go on.
@@ -89,7 +100,5 @@ def sum_of_laws(best: Trial, trials: Sequence[Trial], sizes: Scales, worth: floa
             and any(key[1] == quantity and len(more) > len(laws) for key, more in laws_of(t, sizes).items())
             for t in trials
         )
-        series = len(laws) > TERMS or goes_on
-        if series or len({best.element(label).family for label in laws}) == 1:
-            return SumOfLaws(quantity, tuple(laws), series)
+        return SumOfLaws(quantity, tuple(laws), len(laws) > TERMS or goes_on)
     return None

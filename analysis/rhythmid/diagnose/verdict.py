@@ -5,15 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rhythmid.diagnose.gate import faint
 from rhythmid.diagnose.line_test import strongest_line
 from rhythmid.diagnose.locate import Dependence
-from rhythmid.diagnose.refit import Trial
 from rhythmid.diagnose.result import Verdict
-from rhythmid.diagnose.search import LEVEL, WORTH, Search
+from rhythmid.diagnose.search import LEVEL, MOST, WORTH, Search
 from rhythmid.diagnose.static_law import sum_of_laws
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series, dominant_frequency, scales
-from rhythmid.model import Model
 from rhythmid.record.quality import resolution
 
 TWINS = 2  # as many models that cannot be told apart are an answer; more are undecided
@@ -29,7 +28,7 @@ LEFTOVER = 0.005
 RIVALLING, REAL = 0.1, 0.002
 # of what was missing on held-out records, beyond which an explanation does not hold there: right names of the concealed
 # proof left 0.015 at most, wrong ones 0.02 to 0.11
-UNCARRIED = 0.03
+UNCARRIED = 0.02
 CHANCE = 1e-3  # p-value of a last round from which its score is no chance
 QUANTITIES = {
     "position": "position",
@@ -37,55 +36,11 @@ QUANTITIES = {
     "effort": "actuator's force",
     "signal": "signal",
 }
-TOLD = 2.0  # standard deviations from nothing, from which the records determine the size of an effect
 PERIODS = 4  # of the dominant motion, below which a record says nothing
 
 
 def significant(dependence: Dependence) -> bool:
     return dependence.p_value < REMAINDER_LEVEL and dependence.explained > 0.05
-
-
-def twins_of(best: Trial, rivals: Sequence[Trial]) -> list[tuple[str, ...]]:
-    """Families within which the records cannot tell: elements that replace one another in equally good models.
-
-    Every family begins with what the best model has of it. Where one element can replace several, all are one family.
-    """
-    groups: list[tuple[str, ...]] = []
-    for label in best.added:
-        element = best.element(label)
-        others = list(element.same_as)
-        others += [other for beside, other in element.same_beside.items() if _estimated(best.model, beside)]
-        for rival in rivals:
-            gone = set(best.added) - set(rival.added)
-            come = set(rival.added) - set(best.added)
-            if gone == {label} and len(come) == 1:
-                other = rival.element(come.pop()).name
-                if (
-                    other not in others and other not in element.special_case_of
-                ):  # which contains it: no rival
-                    others.append(other)
-        if others:
-            groups.append((element.name, *others))
-    named = {best.element(label).name for label in best.added}
-    order = [name for group in groups for name in group]
-    return [
-        tuple(sorted(family, key=lambda name: (name not in named, order.index(name))))
-        for family in _joined(groups)
-    ]
-
-
-def _joined(groups: Sequence[tuple[str, ...]]) -> list[set[str]]:
-    """Unions of the groups that share a member."""
-    joined: list[set[str]] = []
-    for group in groups:
-        apart = [one for one in joined if one.isdisjoint(group)]
-        joined = [*apart, set(group).union(*(one for one in joined if one not in apart))]
-    return joined
-
-
-def _estimated(model: Model, name: str) -> bool:
-    """Whether the model has the named element, with parameters that are not all known."""
-    return any(t.element.name == name and not all(v.fixed for v in t.values.values()) for t in model.terms)
 
 
 def verdict_of(
@@ -96,8 +51,10 @@ def verdict_of(
     repeats: NoiseModel | None,
     series: Sequence[Series],
     uncarried: float,
+    imitating: Sequence[str] = (),
 ) -> tuple[Verdict, str]:
-    """The verdict with its reason; `uncarried` is the share of what is missing on held-out records that `found` leaves."""
+    """The verdict with its reason; `uncarried` is the share of what is missing on held-out records that `found` leaves, and
+    `imitating` says which effects stand in for others."""
     fit = found.fit
     too_big = False
     if repeats is not None and repeats.variance > 0:
@@ -107,24 +64,20 @@ def verdict_of(
         colour = max(repeats.long_run_variance / repeats.variance, 1.0)
         too_big = ratio > 1.1 + 6.0 * math.sqrt(2.0 * colour / len(residual))
     line = strongest_line(fit)
+    improvement = found.nominal.chi2 - fit.chi2
     explained = found.nominal.nrmse() ** 2 - fit.nrmse() ** 2
-    matters = line is not None and line.share * fit.nrmse() ** 2 > LINE_WORTH * explained
-    if line is not None and line.p_value < REMAINDER_LEVEL and line.share > LINE_SHARE and matters:
+    if (
+        line is not None
+        and line.p_value < REMAINDER_LEVEL
+        and line.share > LINE_SHARE
+        and line.share * fit.nrmse() ** 2 > LINE_WORTH * explained
+    ):
         return (
             "unknown_physics",
             f"a line at {line.frequency:.3g} Hz remains that nothing in the catalogue explains",
         )
     if not found.best.added:
-        if too_big and p_value < REMAINDER_LEVEL:
-            return "unknown_physics", "no element of the catalogue explains what the nominal model leaves"
-        if remains and remains[0].explained > 0.2 and p_value < LEVEL:
-            return "unknown_physics", "no element of the catalogue explains what the nominal model leaves"
-        if p_value < LEVEL:
-            return "undecided", "something is there, but too faint for any element to be worth its parameters"
-        if _weak(series):
-            return "undecided", "the records are too short or too quiet to exclude anything of interest"
-        return "consistent", ""
-    improvement = found.nominal.chi2 - fit.chi2
+        return _of_none(p_value, remains, too_big, series)
     leftover = max((d.gain for d in remains), default=0.0)
     if too_big or leftover > min(
         LEFTOVER * max(improvement, 1.0), max(REAL * improvement, RIVALLING * _least_worth(found))
@@ -137,9 +90,38 @@ def verdict_of(
             "unknown_physics",
             f"with the best elements of the catalogue {100.0 * uncarried:.0f} % of what is missing on held-out data remains",
         )
+    if imitating:
+        return "unknown_physics", imitating[0]
+    if len(found.best.added) >= MOST:
+        return (
+            "unknown_physics",
+            f"{MOST} effects, as many as are tried together, are a series for something else",
+        )
+    return _of_names(found, twins, series)
+
+
+def _of_none(
+    p_value: float, remains: Sequence[Dependence], too_big: bool, series: Sequence[Series]
+) -> tuple[Verdict, str]:
+    """The verdict on records in which no effect is worth its parameters."""
+    if (too_big and p_value < REMAINDER_LEVEL) or (
+        remains and remains[0].explained > 0.2 and p_value < LEVEL
+    ):
+        return "unknown_physics", "no element of the catalogue explains what the nominal model leaves"
+    if p_value < LEVEL:
+        return "undecided", "something is there, but too faint for any element to be worth its parameters"
+    if _weak(series):
+        return "undecided", "the records are too short or too quiet to exclude anything of interest"
+    return "consistent", ""
+
+
+def _of_names(
+    found: Search, twins: Sequence[tuple[str, ...]], series: Sequence[Series]
+) -> tuple[Verdict, str]:
+    """The verdict on effects that leave nothing, by whether the records determine each of them."""
     summed = sum_of_laws(found.best, found.trials, scales(series, found.best.model), WORTH)
     if summed is not None:
-        terms = " and ".join(found.best.element(label).name.replace("_", " ") for label in summed.labels)
+        terms = _words(found, summed.labels)
         law = f"one law of the {QUANTITIES[summed.quantity]}"
         if summed.series:
             return "unknown_physics", f"{terms} are needed at once, a series for {law}"
@@ -147,16 +129,20 @@ def verdict_of(
             "undecided",
             f"{terms} do it together, and {law} that the catalogue does not have would do it, too",
         )
-    together = _undetermined(found)
+    together = [label for label in found.best.added if faint(found, label)]
     if len(together) > 1:  # one alone is determined by what else it does: a stop touched once by where it is
         return (
             "unknown_physics",
-            f"only the sum of {' and '.join(together)} is determined, none of them by itself",
+            f"only the sum of {_words(found, together)} is determined, none of them by itself",
         )
     named = {found.best.element(label).name for label in found.best.added}
     if any(math.comb(len(group), len(named.intersection(group))) > TWINS for group in twins):
         return "undecided", "several effects explain the records equally well"
     return "missing_physics", ""
+
+
+def _words(found: Search, labels: Sequence[str]) -> str:
+    return " and ".join(found.best.element(label).name.replace("_", " ") for label in labels)
 
 
 def _more_to_say(found: Search) -> float:
@@ -168,19 +154,6 @@ def _more_to_say(found: Search) -> float:
     if last is not None and len(found.rounds) > len(best.added) and last.p_value < CHANCE and last.scores:
         gain = max(gain, last.scores[0].statistic)
     return gain
-
-
-def _undetermined(found: Search) -> list[str]:
-    """The effects, in words, whose sizes the records do not tell from nothing."""
-    names: list[str] = []
-    for label in found.best.added:
-        element = found.best.element(label)
-        size = f"{label}.{element.size}"
-        if element.size and found.fit.std.get(size, 0.0) > 0.0:
-            value, std = found.fit.model.value(size), found.fit.std[size]
-            if abs(value - (element.absent if math.isfinite(element.absent) else 0.0)) < TOLD * std:
-                names.append(element.name.replace("_", " "))
-    return names
 
 
 def _least_worth(found: Search) -> float:

@@ -23,10 +23,8 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 WHITE = NoiseModel(np.empty(0), 1.0)
-LEAST, STATES = (
-    1e-6,
-    0.01,
-)  # damping up to which a step counts as a full one, and beyond which it holds every state back
+LEAST = 1e-6  # damping up to which a step counts as a full one
+STATES = 0.01  # damping beyond which a step holds every state back
 STAY = 0.1  # share of its distance from a lower bound that one step leaves a parameter: a width of zero is hard to leave
 BRINK = 1e-3  # share of its first distance within which it may reach the bound
 

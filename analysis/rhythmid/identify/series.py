@@ -254,10 +254,10 @@ def hold_out_tail(series: Sequence[Series], share: float = 0.2) -> tuple[list[Se
     return seen, unseen
 
 
-def dominant_frequency(series: Series) -> float:
-    """Frequency [Hz] of the strongest line of the motion."""
+def dominant_frequency(series: Series, finer: int = 1) -> float:
+    """Frequency [Hz] of the strongest line of the motion, on a grid that is so many times finer than the record resolves."""
     value = series.averaged - series.averaged.mean()
-    length = fast_length(len(value))
+    length = fast_length(finer * len(value))
     power = np.abs(np.fft.rfft(value * np.hanning(len(value)), length)) ** 2
     power[0] = 0.0
     return float(max(1, int(np.argmax(power))) / (length * series.period * series.block))
@@ -284,9 +284,12 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
             reference = max(reference, float(np.std(total)))
         else:
             effort = max(effort, float(np.std(total)))
-        if one.forcing is not None:
-            line = replace(one, value=np.asarray(one.forcing(one.time)))
-            pumping = dominant_frequency(line)
+    forced = [one for one in series if one.forcing is not None]
+    if forced:
+        longest = max(forced, key=lambda one: one.time[-1] - one.time[0])
+        assert longest.forcing is not None
+        line = replace(longest, value=np.asarray(longest.forcing(longest.time)))
+        pumping = dominant_frequency(line, finer=16)
     return Scales(
         position=position,
         velocity=max(velocity, 1e-12),

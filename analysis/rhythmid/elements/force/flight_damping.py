@@ -24,10 +24,8 @@ ELEMENT = Element(
     starts=lambda s: [{"damping": 0.02 * s.damping}],
     also_known_as=("rebound damping", "asymmetric damping"),
     family="damping",
-    special_case_of=(
-        "viscoelastic_relaxation",
-        "second_mode",
-    ),  # for τ_m → 0; of a mode far below the motion, with the stance damping taking up the rest
+    # for τ_m → 0; of a mode far below the motion, with the stance damping taking up the rest
+    special_case_of=("viscoelastic_relaxation", "second_mode"),
     same_beside={"switched_damper": "viscous_damper"},
     confusable={
         "viscous_damper": "the same model where the stance damping is free",

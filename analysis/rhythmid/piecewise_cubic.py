@@ -1,0 +1,25 @@
+"""Piecewise cubic signals inside a compiled simulation, where their knots are passed in order.
+
+Coefficients stand as in `scipy.interpolate.PPoly`, but the lowest power first. The text of these functions is compiled
+once into a module of its own, which all generated ones import.
+"""
+# pyright: reportMissingParameterType=false, reportUnknownParameterType=false
+
+
+def piece_at(knots, i, t):
+    """Index of the piece that holds at time t, searched from piece i on."""
+    while knots[i + 1] <= t:
+        i += 1
+    return i
+
+
+def value_at(knots, c, i, t):
+    """Value of piece i at time t."""
+    x = t - knots[i]
+    return ((c[3, i] * x + c[2, i]) * x + c[1, i]) * x + c[0, i]
+
+
+def slope_at(knots, c, i, t):
+    """Derivative of piece i at time t."""
+    x = t - knots[i]
+    return (3.0 * c[3, i] * x + 2.0 * c[2, i]) * x + c[1, i]
