@@ -4,6 +4,7 @@ Compiling and fitting a model hold the interpreter lock, so threads would take t
 are: nothing but the results is pickled. Where the system cannot fork, the items are worked through one after another.
 """
 
+import gc
 import multiprocessing
 import multiprocessing.connection
 import os
@@ -24,6 +25,9 @@ def cores() -> int:
 
 
 def _work(function: Callable[[Any], Any], items: Sequence[Any], own: Sequence[int], pipe: Any) -> None:
+    # What was inherited is not this process's to collect: going through it would copy the parent's memory, and may
+    # meet frames of threads that exist in the parent only.
+    gc.freeze()
     for index in own:
         try:
             answer = (index, function(items[index]), None)
@@ -41,7 +45,11 @@ def _work(function: Callable[[Any], Any], items: Sequence[Any], own: Sequence[in
 def fork_map(
     function: Callable[[Item], Result], items: Sequence[Item], workers: int | None = None
 ) -> Iterator[tuple[int, Result | Exception]]:
-    """Results as they come, each with the index of its item. InputErrors are results; any other failure is raised."""
+    """Results as they come, each with the index of its item. InputErrors are results; any other failure is raised.
+
+    The rest of a worker that is killed, by a lack of memory for instance, goes to a new one; RuntimeError is raised
+    where the same item takes that one, too.
+    """
     count = min(workers or cores(), len(items))
     if count <= 1 or "fork" not in multiprocessing.get_all_start_methods():
         for index, item in enumerate(items):
@@ -51,14 +59,18 @@ def fork_map(
                 yield index, error
         return
     context = multiprocessing.get_context("fork")
-    running = {}
-    for worker in range(count):
+    running: dict[Any, tuple[Any, list[int]]] = {}
+    fatal: set[int] = set()  # items at which a worker was killed
+
+    def start(own: list[int]) -> None:
         receive, send = context.Pipe(duplex=False)
-        own = range(worker, len(items), count)
-        process = context.Process(target=_work, args=(function, items, own, send), daemon=True)
+        process = context.Process(target=_work, args=(function, items, tuple(own), send), daemon=True)
         process.start()
         send.close()
-        running[receive] = (process, set(own))
+        running[receive] = (process, own)
+
+    for worker in range(count):
+        start(list(range(worker, len(items), count)))
     try:
         while running:
             ready = multiprocessing.connection.wait(list(running))
@@ -66,13 +78,18 @@ def fork_map(
                 process, left = running[pipe]
                 try:
                     index, result, error = pipe.recv()
-                except EOFError:
+                except (EOFError, OSError):  # nothing more, or killed amid an answer
                     process.join()
                     del running[pipe]
+                    if left and left[0] in fatal:
+                        raise RuntimeError(
+                            f"two workers died at the same work, exit code {process.exitcode}"
+                        ) from None
                     if left:
-                        raise RuntimeError(f"a worker died with exit code {process.exitcode}") from None
+                        fatal.add(left[0])
+                        start(left)
                     continue
-                left.discard(index)
+                left.remove(index)
                 if error is not None and not isinstance(error, InputError):
                     raise error
                 yield index, error if error is not None else result

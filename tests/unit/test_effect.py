@@ -7,7 +7,6 @@ from machines import CATALOGUE, hopper
 from rhythmid.compiled import compile_model
 from rhythmid.effect import Path, effect_along
 from rhythmid.errors import InputError
-from rhythmid.parallel import fork_map
 from rhythmid.signal import first_order_hold
 from rhythmid.simulate import simulate, start_states
 
@@ -59,22 +58,3 @@ def test_what_an_actuator_remembers_along_a_path_is_what_it_does_in_the_simulato
     got = effect_along(CATALOGUE[name], values, hopper(), PATH)
     assert got == pytest.approx(run.effort - F, abs=1e-12)
     assert np.abs(got).max() > 0.1
-
-
-def test_forked_workers_return_every_result_once_and_pass_on_refusals():
-    def work(n: int) -> int:
-        if n == 3:
-            raise InputError("three is refused")
-        return n * n
-
-    found = dict(fork_map(work, list(range(6)), 2))
-    assert {k: v for k, v in found.items() if k != 3} == {0: 0, 1: 1, 2: 4, 4: 16, 5: 25}
-    assert str(found[3]) == "three is refused"
-
-
-def test_a_worker_s_failure_is_raised_with_its_traceback():
-    def work(n: int) -> int:
-        return 1 // n
-
-    with pytest.raises(RuntimeError, match="ZeroDivisionError"):
-        list(fork_map(work, [0, 1], 2))

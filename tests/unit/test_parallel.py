@@ -1,0 +1,49 @@
+"""Work handed to forked processes comes back whole, also from processes that are killed."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from rhythmid.errors import InputError
+from rhythmid.parallel import fork_map
+
+
+def test_forked_workers_return_every_result_once_and_pass_on_refusals():
+    def work(n: int) -> int:
+        if n == 3:
+            raise InputError("three is refused")
+        return n * n
+
+    found = dict(fork_map(work, list(range(6)), 2))
+    assert {k: v for k, v in found.items() if k != 3} == {0: 0, 1: 1, 2: 4, 4: 16, 5: 25}
+    assert str(found[3]) == "three is refused"
+
+
+def test_a_worker_s_failure_is_raised_with_its_traceback():
+    def work(n: int) -> int:
+        return 1 // n
+
+    with pytest.raises(RuntimeError, match="ZeroDivisionError"):
+        list(fork_map(work, [0, 1], 2))
+
+
+def test_the_rest_of_a_worker_that_was_killed_goes_to_another(tmp_path: Path):
+    def work(n: int) -> int:
+        if n == 2 and not (tmp_path / "killed").exists():
+            (tmp_path / "killed").touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return n * n
+
+    assert dict(fork_map(work, list(range(7)), 2)) == {n: n * n for n in range(7)}
+
+
+def test_work_that_kills_every_worker_is_raised():
+    def work(n: int) -> int:
+        if n == 1:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return n
+
+    with pytest.raises(RuntimeError, match="two workers died at the same work, exit code -9"):
+        list(fork_map(work, [0, 1, 2], 2))
