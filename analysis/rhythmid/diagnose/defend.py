@@ -24,13 +24,15 @@ def defend(
     step: float,
     rounds: Sequence[Round],
     margin: float,
+    most: int,
     tell: Tell,
 ) -> tuple[Trial, dict[tuple[str, ...], Trial]]:
     """Let every added element defend its place; returns the survivor and the models that were tried on the way.
 
     First whether it can be left out, then whether another one does better in its place: a simpler member of its family,
     or, where there are several effects, an element that scored well before the others were known. A model that says less
-    may be worse by the `margin` in the criterion.
+    may be worse by the `margin` in the criterion. As many effects as are tried at once, `most`, get no names, whichever
+    they are, so of these none is exchanged.
     """
     tried: dict[tuple[str, ...], Trial] = {}
 
@@ -44,7 +46,7 @@ def defend(
         return found
 
     best = _without_idle(best, run, margin)
-    found = run(best, _swaps(best, series, catalogue, trials, rounds))
+    found = run(best, _swaps(best, series, catalogue, trials, rounds)) if len(best.added) < most else []
     earlier = [t for t in trials.values() if t.added and _stands_for(t, best)]
     plainer = [t for t in [*found, *under_noise(earlier, series, noise, step)] if _stands_for(t, best)]
     simpler = [t for t in plainer if t.bic() < best.bic() + margin]

@@ -157,7 +157,6 @@ def search(
     catalogue: Catalogue,
     pool: ThreadPoolExecutor | None,
     tell: Tell = lambda _: None,
-    most: int = MOST,
 ) -> Search:
     """Search the catalogue for what the nominal model lacks; `nominal` is its fit to the same series."""
     step = nominal.run.max_step
@@ -183,7 +182,7 @@ def search(
     now = first
     gained = 0.0
     while (
-        now.p_value < LEVEL and _could_pay(now, best, max(WORTH, SHARE * gained)) and len(best.added) < most
+        now.p_value < LEVEL and _could_pay(now, best, max(WORTH, SHARE * gained)) and len(best.added) < MOST
     ):
         count = REFITTED if not best.added else REFITTED - 2
         proposals, enough = _proposals(here.model, here.added, now.scores, count, here.chi2)
@@ -221,14 +220,14 @@ def search(
         best = winner
         tell(f"{best.added[-1]} explains it better by {gain:.0f}; looking for more")
         current = whole_fit(best, series, noise, step, pool=pool)
-        if len(best.added) >= most:
+        if len(best.added) >= MOST:
             break
         now, current = _one_round(current, catalogue, pool)
         here = under_noise([best], series, current.noise, step, 0)[0]
         rounds.append(now)
     if best.added:
         margin = max(WORTH, SHARE * gained)
-        defended, more = defend(best, series, catalogue, trials, noise, step, rounds, margin, tell)
+        defended, more = defend(best, series, catalogue, trials, noise, step, rounds, margin, MOST, tell)
         trials |= more
         if defended is not best:
             best = defended
