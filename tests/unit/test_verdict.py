@@ -125,6 +125,19 @@ def test_laws_of_one_quantity_that_leave_more_to_say_or_are_many_are_a_series_an
     assert ("one law of the position that the catalogue does not have" in why) is (expected == "undecided")
 
 
+@pytest.mark.parametrize(("size", "expected"), [(0.25, "missing_physics"), (1.0, "unknown_physics")])
+def test_a_leading_law_with_more_than_one_correction_is_named_only_where_these_are_faint(size, expected):
+    """Of the sum of the three the corrections together are 5 % and 24 %: of one correction both would be borne."""
+    best = several(
+        hopper(),
+        cubic_stiffness=CURVED["cubic_stiffness"],
+        quadratic_stiffness={"coefficient": size},
+        quintic_stiffness={"coefficient": -0.5 * size},
+    )
+    found = replace(explained(0.1, 0.01), best=best, trials=(best,))
+    assert verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)[0] == expected
+
+
 def fit_of(rest: float, line: float) -> Fit:
     """A fit that leaves noise of size `rest`, as a share of the motion, and in it a line of this size, at 3.7 Hz."""
     noise = rest * np.random.default_rng(2).standard_normal(len(TIME))

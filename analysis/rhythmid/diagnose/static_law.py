@@ -19,7 +19,9 @@ Array = NDArray[np.float64]
 POINTS = 400  # instants at which an effect is tried
 SPREAD = 3.0  # standard deviations of velocity and force that they cover
 TERMS = 2  # as many laws of one quantity may be causes of their own; more are a series
-CORRECTION = 0.3  # of a sum of laws, up to which the others only correct the one that it mostly is
+# of a sum of laws, up to which another one only corrects the one that it mostly is; and up to which several do, for a
+# series with a leading term that is nearly right takes more than one to mend it
+CORRECTION, CORRECTIONS = 0.3, 0.1
 MOSTLY = 0.3  # change, as a share of the effect, below which other quantities only correct it, as the damping of a stop
 SAME = 1e-9  # share of the effect below which what is left of it is rounding
 
@@ -92,7 +94,8 @@ def sum_of_laws(best: Trial, trials: Sequence[Trial], sizes: Scales, worth: floa
     """
     for (_, quantity), laws in laws_of(best, sizes).items():
         total = np.sum(list(laws.values()), axis=0)
-        if any(np.std(total - law) < CORRECTION * np.std(total) for law in laws.values()):
+        share = CORRECTION if len(laws) <= TERMS else CORRECTIONS
+        if any(np.std(total - law) < share * np.std(total) for law in laws.values()):
             continue
         goes_on = any(
             set(t.added) > set(best.added)
