@@ -197,21 +197,22 @@ def test_effects_that_leave_a_structured_remainder_are_not_named_unless_it_is_fa
 
 
 @pytest.mark.parametrize(
-    ("share", "p_value", "rounds", "expected"),
+    ("share", "p_value", "added", "expected"),
     [
-        (0.004, 1e-6, 2, "unknown_physics"),
-        (0.001, 1e-6, 2, "missing_physics"),  # no more than real machines leave
-        (0.004, 0.02, 2, "missing_physics"),  # may be chance
-        (0.004, 1e-6, 1, "missing_physics"),  # from before the effect was there
+        (0.004, 1e-6, ("coulomb_friction",), "unknown_physics"),
+        (0.001, 1e-6, ("coulomb_friction",), "missing_physics"),  # no more than real machines leave
+        (0.004, 0.02, ("coulomb_friction",), "missing_physics"),  # may be chance
+        (0.004, 1e-6, (), "missing_physics"),  # from before the effect was there
+        (0.004, 1e-6, ("second_mode", "bilinear_stiffness"), "missing_physics"),  # that stood in its place
     ],
 )
 def test_effects_that_leave_what_a_further_one_explains_in_part_are_not_named(
-    share, p_value, rounds, expected
+    share, p_value, added, expected
 ):
     found = explained(0.1, 0.01)
     statistic = share * (found.nominal.chi2 - found.fit.chi2)
     score = Score(0, CATALOGUE["quadratic_drag"], {"coefficient": 0.1}, statistic, 1.0)
-    found = replace(found, rounds=(Round((score,), p_value),) * rounds)
+    found = replace(found, rounds=(Round((score,), p_value), Round((score,), p_value, added)))
     assert verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)[0] == expected
 
 
@@ -219,7 +220,8 @@ def test_effects_that_leave_what_a_further_one_explains_in_part_are_not_named(
     ("stds", "expected"),
     [
         ({"cubic_stiffness.coefficient": 1.0, "coulomb_friction.force": 0.01}, "missing_physics"),
-        ({"cubic_stiffness.coefficient": 9.0, "coulomb_friction.force": 0.01}, "missing_physics"),
+        ({"cubic_stiffness.coefficient": 2.0, "coulomb_friction.force": 0.01}, "missing_physics"),
+        ({"cubic_stiffness.coefficient": 3.0, "coulomb_friction.force": 0.01}, "unknown_physics"),
         ({"cubic_stiffness.coefficient": 9.0, "coulomb_friction.force": 0.08}, "unknown_physics"),
         ({"cubic_stiffness.coefficient": np.inf, "coulomb_friction.force": np.inf}, "unknown_physics"),
     ],
@@ -230,7 +232,9 @@ def test_effects_of_which_only_the_sum_is_determined_are_not_named(stds, expecte
     found.fit.__dict__.update(std=stds, model=best.model)
     verdict, why = verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)
     assert verdict == expected
-    assert ("only the sum of cubic stiffness and coulomb friction" in why) is (expected == "unknown_physics")
+    assert ("only what cubic stiffness and coulomb friction do together" in why) is (
+        expected == "unknown_physics"
+    )
 
 
 def test_effects_that_do_not_hold_on_held_out_data_are_not_named():

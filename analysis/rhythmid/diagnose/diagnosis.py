@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.diagnose.calibrate import Calibration, causal
 from rhythmid.diagnose.confidence import probabilities
 from rhythmid.diagnose.delays import delays_of
+from rhythmid.diagnose.elsewhere import elsewhere
 from rhythmid.diagnose.exclusions import unscored
 from rhythmid.diagnose.gate import admitted
 from rhythmid.diagnose.heldout import HeldOut, tail_error
@@ -138,7 +139,12 @@ def diagnose(
         before = dependences(trajectories(found.nominal), pool)
         after = dependences(trajectories(found.fit), pool) if found.best.added else before
         judge = HeldOut(found, unseen if holdout else None)
-        diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful)
+        fitted = scales(seen, found.fit.model)
+        imitating = [
+            *stand_ins(trajectories(found.fit), found.best.added, fitted),
+            *elsewhere(found, known),
+        ]
+        diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful, imitating)
         said = (*diagnosis.notes, *(note for note in notes if note is not None))
         excluded = (*diagnosis.excluded, *unscored(found, known, pool))
         diagnosis = replace(diagnosis, scoring=scoring.words, notes=said, excluded=excluded)
@@ -198,6 +204,7 @@ def _conclude(
     judge: HeldOut,
     heldout: str,
     harmful: Sequence[str],
+    imitating: Sequence[str],
 ) -> Diagnosis:
     """Put the verdict and its reasons together."""
     series = found.fit.run.series
@@ -210,8 +217,6 @@ def _conclude(
         if len(t.added) == len(found.best.added) and t.bic() - found.best.bic() < WORTH
     ]
     twins = twins_of(found.best, rivals)
-    known, sizes = trajectories(found.fit), scales(series, found.fit.model)
-    imitating = stand_ins(known, found.best.added, sizes)
     verdict, reason = verdict_of(
         found, p_value, remains, twins, repeats, series, judge.uncarried(), imitating
     )

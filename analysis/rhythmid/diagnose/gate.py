@@ -59,15 +59,15 @@ def admitted(
     return found, tuple(dropped)
 
 
-def faint(found: Search, label: str) -> bool:
-    """Whether the size of an effect of the chosen model cannot be told from its absence."""
+def faint(found: Search, label: str, limit: float = FAINT) -> bool:
+    """Whether the size of an effect of the chosen model is within so many standard deviations of its absence."""
     element = found.best.element(label)
     if not element.size:
         return False
     name = f"{label}.{element.size}"
     if name not in found.fit.std:
         return False
-    return abs(found.fit.model.value(name) - element.absent) < FAINT * found.fit.std[name]
+    return abs(found.fit.model.value(name) - element.absent) < limit * found.fit.std[name]
 
 
 def _held_out(found: Search, separate: Sequence[Series] | None) -> float | None:

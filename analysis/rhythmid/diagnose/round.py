@@ -8,10 +8,12 @@ from rhythmid.diagnose.screen import Score
 
 @dataclass(frozen=True)
 class Round:
-    """One round of the search: the scores, best first, and the probability of such a best score by chance."""
+    """One round of the search: the scores, best first, and the probability of such a best score by chance; `added` are the
+    labels of the effects that the scored model had already."""
 
     scores: tuple[Score, ...]
     p_value: float
+    added: tuple[str, ...] = ()
 
 
 def distinct(scores: Sequence[Score], count: int) -> list[tuple[Score, list[Score]]]:

@@ -117,7 +117,9 @@ def noise_without(fit: Fit, changes: Sequence[Change], most: int = 60) -> NoiseM
     return estimate_noise(stretches, floor=fit.noise.std * 1e-6)
 
 
-def _one_round(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> tuple[Round, Fit]:
+def _one_round(
+    fit: Fit, added: tuple[str, ...], catalogue: Catalogue, pool: ThreadPoolExecutor | None
+) -> tuple[Round, Fit]:
     """Score the catalogue at a fit, under the noise that its best guesses leave; returns the fit under that noise, too.
 
     What is missing, such as a slow drift, would otherwise pass for the colour of the noise, in later rounds as in the first.
@@ -133,7 +135,7 @@ def _one_round(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) 
         noise = NoiseModel(np.empty(0), noise.variance**0.5)
     fit = under(fit, noise, pool)
     scores = score(fit, changes)
-    return Round(tuple(scores), p_value(scores)), fit
+    return Round(tuple(scores), p_value(scores), added), fit
 
 
 def _proposals(
@@ -162,7 +164,7 @@ def search(
     step = nominal.run.max_step
     floor = 1e-9 * max(float(np.std(one.averaged)) for one in series)
     tell("scoring the catalogue")
-    first, nominal = _one_round(nominal, catalogue, pool)
+    first, nominal = _one_round(nominal, (), catalogue, pool)
     current, noise = nominal, nominal.noise
     base = Trial(
         (),
@@ -222,7 +224,7 @@ def search(
         current = whole_fit(best, series, noise, step, pool=pool)
         if len(best.added) >= MOST:
             break
-        now, current = _one_round(current, catalogue, pool)
+        now, current = _one_round(current, best.added, catalogue, pool)
         here = under_noise([best], series, current.noise, step, 0)[0]
         rounds.append(now)
     if best.added:

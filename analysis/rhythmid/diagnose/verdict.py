@@ -129,11 +129,16 @@ def _of_names(
             "undecided",
             f"{terms} do it together, and {law} that the catalogue does not have would do it, too",
         )
-    together = [label for label in found.best.added if faint(found, label)]
-    if len(together) > 1:  # one alone is determined by what else it does: a stop touched once by where it is
+    # nearer to its absence than the criterion asks of one more parameter, an effect would do as well in the limit that
+    # its other parameters leave: as the gain that a curvature around a point far away is. One alone is determined by what
+    # else it does: a stop touched once by where it is
+    limit = math.sqrt(WORTH + math.log(max(found.best.samples, 2)))
+    sizeless = [label for label in found.best.added if faint(found, label, limit)]
+    if sizeless and len(found.best.added) > 1:
         return (
             "unknown_physics",
-            f"only the sum of {_words(found, together)} is determined, none of them by itself",
+            f"only what {_words(found, found.best.added)} do together is determined, not the size of "
+            f"{_words(found, sizeless)}",
         )
     named = {found.best.element(label).name for label in found.best.added}
     if any(math.comb(len(group), len(named.intersection(group))) > TWINS for group in twins):
@@ -147,13 +152,12 @@ def _words(found: Search, labels: Sequence[str]) -> str:
 
 def _more_to_say(found: Search) -> float:
     """What further effects would gain: in the criterion, of a richer model that was tried and is worth its parameters; in
-    chi2, of the best score of a round that began with no less than what was chosen, where that is no chance. 0 without."""
-    best, last = found.best, found.rounds[-1] if found.rounds else None
+    chi2, of the best score of a round that began with all that was chosen, where that is no chance. 0 without."""
+    best = found.best
+    later = [one for one in found.rounds if set(one.added) >= set(best.added)]
     richer = min((t.bic() for t in found.trials if set(t.added) > set(best.added)), default=math.inf)
     gain = best.bic() - richer if best.bic() - richer > WORTH else 0.0
-    if last is not None and len(found.rounds) > len(best.added) and last.p_value < CHANCE and last.scores:
-        gain = max(gain, last.scores[0].statistic)
-    return gain
+    return max([gain, *(one.scores[0].statistic for one in later if one.scores and one.p_value < CHANCE)])
 
 
 def _least_worth(found: Search) -> float:

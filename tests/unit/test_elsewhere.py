@@ -1,0 +1,63 @@
+"""An effect on a signal that does as well in another place, where the catalogue has nothing like it, is no name."""
+
+import numpy as np
+import pytest
+
+from machines import CATALOGUE, SHORT, hopper, records
+from rhythmid.diagnose.elsewhere import elsewhere
+from rhythmid.diagnose.refit import Trial
+from rhythmid.diagnose.search import Search
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.output_error import estimate
+from rhythmid.identify.series import prepare
+
+NOISE = NoiseModel(np.empty(0), 0.5e-4)  # of averages of four samples
+LAG = {"time_constant": 0.03}
+
+
+def search_for(true: str, named: str) -> Search:
+    """A search that named one effect in records of a machine with another."""
+    machine = hopper().with_element(CATALOGUE[true], LAG)
+    series = prepare(records(machine, SHORT, delays=(0.0203, 0.0151)), 4)
+    begin = hopper().with_element(CATALOGUE[named], LAG)
+    fit = estimate(begin, series, noise=NOISE, max_step=1e-3)
+    trial = Trial(
+        (named,), fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), True, fit.noise, fit.differences
+    )  # fmt: skip
+    return Search(fit, trial, fit, fit.noise, (trial,), (), ())
+
+
+@pytest.mark.parametrize(
+    ("true", "named", "place"),
+    [
+        ("sensor_lag", "actuator_lag", "between the mass and the measurement"),
+        ("actuator_lag", "sensor_lag", "in the actuator"),
+        ("command_lag", "actuator_lag", "in the command path"),
+    ],
+)
+def test_a_lag_that_the_catalogue_lacks_is_told_from_the_one_that_stands_in_for_it(true, named, place):
+    others = {"command_lag", "actuator_lag", "sensor_lag"} - {named}
+    said = elsewhere(search_for(true, named), CATALOGUE.without(*others))
+    assert len(said) == 1 and named.replace("_", " ") in said[0] and place in said[0]
+
+
+def test_a_lag_that_is_where_it_is_named_stays_its_name():
+    assert (
+        elsewhere(search_for("actuator_lag", "actuator_lag"), CATALOGUE.without("command_lag", "sensor_lag"))
+        == []
+    )
+
+
+def test_places_for_which_the_catalogue_has_a_lag_have_been_searched():
+    assert elsewhere(search_for("sensor_lag", "actuator_lag"), CATALOGUE) == []
+
+
+def test_what_has_a_size_in_the_unit_of_its_signal_is_not_moved():
+    machine = hopper().with_element(CATALOGUE["actuator_saturation"], {"limit": 0.8})
+    series = prepare(records(machine, SHORT[:1]), 4)
+    fit = estimate(machine, series, noise=NOISE, max_step=1e-3)
+    trial = Trial(
+        ("actuator_saturation",), fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), True, fit.noise,
+        fit.differences,
+    )  # fmt: skip
+    assert elsewhere(Search(fit, trial, fit, fit.noise, (trial,), (), ()), CATALOGUE) == []
