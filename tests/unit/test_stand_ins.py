@@ -97,6 +97,18 @@ def test_a_ripple_as_long_as_it_may_be_is_a_spring(share, edge):
 
 
 @pytest.mark.parametrize(
+    "name", ["coulomb_friction", "asymmetric_coulomb_friction", "load_dependent_friction"]
+)
+@pytest.mark.parametrize(("times", "damper"), [(2.0, True), (1.9, False), (0.01, False)])
+def test_dry_friction_that_turns_over_all_speeds_is_a_damper(name, times, damper):
+    friction = CATALOGUE[name].within(SIZES)
+    values = {one.name: 0.1 for one in friction.parameters} | {"transition": times * SIZES.velocity}
+    fit = SimpleNamespace(model=hopper().with_element(friction, values))
+    said = stand_ins(replace_fit(motion("viscous_damper", {"damping": 0.1}), fit), (name,), SIZES)
+    assert ["the edge of what it can be (transition)" in one for one in said] == ([True] if damper else [])
+
+
+@pytest.mark.parametrize(
     ("frequency", "synchronous"), [(2.0, True), (4.09, True), (1.91, True), (2.11, False), (3.3, False)]
 )
 def test_a_disturbance_that_the_records_cannot_tell_from_the_forcing_in_frequency_is_a_stand_in(

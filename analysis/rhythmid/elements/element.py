@@ -86,6 +86,11 @@ class Scales:
         return self.low + margin, self.high - margin
 
     @property
+    def turning(self) -> tuple[float, float]:
+        """Speeds over which dry friction may turn: where the motion does not leave them, it is but a damper."""
+        return 0.0, 2.0 * self.velocity
+
+    @property
     def damping(self) -> float:
         """The damping coefficient sqrt(k m), half the critical one."""
         return (self.stiffness * self.mass) ** 0.5

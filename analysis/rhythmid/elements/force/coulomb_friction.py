@@ -29,6 +29,7 @@ ELEMENT = Element(
     kernel=kernel,
     size="force",
     starts=lambda s: [{"force": 0.02 * s.force, "transition": w * s.velocity} for w in (0.02, 0.2)],
+    ranges=lambda s: {"transition": s.turning},
     also_known_as=("dry friction", "kinetic friction"),
     family="friction",
     special_case_of=(

@@ -28,6 +28,7 @@ ELEMENT = Element(
     kernel=kernel,
     size="coefficient",
     starts=lambda s: [{"coefficient": 0.05, "transition": 0.1 * s.velocity}],
+    ranges=lambda s: {"transition": s.turning},
     also_known_as=("gear friction", "torque-dependent friction"),
     family="friction",
     confusable={
