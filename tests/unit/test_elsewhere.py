@@ -1,9 +1,12 @@
 """An effect on a signal that does as well in another place, where the catalogue has nothing like it, is no name."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from machines import CATALOGUE, SHORT, hopper, records
+from rhythmid.diagnose import elsewhere as module
 from rhythmid.diagnose.elsewhere import elsewhere
 from rhythmid.diagnose.refit import Trial
 from rhythmid.diagnose.search import Search
@@ -39,6 +42,23 @@ def test_a_lag_that_the_catalogue_lacks_is_told_from_the_one_that_stands_in_for_
     others = {"command_lag", "actuator_lag", "sensor_lag"} - {named}
     said = elsewhere(search_for(true, named), CATALOGUE.without(*others))
     assert len(said) == 1 and named.replace("_", " ") in said[0] and place in said[0]
+
+
+def test_what_may_only_have_made_up_for_the_wrong_place_is_tried_without_as_well(monkeypatch):
+    alone = search_for("command_lag", "actuator_lag")
+    mode = {"mass": 0.001, "frequency": 1.5, "damping_ratio": 0.01}
+    model = alone.fit.model.with_element(CATALOGUE["second_mode"], mode)
+    best = replace(alone.best, added=("actuator_lag", "second_mode"), model=model)
+    tried: list[tuple[str, ...]] = []
+
+    def run_trials(proposals, *_):
+        tried.extend(one.added for one in proposals)
+        return [], []
+
+    monkeypatch.setattr(module, "run_trials", run_trials)
+    elsewhere(replace(alone, best=best), CATALOGUE.without("command_lag"))
+    moved = "actuator_lag_of_the_command"
+    assert tried == [("second_mode", moved), (moved,)]
 
 
 def test_a_lag_that_is_where_it_is_named_stays_its_name():

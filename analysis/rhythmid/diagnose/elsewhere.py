@@ -34,9 +34,10 @@ def elsewhere(found: Search, catalogue: Catalogue) -> list[str]:
         term = found.best.model.term(label)
         assert term is not None
         moved = [
-            _moved(found, term, place)
+            proposal
             for place in _free_places(term.element, catalogue)
             if not (tied and place == "sensor")
+            for proposal in _moved(found, term, place)
         ]
         if not moved:
             continue
@@ -68,8 +69,9 @@ def _free_places(element: Element, catalogue: Catalogue) -> Iterator[Slot]:
             yield place
 
 
-def _moved(found: Search, term: Term, place: Slot) -> Proposal:
-    """The chosen model with one of its effects in another place."""
+def _moved(found: Search, term: Term, place: Slot) -> Iterator[Proposal]:
+    """The chosen model with one of its effects in another place; and without any one of the others, that may only have made
+    up for the wrong place."""
     measured = place == "sensor"
     element = replace(
         term.element,
@@ -78,5 +80,9 @@ def _moved(found: Search, term: Term, place: Slot) -> Proposal:
         initial=lambda x, v, f, **_: (x if measured else f,) * len(term.element.own),
     )
     values = {name: value.value for name, value in term.values.items()}
-    rest = tuple(one for one in found.best.added if one != term.label)
-    return propose(found.best.model.without(term.label), element, [values], rest, found.best.chi2)
+    others = [label for label in found.best.added if label != term.label]
+    for idle in (None, *others):
+        rest = tuple(label for label in others if label != idle)
+        base = found.best.model.without(term.label)
+        base = base if idle is None else base.without(idle)
+        yield propose(base, element, [values], rest)
