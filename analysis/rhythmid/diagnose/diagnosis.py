@@ -18,6 +18,7 @@ from rhythmid.diagnose.confidence import probabilities
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.elsewhere import elsewhere
 from rhythmid.diagnose.exclusions import unscored
+from rhythmid.diagnose.fine_steps import finely_stepped
 from rhythmid.diagnose.gate import admitted
 from rhythmid.diagnose.heldout import HeldOut, tail_error
 from rhythmid.diagnose.locate import Dependence, dependences
@@ -134,16 +135,16 @@ def diagnose(
         found = search(seen, calibration.fit, known, pool, tell)
         tell("judging on held-out records")
         found, harmful = admitted(found, unseen if holdout else None, pool)
-        found = profiled(found, pool)
-        tell("locating the mismatch")
-        before = dependences(trajectories(found.nominal), pool)
-        after = dependences(trajectories(found.fit), pool) if found.best.added else before
-        judge = HeldOut(found, unseen if holdout else None)
         fitted = scales(seen, found.fit.model)
         imitating = [
             *stand_ins(trajectories(found.fit), found.best.added, fitted),
             *elsewhere(found, known),
         ]
+        found = profiled(finely_stepped(found, pool), pool)
+        tell("locating the mismatch")
+        before = dependences(trajectories(found.nominal), pool)
+        after = dependences(trajectories(found.fit), pool) if found.best.added else before
+        judge = HeldOut(found, unseen if holdout else None)
         diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful, imitating)
         said = (*diagnosis.notes, *(note for note in notes if note is not None))
         excluded = (*diagnosis.excluded, *unscored(found, known, pool))
