@@ -36,7 +36,8 @@ $(VENV)/.warm: $(VENV)/.packages
 	@touch $@
 
 test: lint ## Run the linters and all tests, fast ones first
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder --ignore tests/ros
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder \
+		tests/unit tests/faults tests/proof tests/browser
 	@# what runs in real time has the machine to itself
 	$(BIN)/python -m pytest tests/ros
 

@@ -55,11 +55,11 @@ def load_run(module: Module) -> Callable[..., int]:
 
     Raises InputError where the cache cannot be written, or where an element's kernel does not compile.
     """
-    for needed in (*module.imports, module):
-        with _LOCK:
-            if needed is module or needed.name not in sys.modules:
+    with _LOCK:  # whoever comes second finds a module that is whole
+        for needed in (*module.imports, module):
+            if needed.name not in sys.modules:
                 _load(needed)
-    return sys.modules[module.name].run
+        return sys.modules[module.name].run
 
 
 def _load(module: Module) -> None:
@@ -83,8 +83,10 @@ def _load(module: Module) -> None:
     sys.modules[module.name] = made
     try:
         spec.loader.exec_module(made)
-    except NumbaError as error:
+    except BaseException as error:
         del sys.modules[module.name]
+        if not isinstance(error, NumbaError):
+            raise
         texts = "\n".join(one.text for one in (*module.imports, module))
         raise InputError(_complaint(texts, str(error))) from None
 
