@@ -25,6 +25,7 @@ from rhythmid.parallel import fork_map
 
 Array = NDArray[np.float64]
 SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
+STEEP = 0.8  # of chi2, below which as many iterations as in a sketch have to bring a descent that goes on
 PROMISING = 0.3  # share of the spread of chi2 within which a model is carried to convergence
 HOPS = 12  # at most, from one minimum to the next
 WAYS = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minima, that one hop goes
@@ -179,9 +180,7 @@ def _fit_proposal(
     if best is None:
         assert failure is not None
         raise failure
-    if not best.converged:
-        more = BRIEF - SKETCH
-        best = descend(best.model, run, names, noise, best.starts, more, None, TOLERANCE, best.differences)
+    best = _carried_on(best, run, names, noise)
     guessed = proposal.guesses[0] if proposal.guesses else {}
     flat = _flat(best.model, best.differences[0], list(guessed))
     if flat:
@@ -192,6 +191,17 @@ def _fit_proposal(
     for name, distance in hops.items():
         best = _hopped(best, run, names, noise, name, distance)
     return _outcome(best)
+
+
+def _carried_on(end: Descent, run: FreeRun, names: tuple[str, ...], noise: NoiseModel) -> Descent:
+    """The descent carried on to `BRIEF` iterations, and beyond as long as it still falls steeply: in a narrow, bent valley it
+    comes from far away and can be the deepest in the end."""
+    done, steep = SKETCH, True
+    while not end.converged and (done < BRIEF or (steep and done < THOROUGH)):
+        before = end.chi2
+        end = descend(end.model, run, names, noise, end.starts, SKETCH, None, TOLERANCE, end.differences)
+        done, steep = done + SKETCH, end.chi2 < STEEP * before
+    return end
 
 
 def _hops(proposal: Proposal, series: Sequence[Series]) -> dict[str, float]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.defend import defend
+from rhythmid.diagnose.order import in_best_order
 from rhythmid.diagnose.refit import (
     Proposal,
     Trial,
@@ -217,9 +218,10 @@ def search(
                 break
         else:  # what the noise model of the round saw in them, the noise that they leave does not bear out
             break
-        gained += gain
         noise = settled
-        best = winner
+        best = in_best_order(winner, series, noise, step)
+        gained += gain + winner.chi2 - best.chi2
+        trials[tuple(sorted(best.added))] = best
         tell(f"{best.added[-1]} explains it better by {gain:.0f}; looking for more")
         current = whole_fit(best, series, noise, step, pool=pool)
         if len(best.added) >= MOST:
@@ -232,7 +234,8 @@ def search(
         defended, more = defend(best, series, catalogue, trials, noise, step, rounds, margin, MOST, tell)
         trials |= more
         if defended is not best:
-            best = defended
+            best = in_best_order(defended, series, noise, step)
+            trials[tuple(sorted(best.added))] = best
             noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
     ranked = _contenders(trials, best)
     for _ in range(OVERTAKEN):
