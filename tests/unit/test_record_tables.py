@@ -217,6 +217,50 @@ def test_a_wrong_description_is_refused_with_its_line(tmp_path, content, words):
     assert "signals.yaml:" in str(refused.value) and words in str(refused.value), str(refused.value)
 
 
+COLUMNS = "time: {column: t}\ninput: {column: u}\noutput: {column: y}\n"
+
+
+def test_one_description_serves_many_tables_given_in_place_of_bags(tmp_path):
+    named = signals(tmp_path, "", COLUMNS)
+    for name in ("small.csv", "large.TXT"):
+        (tmp_path / name).write_text(text())
+    np.savez(tmp_path / "third.npz", t=TIME, u=U, y=Y)
+    found = load_records([tmp_path / name for name in ("small.csv", "large.TXT", "third.npz")], named)
+    assert [record.name for record in found] == ["small", "large", "third"]
+    for record in found:
+        check(record)
+    assert quality_report(tmp_path / "small.csv", named).problems == ()
+
+
+def test_a_channel_may_have_a_file_of_its_own_beside_the_table_that_is_given(tmp_path):
+    (tmp_path / "motion.csv").write_text(text(head="t,none,y"))
+    (tmp_path / "force.csv").write_text(text())
+    own = signals(tmp_path, "force.csv", COLUMNS.replace("{column: u}", "{file: FILE, column: u}"))
+    check(read_record(tmp_path / "motion.csv", own))
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (SIGNALS, "names its tables itself"),
+        ("output: {topic: /y, field: data}\n", "names topics of a bag, but"),
+        (COLUMNS.replace("column: y", "column: z"), "has no column 'z'"),
+    ],
+)
+def test_a_table_and_a_description_that_do_not_belong_together_are_refused(tmp_path, content, words):
+    (tmp_path / "run.csv").write_text(text())
+    with pytest.raises(InputError, match=words):
+        read_record(tmp_path / "run.csv", signals(tmp_path, "run.csv", content))
+
+
+def test_a_table_without_a_description_is_refused_with_what_to_give(tmp_path):
+    (tmp_path / "run.csv").write_text(text())
+    with pytest.raises(InputError, match=r"have to be named with --signals"):
+        read_record(tmp_path / "run.csv")
+    with pytest.raises(InputError, match=r"signals.yaml:2: input: 'file:' is missing"):
+        read_record(signals(tmp_path, "", COLUMNS))
+
+
 SILVERBOX = (
     Path(os.environ.get("RHYTHMID_DATA") or Path(__file__).parents[3] / "shared" / "data") / "silverbox"
 )

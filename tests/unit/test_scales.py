@@ -1,9 +1,11 @@
 """Scales: what the records tell about sizes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from machines import hopper
+from machines import CATALOGUE, hopper
 from rhythmid.identify.series import Series, scales
 from rhythmid.signal import spline
 
@@ -20,3 +22,16 @@ def forced(frequency: float, seconds: float) -> Series:
 def test_the_forcing_s_frequency_is_told_finer_than_the_longest_record_resolves(frequency):
     records = [forced(frequency, 30.0), forced(frequency, 7.0)]
     assert scales(records, hopper()).forcing_frequency == pytest.approx(frequency, abs=0.1 / 30.0)
+
+
+def test_a_limit_is_looked_for_just_below_the_highest_force_too():
+    """A peak that is cut off once lies far above the usual forces."""
+    one = forced(1.0, 10.0)
+    peak = spline(one.time, 3.0 * np.exp(-(((one.time - 4.0) / 0.1) ** 2)))
+    sizes = scales([replace(one, command=peak)], hopper())
+    highest = float(np.abs(peak(one.time) + np.sin(2.0 * np.pi * one.time + 0.3)).max())
+    assert sizes.peak_effort == pytest.approx(highest)
+    starts = CATALOGUE["actuator_saturation"].starts
+    assert starts is not None
+    assert any(0.95 * highest < start["limit"] < highest for start in starts(sizes))
+    assert not starts(replace(sizes, effort=0.0, peak_effort=0.0))

@@ -10,7 +10,9 @@ from rhythmid.output import require_new, write_json
 
 
 def check(
-    bag: Annotated[Path, typer.Argument(help="Bag directory, .mcap/.db3 file, or signals.yaml of tables.")],
+    bag: Annotated[
+        Path, typer.Argument(help="Bag directory, .mcap/.db3 file, table, or signals.yaml of tables.")
+    ],
     signals: SignalsFile = None,
     json: JsonFile = None,
 ) -> None:

@@ -128,7 +128,12 @@ def _one_round(
     known = trajectories(fit)
     sizes = replace(scales(fit.run.series, fit.model), residual_frequency=residual_line(fit))
     if controlled(fit.model):  # the actuator's force is the controller's, which only the simulation knows
-        sizes = replace(sizes, effort=max(float(np.std(path.effort)) for path in known.paths) or sizes.effort)
+        efforts = [path.effort for path in known.paths]
+        sizes = replace(
+            sizes,
+            effort=max(float(np.std(effort)) for effort in efforts) or sizes.effort,
+            peak_effort=max(float(np.abs(effort).max()) for effort in efforts),
+        )
     changes = changes_of(known, guesses(catalogue, fit.model, sizes), pool)
     noise = noise_without(fit, changes)
     if fit.nrmse() > MISFIT and noise.variance > PREDICTED * noise.std**2:

@@ -72,6 +72,7 @@ class Scales:
     # [Hz] strongest line that the nominal model leaves unexplained, 0 where unknown
     residual_frequency: float = 0.0
     reference: float = 0.0  # standard deviation of a controller's reference, 0 where there is none
+    peak_effort: float = 0.0  # largest actuator force, 0 where unknown
     rest: float | None = None  # position at which the model's linear spring is at rest, where that is known
 
     @property

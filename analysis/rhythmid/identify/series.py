@@ -273,7 +273,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     inertial = model.mass.value * (2 * np.pi * frequency) ** 2
     spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
     stiffness = spring if spring > FAINT * inertial else inertial
-    effort, pumping, reference = 0.0, 0.0, 0.0
+    effort, peak, pumping, reference = 0.0, 0.0, 0.0, 0.0
     for one in series:
         total = np.zeros(len(one.time))
         for signal in (one.command, one.forcing):
@@ -284,6 +284,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
             reference = max(reference, float(np.std(total)))
         else:
             effort = max(effort, float(np.std(total)))
+            peak = max(peak, float(np.abs(total).max(initial=0.0)))
     forced = [one for one in series if one.forcing is not None]
     if forced:
         longest = max(forced, key=lambda one: one.time[-1] - one.time[0])
@@ -304,6 +305,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         period=biggest.period,
         forcing_frequency=pumping,
         reference=reference,
+        peak_effort=peak,
         rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
     )
 

@@ -16,7 +16,7 @@ from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.quality import ChannelQuality, Quality, clipped
 from rhythmid.record.record import SHORTEST, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
-from rhythmid.record.table import Table
+from rhythmid.record.table import SUFFIXES, Table
 from rhythmid.record.timing import Timing, put_in_order
 from rhythmid.signal import Hold
 
@@ -50,7 +50,8 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
 
     Parameters
     ----------
-    source : a bag directory, an .mcap or .db3 file, or a signals.yaml that names tables.
+    source : a bag directory, an .mcap or .db3 file, a signals.yaml that names tables, or a table, of which `signals` names
+        the columns.
     signals : which channel is what; by default the topics of rhythmid's own nodes.
 
     Times are relative to the first sample of any channel; a clock that began with the run (simulated time) and the
@@ -70,9 +71,12 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
         return read_tables(given)
     if not source.exists():
         raise InputError(f"{source}: no such file or directory")
+    if signals is not None and source.suffix.lower() in SUFFIXES:
+        return read_tables(signals.of_table(source))
     if not is_bag(source):
         raise InputError(
-            f"{source}: is neither a bag (directory, .mcap, .db3) nor a signals.yaml that names tables"
+            f"{source}: is neither a bag (directory, .mcap, .db3) nor a signals.yaml that names tables; "
+            "the columns of a table have to be named with --signals"
         )
     if signals is not None and signals.from_tables:
         raise InputError(f"{signals.path}: names tables, so it takes the place of the bag {source}")
@@ -108,6 +112,11 @@ def read_bag(bag: Bag, signals: Signals | None = None) -> Record:
 
 def read_tables(signals: Signals) -> Record:
     """Read a record from the tables that `signals` names. Raises InputError as `read_record` does."""
+    for source in signals.channels.values():
+        if source.file is None:
+            raise InputError(
+                f"{source.place}'file:' is missing: whose column is it? Or give the table, and this file with --signals"
+            )
     tables = {
         file: Table.load(file) for source in signals.channels.values() if (file := source.file) is not None
     }

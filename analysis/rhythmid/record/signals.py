@@ -9,14 +9,14 @@
     # on output: kind: position (default) | velocity | acceleration
 
 A channel is a field of a topic, or a `column` of a `file` (.mat, .csv, .npz; relative to signals.yaml; `tables: {file: …}`
-names one file for all). Its value is `scale` * recorded + `offset`, in `unit`. `input: none` says that nothing but the
+names one file for all; without either it is a column of the table that is read). Its value is `scale` * recorded + `offset`, in `unit`. `input: none` says that nothing but the
 forcing, if that, drives the machine. `forcing: {amplitude: 1.0, frequency: 1.0, phase: 0.0}` states
 amplitude * cos(2π frequency t + phase) in the record's time.
 """
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, cast
 
@@ -68,7 +68,7 @@ class Sinusoid:
 
 @dataclass(frozen=True)
 class Source:
-    """Where one channel comes from: `field` of `topic`, or `column` of `file`."""
+    """Where one channel comes from: `field` of `topic`, or `column` of `file`, None for the table that is read."""
 
     unit: str
     topic: str = ""
@@ -80,9 +80,9 @@ class Source:
     place: str = ""  # "signals.yaml:3: input: ", to begin a complaint with
 
     def __str__(self) -> str:
-        if self.file is not None:
-            return f"{self.file.name} column {self.column}"
-        return f"{self.topic} {self.field.text if self.field else ''}"
+        if self.topic:
+            return f"{self.topic} {self.field.text if self.field else ''}"
+        return f"{self.file.name if self.file else 'table'} column {self.column}"
 
 
 @dataclass(frozen=True)
@@ -112,8 +112,20 @@ class Signals:
 
     @property
     def from_tables(self) -> bool:
-        """Whether the channels are columns of files, so that no bag is needed."""
-        return self.channels["output"].file is not None
+        """Whether the channels are columns of tables, so that no bag is needed."""
+        return not self.channels["output"].topic
+
+    def of_table(self, path: Path) -> "Signals":
+        """The same channels of the table at `path`, where they name no file. Raises InputError when they need no such table."""
+        if not self.from_tables:
+            raise InputError(f"{self.path}: names topics of a bag, but {path} is a table: name its columns")
+        if all(source.file is not None for source in self.channels.values()):
+            raise InputError(f"{self.path}: names its tables itself, so it takes the place of {path}")
+        channels = {
+            role: source if source.file is not None else replace(source, file=path)
+            for role, source in self.channels.items()
+        }
+        return replace(self, channels=channels, path=path)
 
     @classmethod
     def load(cls, path: str | Path) -> "Signals":
@@ -170,7 +182,7 @@ def _signals(document: Node, path: Path) -> Signals:
         document.fail("'output:' is missing: which channel is the measured motion?")
     output = channels["output"]
     for role, source in channels.items():
-        if (source.file is None) != (output.file is None):
+        if bool(source.topic) != bool(output.topic):
             keys[role].fail("topics and files cannot be mixed in one record")
     if "use" in keys:
         ends = [end.number() for end in keys["use"].items()]
@@ -179,7 +191,7 @@ def _signals(document: Node, path: Path) -> Signals:
         use = ends[0], ends[1]
     else:
         use = -math.inf, math.inf
-    clock = _clock(keys.get("time"), document, output.file is not None)
+    clock = _clock(keys.get("time"), document, not output.topic)
     return Signals(channels, clock, law, kind, measured, hold, use, path=path)
 
 
@@ -224,8 +236,6 @@ def _source(node: Node, role: str, unit: str, folder: Path, default_file: Path |
     if "column" not in keys:
         node.fail("give topic and field (of a bag) or file and column (of a .mat, .csv or .npz table)")
     file = folder / keys["file"].text() if "file" in keys else default_file
-    if file is None:
-        node.fail("'file:' is missing: whose column is it?")
     return Source(unit, file=file, column=_column(keys["column"]), scale=scale, offset=offset, place=place)
 
 

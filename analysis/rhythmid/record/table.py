@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 
 TEXT = (".csv", ".tsv", ".txt", ".dat")
+SUFFIXES = (".mat", ".npz", *TEXT)
 
 
 @dataclass(frozen=True)

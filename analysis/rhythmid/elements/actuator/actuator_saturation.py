@@ -18,7 +18,15 @@ ELEMENT = Element(
     kernel=kernel,
     size="limit",
     absent=inf,
-    starts=lambda s: [{"limit": w * s.effort} for w in (1.0, 1.4, 2.0, 3.0) if s.effort > 0.0],
+    starts=lambda s: [  # the last two cut off no more than the highest peaks
+        {"limit": limit}
+        for limit in (
+            *(w * s.effort for w in (1.0, 1.4, 2.0, 3.0)),
+            0.9 * s.peak_effort,
+            0.97 * s.peak_effort,
+        )
+        if limit > 0.0
+    ],
     also_known_as=("force limit", "current limit", "clipping"),
     family="actuator nonlinearity",
     confusable={
