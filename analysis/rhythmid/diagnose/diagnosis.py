@@ -21,6 +21,7 @@ from rhythmid.diagnose.exclusions import unscored
 from rhythmid.diagnose.fine_steps import finely_stepped
 from rhythmid.diagnose.gate import admitted
 from rhythmid.diagnose.heldout import HeldOut, tail_error
+from rhythmid.diagnose.limiting_case import limiting_cases
 from rhythmid.diagnose.locate import Dependence, dependences
 from rhythmid.diagnose.next_experiment import next_experiment
 from rhythmid.diagnose.profile import profiled
@@ -140,7 +141,9 @@ def diagnose(
             *stand_ins(trajectories(found.fit), found.best.added, fitted),
             *elsewhere(found, known),
         ]
-        found = profiled(finely_stepped(found, pool), pool)
+        found = finely_stepped(found, pool)
+        imitating += limiting_cases(found)
+        found = profiled(found, pool)
         tell("locating the mismatch")
         before = dependences(trajectories(found.nominal), pool)
         after = dependences(trajectories(found.fit), pool) if found.best.added else before

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 from rhythmid.compiled import compile_model
 from rhythmid.diagnose.heldout import HeldOut
-from rhythmid.diagnose.refit import Proposal, run_trials, whole_fit
-from rhythmid.diagnose.search import Search
+from rhythmid.diagnose.refit import Proposal, Trial, run_trials, whole_fit
+from rhythmid.diagnose.search import WORTH, Search
 from rhythmid.errors import InputError
 from rhythmid.identify.series import Series
 
@@ -68,6 +68,11 @@ def faint(found: Search, label: str, limit: float = FAINT) -> bool:
     if name not in found.fit.std:
         return False
     return abs(found.fit.model.value(name) - element.absent) < limit * found.fit.std[name]
+
+
+def needed(trial: Trial) -> float:
+    """Standard deviations from its absence that the criterion asks of the size of one more effect."""
+    return math.sqrt(WORTH + math.log(max(trial.samples, 2)))
 
 
 def _held_out(found: Search, separate: Sequence[Series] | None) -> float | None:

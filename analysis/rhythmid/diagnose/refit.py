@@ -122,12 +122,12 @@ def propose(
     def named(guess: dict[str, float]) -> dict[str, float]:
         return {f"{label}.{name}": value for name, value in guess.items()}
 
-    faint = [_fainter(element, guesses[0], share) for share in FAINTER] if element.size else []
+    faint = [fainter(element, guesses[0], share) for share in FAINTER] if element.size else []
     return Proposal((*added, label), extended, tuple(map(named, guesses)), ceiling, tuple(map(named, faint)))
 
 
-def _fainter(element: Element, guess: dict[str, float], share: float) -> dict[str, float]:
-    """The guess with its effect reduced to a share."""
+def fainter(element: Element, guess: dict[str, float], share: float) -> dict[str, float]:
+    """Values of an element's parameters with its effect reduced to a share."""
     value = guess[element.size]
     if math.isinf(element.absent):
         return guess | {element.size: value / share}

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rhythmid.diagnose.gate import faint
+from rhythmid.diagnose.gate import faint, needed
 from rhythmid.diagnose.line_test import strongest_line
 from rhythmid.diagnose.locate import Dependence
 from rhythmid.diagnose.result import Verdict
@@ -132,8 +132,7 @@ def _of_names(
     # nearer to its absence than the criterion asks of one more parameter, an effect would do as well in the limit that
     # its other parameters leave: as the gain that a curvature around a point far away is. One alone is determined by what
     # else it does: a stop touched once by where it is
-    limit = math.sqrt(WORTH + math.log(max(found.best.samples, 2)))
-    sizeless = [label for label in found.best.added if faint(found, label, limit)]
+    sizeless = [label for label in found.best.added if faint(found, label, needed(found.best))]
     if sizeless and len(found.best.added) > 1:
         return (
             "unknown_physics",

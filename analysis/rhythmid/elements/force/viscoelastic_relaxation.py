@@ -37,6 +37,7 @@ ELEMENT = Element(
         }
         for w in (0.15, 0.7, 3.0)
     ],
+    ranges=lambda s: {"time_constant": (0.0, 0.25 * s.duration)},  # slower it shows but once, as a drift
     also_known_as=("Maxwell branch", "Zener solid", "standard linear solid", "creep"),
     family="damping",
     confusable={
