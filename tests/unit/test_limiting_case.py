@@ -1,0 +1,45 @@
+"""An effect that does as well with a tenth of its size is but the limit that its other parameters take."""
+
+import numpy as np
+
+from machines import CATALOGUE, SHORT, hopper, records
+from rhythmid.diagnose.limiting_case import limiting_cases
+from rhythmid.diagnose.refit import Trial
+from rhythmid.diagnose.search import Search
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.output_error import estimate
+from rhythmid.identify.series import prepare
+
+NOISE = NoiseModel(np.empty(0), 0.5e-4)  # of averages of four samples
+
+
+def search_for(true: str, true_values: dict[str, float], named: str, values: dict[str, float]) -> Search:
+    """A search that named one effect in records of a machine with another."""
+    machine = hopper().with_element(CATALOGUE[true], true_values)
+    series = prepare(records(machine, SHORT), 4)
+    begin = hopper().with_element(CATALOGUE[named], values)
+    fit = estimate(begin, series, noise=NOISE, max_step=1e-3)
+    trial = Trial(
+        (named,), fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), True, fit.noise, fit.differences
+    )  # fmt: skip
+    return Search(fit, trial, fit, fit.noise, (trial,), (), ())
+
+
+def test_a_damper_that_depends_on_a_position_far_away_is_a_plain_one_and_no_name():
+    far = {"coefficient": 0.6, "reference": -1.0, "exponent": 2.0}
+    said = limiting_cases(search_for("viscous_damper", {"damping": 0.8}, "position_dependent_damping", far))
+    assert len(said) == 1 and "position dependent damping does as well with a tenth of its size" in said[0]
+
+
+def test_a_damper_that_does_depend_on_position_keeps_its_name():
+    values = {"coefficient": 200.0, "reference": 0.12, "exponent": 2.0}
+    found = search_for("position_dependent_damping", values, "position_dependent_damping", values)
+    assert limiting_cases(found) == []
+
+
+def test_a_stop_touched_once_is_a_stop_however_uncertain_its_stiffness():
+    values = {"stiffness": 300.0, "damping_ratio": 0.05, "position": 0.1665}
+    found = search_for("end_stop_contact", values, "end_stop_contact", values)
+    fit = found.fit
+    assert float(np.max([one.value.max() for one in fit.run.series])) > 0.1665
+    assert limiting_cases(found) == []
