@@ -6,13 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from machines import CATALOGUE, SHORT, hopper, records
+from machines import CATALOGUE, hopper
 from rhythmid.diagnose import refit
 from rhythmid.diagnose.refit import Proposal, Trial, propose, run_trials
 from rhythmid.identify.descent import Descent
-from rhythmid.identify.force_scoring import observed
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.series import Series, prepare
+from rhythmid.identify.series import Series
 
 QUIET = NoiseModel(np.empty(0), 1.0)
 TIME = 1e-3 * np.arange(64)
@@ -186,16 +185,3 @@ def test_a_descent_that_still_falls_steeply_goes_on_where_others_have_been_left(
     assert end.converged == arrives
     assert sum(left) <= refit.THOROUGH + refit.SKETCH
     assert arrives or sum(left) == refit.BRIEF
-
-
-@pytest.mark.parametrize(("limit", "smothered"), [(0.02, True), (0.9, False)])
-def test_in_the_balance_of_forces_a_limit_that_leaves_nothing_of_the_force_explains_nothing(limit, smothered):
-    """Without any force, a machine without inertia is in balance, too."""
-    machine = hopper().with_element(CATALOGUE["actuator_saturation"], {"limit": limit})
-    free = prepare(records(hopper(), SHORT[:1]), 4)
-    tied = observed(free, hopper(), 2.0)
-    for series, expected in ((tied, smothered), (free, False)):
-        run = refit.prepare_run(machine, series, 1e-3)
-        start = tuple(np.array([0.15, 0.0]) for _ in series)
-        end = Descent(machine, start, (), 0.0, 64, True, "", (), (np.ones(1), np.ones(2)), None)
-        assert refit._smothered(end, run) == expected

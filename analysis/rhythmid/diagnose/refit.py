@@ -30,7 +30,6 @@ PROMISING = 0.3  # share of the spread of chi2 within which a model is carried t
 HOPS = 12  # at most, from one minimum to the next
 WAYS = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minima, that one hop goes
 FAINTER = (0.1, 0.01)  # shares of a guess that led nowhere, tried in its place
-SMOTHERED = 0.3  # of the driving force's deviation, below which what is left of it is next to nothing
 TOLERANCE = 0.05  # of chi2, at which a trial has converged: far below what an element has to earn
 
 
@@ -174,9 +173,6 @@ def _fit_proposal(
         except InputError as error:
             failure = error
             continue
-        if _smothered(end, run):
-            failure = InputError("it fits best where it leaves next to nothing of the driving force")
-            continue
         if best is None or end.chi2 < best.chi2:
             best = end
         if best.chi2 < enough:
@@ -206,21 +202,6 @@ def _carried_on(end: Descent, run: FreeRun, names: tuple[str, ...], noise: Noise
         end = descend(end.model, run, names, noise, end.starts, SKETCH, None, TOLERANCE, end.differences)
         done, steep = done + SKETCH, end.chi2 < STEEP * before
     return end
-
-
-def _smothered(end: Descent, run: FreeRun) -> bool:
-    """Whether next to nothing is left of the driving force: in the balance of forces, machines without any balance, too."""
-    if run.series[0].observer is None:
-        return False
-    left = given = 0.0
-    for index, one in enumerate(run.series):
-        rows = run.rows(end.model, index, end.starts[index])
-        if rows is None or one.command is None:
-            return False
-        left += float(np.sum((rows[:, run.states + 1] - rows[:, run.states + 1].mean()) ** 2))
-        drive = one.command(one.centres)
-        given += float(np.sum((drive - drive.mean()) ** 2))
-    return left < SMOTHERED**2 * given
 
 
 def _hops(proposal: Proposal, series: Sequence[Series]) -> dict[str, float]:

@@ -26,7 +26,6 @@ WHITE = NoiseModel(np.empty(0), 1.0)
 LEAST = 1e-6  # damping up to which a step counts as a full one
 STATES = 0.01  # damping beyond which a step holds every state back
 STAY = 0.1  # share of its distance from a lower bound that one step leaves a parameter: a width of zero is hard to leave
-LEAP = 10.0  # times the motion's size, which no step moves a start further: a position that nothing pins down stays near
 BRINK = 1e-3  # share of its first distance within which it may reach the bound
 
 
@@ -44,15 +43,6 @@ def first_guess(model: Model, run: FreeRun) -> list[Array]:
             begin = float(one.command(one.centres[0])) + begin[0], begin[1]
         found.append(start_of(model, run, index, float(begin[0]), float(begin[1])))
     return found
-
-
-def _leap(run: FreeRun, spread: float) -> Array:
-    """The furthest that one step moves position and velocity where a series begins; other states are free."""
-    rate = 2 * np.pi * max(dominant_frequency(one) for one in run.series)
-    order = {"position": 0, "velocity": 1, "acceleration": 2}[run.series[0].measured]
-    leap = np.full(run.states, np.inf)
-    leap[:2] = LEAP * spread * rate ** (np.array([0.0, 1.0]) - order)
-    return leap
 
 
 def _first_steps(model: Model, names: Sequence[str], run: FreeRun) -> Array:
@@ -140,7 +130,6 @@ def descend(
         )
     else:
         steps, state_steps = differences
-    leap = _leap(run, problem.spread)
     held = np.array([float(place in run.compiled.layout.memories) for place in range(run.states)])
     damping, converged, searched = LEAST, False, not held.any()
     low = np.array([model.parameters[name].bounds[0] for name in names])
@@ -180,7 +169,7 @@ def descend(
                 ahead = error + slope @ step
                 # the other states are held back only where that of the parameters and memories did not help
                 change = state_update(state, ahead, damping * np.where(damping > STATES, 1.0, held))
-                moved.append(start + np.clip(change * state_steps, -leap, leap))
+                moved.append(start + change * state_steps)
                 promised += float(np.sum((ahead + state @ change) ** 2))
             enough = max(tolerance * min(1.0, cost / samples), 1e-7 * cost)
             if whole and damping <= LEAST and cost - promised < enough:
