@@ -1,6 +1,7 @@
 """Stiffness laws against the exact periods of their free swings and against conserved energy."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -90,3 +91,11 @@ def test_stiffness_elements_follow_the_rest_length_of_the_spring(rig):
         run[rest] = rig.run(model, 0.5, (rest + 0.05, 0.0)).position - rest
     assert run[0.7] == pytest.approx(run[0.0], abs=1e-12)
     assert np.ptp(run[0.0]) > 0.09
+
+
+def test_a_pendulum_that_goes_round_is_sought_hanging_any_way(catalogue, scales):
+    starts = catalogue["pendulum_gravity"].starts
+    around = replace(scales, low=-20.0, high=1.0, centre=-8.0)
+    found = {start["reference"] for start in starts(around)}
+    assert len(found) == 4 and max(found) - min(found) == pytest.approx(1.5 * math.pi)
+    assert [start["reference"] for start in starts(scales)] == [scales.centre]

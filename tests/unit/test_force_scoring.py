@@ -1,5 +1,7 @@
 """Force scoring: a simulation tied to its record shows the force that the model lacks, and nothing where it lacks none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -37,7 +39,17 @@ def test_a_missing_force_stretches_the_observer_by_itself_over_its_stiffness():
     fit = estimate(MODEL, series, names=())
     observer = series[0].observer
     assert observer is not None
-    assert np.median(fit.residuals[0]) == pytest.approx(-0.5 / observer.stiffness, rel=1e-3)
+    assert np.median(fit.residuals[0]) == pytest.approx(-0.5 / (2.0 * observer.stiffness), rel=1e-3)
+
+
+def test_a_machine_without_inertia_or_forces_is_not_drawn_through_a_noisy_record():
+    exact = record()
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(TIME))
+    noisy = replace(exact, output=replace(exact.output, value=exact.output.value + noise))
+    light = MODEL.with_values({"inertia.mass": 0.05, "viscous_damper.damping": 0.01})
+    fit = estimate(light, observed(prepare([noisy]), MODEL, 8.0))
+    for name, true in {"inertia.mass": 2.0, "viscous_damper.damping": 8.0}.items():
+        assert abs(fit.model.value(name) - true) < 4.0 * fit.std[name] < 0.2 * true
 
 
 def test_an_error_is_a_share_of_the_driving_force():
@@ -57,4 +69,4 @@ def test_where_the_velocity_was_measured_a_damper_alone_draws_the_machine():
     observer = series[0].observer
     assert observer is not None and observer.stiffness == 0.0
     fit = estimate(MODEL, series, names=())
-    assert np.median(fit.residuals[0]) == pytest.approx(-0.5 / (observer.damping + 8.0), rel=1e-2)
+    assert np.median(fit.residuals[0]) == pytest.approx(-0.5 / (2.0 * observer.damping + 8.0), rel=1e-2)

@@ -12,7 +12,8 @@ from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate, start_only
 from rhythmid.identify.series import block_length, hold_out_tail, prepare
-from rhythmid.model import Prior
+from rhythmid.model import Model, Prior
+from rhythmid.record.record import Channel, Record
 
 TRUTH = {
     "input_delay.delay": 0.0203,
@@ -176,3 +177,19 @@ def test_the_start_of_a_record_without_command_is_found_beside_a_lag_that_stays_
         fit = start_only(machine, prepare([silent.cut(2.13, 6.0)]), noise, 5e-4)
         assert np.sqrt(fit.chi2 / fit.samples) < 1.05
         assert abs(fit.starts[0][2]) < 1e-9
+
+
+def test_a_mass_that_the_records_do_not_determine_is_not_put_to_its_bound_of_zero():
+    time = np.arange(0.0, 6.0, 4e-3)
+    rng = np.random.default_rng(7)
+    decay = 0.05 * np.exp(-0.2 * time) * np.cos(12.0 * time) + 2e-4 * rng.standard_normal(len(time))
+    model = Model.from_text("""
+inertia: {mass: {value: 1.3, unit: kg}}
+force:
+  - linear_spring: {stiffness: {value: 180.0, unit: N/m}, rest_length: {value: 0.0, unit: m, fixed: true}}
+  - viscous_damper: {damping: {value: 0.4, unit: N*s/m}}
+""")
+    fit = estimate(model, prepare([Record("decay", Channel(time, decay, "m"))]))
+    mass, stiffness = fit.model.value("inertia.mass"), fit.model.value("linear_spring.stiffness")
+    assert stiffness / mass == pytest.approx(12.0**2, rel=0.01)
+    assert fit.std["inertia.mass"] > mass  # only ratios are determined

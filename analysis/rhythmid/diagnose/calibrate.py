@@ -22,6 +22,8 @@ from rhythmid.signal import band_limited, first_order_hold
 
 INPUT_DELAY = "input_delay.delay"
 EVEN = 1e-3  # of the period; spread of the times between samples that still counts as even
+FOLLOWS = 0.3  # error, as a share of the motion, below which a model follows the machine
+GAIN = 0.7  # share to which a delay far from its start has to lower the error, or it but stands in for what is missing
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ def calibrate(
     if best is None:
         assert failure is not None
         raise failure
-    if best.nrmse() > 0.3:
+    if best.nrmse() > FOLLOWS:
         best = _scan_delays(best, series, pool)
     return _hold(best, series, pool, tell)
 
@@ -125,7 +127,10 @@ def _scan_delays(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | 
                 continue
             if trial.chi2 < best.chi2:
                 best = trial
-    return best if best is fit else estimate(best.model, series, pool=pool)
+    if best is fit:
+        return fit
+    found = estimate(best.model, series, pool=pool)
+    return found if found.nrmse() < GAIN * fit.nrmse() else fit
 
 
 def reconstructed(series: Series) -> Series:
@@ -147,7 +152,7 @@ def _hold(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None, t
     """
     kept = Calibration(fit, tuple(series), (), None)
     held = [one for one in series if one.command is not None and one.command.c.shape[0] == 1]
-    if INPUT_DELAY not in fit.names or not held:
+    if INPUT_DELAY not in fit.names or not held or fit.nrmse() > FOLLOWS:
         return kept
     delay, std, period = fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY], held[0].period
     if not math.isfinite(std) or delay > -max(4.0 * std, 0.05 * period):

@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from rhythmid.diagnose.calibrate import Calibration, calibrate, reconstructed
+from rhythmid.diagnose.calibrate import FOLLOWS, Calibration, calibrate, reconstructed
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.force_scoring import observed
@@ -23,7 +23,6 @@ from rhythmid.identify.series import Series, bandwidth, hold_out_tail
 from rhythmid.model import Model
 from rhythmid.progress import Tell
 
-FOLLOWS = 0.3  # error below which it follows the machine well enough for a free run
 GAIN = 0.9  # share to which a step to shorter windows has to lower the error
 PATIENCE = 2  # steps without such a gain before no more are tried
 BETTER = 0.6  # share to which all steps together have to: an error that adds up, not one made at once by noise or effect

@@ -235,6 +235,8 @@ def guesses(catalogue: Catalogue, model: Model, sizes: Scales) -> list[tuple[Ele
             continue
         if element.controlled and not controlled(model):
             continue
+        if element.displaced_base and not sizes.displaced_base:
+            continue
         if any(model.borrowed(source, default) is None for source, default in element.borrows.values()):
             continue
         found += [(element, dict(start)) for start in element.starts(sizes)]

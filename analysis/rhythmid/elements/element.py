@@ -74,6 +74,7 @@ class Scales:
     reference: float = 0.0  # standard deviation of a controller's reference, 0 where there is none
     peak_effort: float = 0.0  # largest actuator force, 0 where unknown
     rest: float | None = None  # position at which the model's linear spring is at rest, where that is known
+    displaced_base: bool = False  # whether the input displaces the base that the leg stands on
 
     @property
     def force(self) -> float:
@@ -112,7 +113,7 @@ class Element:
     other parameters. `starts` proposes first guesses of physical size from the record's scales, several where the shape
     matters. `special_case_of` names richer elements that contain this one, exactly or in a limit of their parameters;
     `confusable` maps another element's name to what tells the two apart. A `rotational` effect needs an angle for x, a
-    `controlled` one a controller in the model.
+    `controlled` one a controller in the model, one of a `displaced_base` an input that moves the base.
     `ranges` bounds parameters by the record's scales to where the effect still is what its name says: a ripple repeats
     within the travel, or it is but another spring. `hops` says how far apart the minima lie at most that a fit has in a parameter.
     """
@@ -146,6 +147,7 @@ class Element:
     )  # beside which element it is the same as which other
     rotational: bool = False  # makes sense only where the position is an angle
     controlled: bool = False  # makes sense only where a controller in the command path closes the loop
+    displaced_base: bool = False  # says what another does not only where the input displaces the base
     starts: Callable[[Scales], list[dict[str, float]]] | None = None
     ranges: Callable[[Scales], Mapping[str, tuple[float, float]]] | None = None
     hops: Callable[[Scales], Mapping[str, float]] | None = None

@@ -74,6 +74,8 @@ def describe(element: Element) -> str:
         facts.append("- For rotational machines only.")
     if element.controlled:
         facts.append("- For machines whose controller is in the model.")
+    if element.displaced_base:
+        facts.append("- For machines on a base that the input displaces.")
     facts.append("- Candidate." if element.candidate else "- Not a candidate.")
     if element.special_case_of:
         facts.append(f"- Special case of {_names(element.special_case_of)}.")

@@ -2,9 +2,9 @@
 
 Where a machine integrates, or sticks and slips, a free run adds up every small disturbance until it means nothing. Tied to
 the record it cannot get far: what it stays behind by is the force that the model lacks, seen through
-1 / (m s² + d s + k). This is inverse dynamics without a derivative of the measurement: force and simulation are compared
+1 / m (s² + d s + k). This is inverse dynamics without a derivative of the measurement: force and simulation are compared
 below the observer's bandwidth, and all else goes on as in a free run. A machine of which the velocity was measured is
-drawn by the damper alone; what it lags behind is the force over m s + d.
+drawn by the damper alone; what it lags behind is the force over m (s + d).
 """
 
 import math
@@ -32,10 +32,10 @@ def observed(series: Sequence[Series], model: Model, frequency: float) -> list[S
     for one in series:
         motion = _motion(one.time, one.value, max(1, one.block // FINER))
         if one.measured == "velocity":
-            stiffness, damping = 0.0, model.mass.value * omega
+            stiffness, damping = 0.0, omega
             holds, pull = damping, PPoly(damping * motion.c, motion.x, extrapolate=True)
         else:
-            stiffness, damping = model.mass.value * omega**2, 2.0 * model.mass.value * omega
+            stiffness, damping = omega**2, 2.0 * omega
             rate = motion.derivative()
             cubic = np.vstack([np.zeros((1, rate.c.shape[1])), rate.c])
             holds, pull = stiffness, PPoly(stiffness * motion.c + damping * cubic, motion.x, extrapolate=True)
@@ -43,7 +43,7 @@ def observed(series: Sequence[Series], model: Model, frequency: float) -> list[S
             (part(one.centres) for part in (one.command, one.forcing) if part is not None),
             np.zeros(one.blocks),
         )
-        size = float(np.std(effort)) / holds
+        size = float(np.std(effort)) / (model.mass.value * holds)
         found.append(replace(one, observer=Observer(stiffness, damping, pull, size)))
     return found
 

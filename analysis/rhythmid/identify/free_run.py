@@ -72,7 +72,8 @@ class FreeRun:
             knots[1:-1] += late if varies else late[0]
         out = np.empty((len(times), self.states + 2))
         if one.observer is not None:
-            disturbance = one.observer.disturbance(float(np.mean(one.centres - times)), disturbance)
+            behind = float(np.mean(one.centres - times))
+            disturbance = one.observer.disturbance(model.mass.value, behind, disturbance)
         force = NO_SIGNAL if disturbance is None else pieces(disturbance)
         done = compiled.run(
             times, knots, coefficients, *given.forcing, *force,

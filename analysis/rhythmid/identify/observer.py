@@ -1,5 +1,7 @@
 """An observer: the recorded motion draws the simulated machine along, through a spring and a damper.
 
+They are in proportion to the model's mass, so that the bandwidth stays as it is while that is estimated. Were they not, a
+model without inertia and without forces would be drawn through every record, noise and all.
 D. G. Luenberger, IEEE Trans. Autom. Control 16 (1971) 596. `force_scoring` says what it is for.
 """
 
@@ -17,16 +19,20 @@ from rhythmid.signal import shifted
 Array = NDArray[np.float64]
 
 
-def _kernel(x, v, t, f, stiffness, damping):
-    return -stiffness * x - damping * v
+def _kernel(x, v, t, f, stiffness, damping, mass):
+    return -mass * (stiffness * x + damping * v)
 
 
 OBSERVER = Element(
     name="observer",
     slot="force",
     title="Observer",
-    equation="F = −k x − d v, beside the recorded motion's k y + d ẏ",
-    parameters=(Parameter("stiffness", "N/m", "stiffness k"), Parameter("damping", "N*s/m", "damping d")),
+    equation="F = −m (k x + d v), beside the recorded motion's m (k y + d ẏ)",
+    parameters=(
+        Parameter("stiffness", "1/s^2", "stiffness k for each unit of mass"),
+        Parameter("damping", "1/s", "damping d for each unit of mass"),
+    ),
+    borrows={"mass": ("inertia.mass", None)},
     kernel=_kernel,
     acts="body",
     candidate=False,
@@ -36,17 +42,19 @@ OBSERVER = Element(
 
 @dataclass(frozen=True)
 class Observer:
-    """A spring [N/m] and a damper [N s/m] from the simulated machine to the recorded motion, whose `pull` [N] is a function
-    of the measurement's stamps [s]. By `size`, in the output's unit, the driving force (rms) would hold the simulation off."""
+    """A spring [1/s²] and a damper [1/s], both for each unit of mass, from the simulated machine to the recorded motion, whose
+    `pull` [m/s²] is a function of the measurement's stamps [s]. By `size`, in the output's unit, the driving force (rms) would
+    hold the simulation off."""
 
     stiffness: float
     damping: float
     pull: PPoly
     size: float
 
-    def disturbance(self, late: float, further: PPoly | None = None) -> PPoly:
-        """Force on the mass [N] over physical time, the measurement being `late` [s] behind it, and a further one."""
+    def disturbance(self, mass: float, late: float, further: PPoly | None = None) -> PPoly:
+        """Force [N] on a mass [kg] over physical time, the measurement being `late` [s] behind it, and a further one."""
         moved = shifted(self.pull, -late)
+        moved = PPoly(mass * moved.c, moved.x, extrapolate=True)
         return moved if further is None else _sum(moved, further)
 
 

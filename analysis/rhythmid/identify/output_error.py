@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.errors import InputError
 from rhythmid.identify.covariance import covariance_of, on_the_edge
 from rhythmid.identify.descent import WHITE, Descent, descend, first_guess
 from rhythmid.identify.faint_directions import faint, with_faint_directions
@@ -104,9 +105,21 @@ def minimise(
     )
     edge = on_the_edge(fit.model, names, fit.covariance)
     if edge:
-        end = descend(
-            fit.model.with_values(edge), run, names, noise, fit.starts, max(iterations, 3), pool, tolerance
-        )
+        try:
+            end = descend(
+                fit.model.with_values(edge),
+                run,
+                names,
+                noise,
+                fit.starts,
+                max(iterations, 3),
+                pool,
+                tolerance,
+            )
+        except (
+            InputError
+        ):  # such as without inertia: what is far from its bound, but undetermined with others
+            return fit
         if end.chi2 < fit.chi2 + FALSE_EDGE:
             return _fit(end, run, names, noise, pool)
     return fit

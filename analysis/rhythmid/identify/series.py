@@ -307,6 +307,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         reference=reference,
         peak_effort=peak,
         rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
+        displaced_base=any(one.kind == "base_displacement" for one in series),
     )
 
 

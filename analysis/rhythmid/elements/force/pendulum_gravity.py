@@ -12,6 +12,14 @@ def kernel(x, v, t, f, moment, reference):
     return -moment * math.sin(x - reference)
 
 
+def starts(scales):
+    """Hanging at the middle of the motion; of one that goes round, nowhere in particular."""
+    moment = max(0.1 * scales.stiffness, 0.1 * scales.effort)
+    around = scales.high - scales.low > 2.0 * math.pi
+    references = [0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi] if around else [scales.centre]
+    return [{"moment": moment, "reference": reference} for reference in references]
+
+
 ELEMENT = Element(
     name="pendulum_gravity",
     slot="force",
@@ -25,7 +33,7 @@ ELEMENT = Element(
     acts="body",
     rotational=True,
     size="moment",
-    starts=lambda s: [{"moment": 0.1 * s.stiffness, "reference": s.centre}],
+    starts=starts,
     also_known_as=("gravity torque", "link weight"),
     family="stiffness",
     confusable={

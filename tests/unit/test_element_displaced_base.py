@@ -1,0 +1,71 @@
+"""What acts between the mass and a base that moves, against closed forms in the moving frame."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rhythmid.diagnose.screen import guesses
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.series import Series, prepare, scales
+from rhythmid.model import Model
+from rhythmid.record.record import Channel, Record
+
+CATALOGUE = load_catalogue()
+TIME = np.arange(0.0, 1.0, 1e-3)
+BASE_SPEED = 0.4
+ONLY_THERE = {"quadratic_damping", "travel_stop"}
+
+
+def mass(element: str, values: dict[str, float]) -> Model:
+    text = "inertia: {mass: {value: 2.0, unit: kg}}\nforce: [{viscous_damper: {damping: {value: 0.0, unit: N*s/m}}}]"
+    return Model.from_text(text).with_element(CATALOGUE[element], values)
+
+
+def series(kind: str = "base_displacement") -> list[Series]:
+    base = Channel(TIME, BASE_SPEED * TIME, "m")
+    moving = Channel(TIME, np.sin(20.0 * TIME), "m")
+    return prepare([Record("rig", moving, base, hold="linear", input_kind=kind)], block=1)
+
+
+def position(model: Model, start: tuple[float, float]) -> np.ndarray:
+    run = prepare_run(model, series(), 1e-4)
+    outputs = run.outputs(model, [np.array(start)])
+    assert outputs is not None
+    return outputs[0]
+
+
+def test_quadratic_damping_lets_a_mass_coast_as_one_over_time_in_the_frame_of_the_base():
+    c, m, fast = 0.8, 2.0, 3.0
+    found = position(mass("quadratic_damping", {"coefficient": c}), (0.0, BASE_SPEED + fast))
+    expected = BASE_SPEED * TIME + m / c * np.log1p(c * fast / m * TIME)
+    assert found == pytest.approx(expected, abs=1e-6)
+
+
+def test_drag_of_the_air_does_not_know_of_the_base():
+    c, m, fast = 0.8, 2.0, 3.0
+    found = position(mass("quadratic_drag", {"coefficient": c}), (0.0, fast))
+    assert found == pytest.approx(m / c * np.log1p(c * fast / m * TIME), abs=1e-6)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_travel_stop_throws_the_mass_back_in_the_frame_of_the_base(side):
+    stiffness, gap, fast, m = 5000.0, 0.1, 0.5, 2.0
+    stop = {"stiffness": stiffness, "damping_ratio": 0.0, "position": side * gap, "side": side}
+    found = position(mass("travel_stop", stop), (0.0, BASE_SPEED + side * fast)) - BASE_SPEED * TIME
+    contact = math.pi * math.sqrt(m / stiffness)
+    deepest = gap + fast * math.sqrt(m / stiffness)
+    assert (side * found).max() == pytest.approx(deepest, rel=1e-4)
+    gone = TIME > gap / fast + contact
+    back = side * (gap - fast * (TIME - gap / fast - contact))
+    assert found[gone] == pytest.approx(back[gone], abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("kind", "there"), [("base_displacement", True), ("base_acceleration", False), ("force", False)]
+)
+def test_they_are_candidates_only_where_the_input_displaces_the_base(kind, there):
+    model, given = mass("linear_spring", {"stiffness": 800.0, "rest_length": 0.0}), series(kind)
+    names = {element.name for element, _ in guesses(CATALOGUE, model, scales(given, model))}
+    assert (names >= ONLY_THERE) is there and bool(names & ONLY_THERE) is there
