@@ -16,7 +16,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
 from rhythmid.identify.series import Series, dominant_frequency
-from rhythmid.model import Model
+from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.signal import band_limited, first_order_hold
 
@@ -109,9 +109,24 @@ def calibrate(
     if best is None:
         assert failure is not None
         raise failure
+    if INERTIA in best.names and best.std[INERTIA] > best.model.value(INERTIA):
+        found = calibrate(_with_mass_as_given(model), series, catalogue, pool, tell)
+        return replace(found, notes=(_no_mass(model), *found.notes))
     if best.nrmse() > FOLLOWS:
         best = _scan_delays(best, series, pool)
     return _hold(best, series, pool, tell)
+
+
+def _with_mass_as_given(model: Model) -> Model:
+    return model.with_parameters({INERTIA: replace(model.mass, fixed=True)})
+
+
+def _no_mass(model: Model) -> str:
+    mass = model.mass
+    return (
+        f"The records do not determine the mass, for no force in them is known: it is kept at {mass.value:g} {mass.unit}, and "
+        "stiffnesses, dampings and forces are in proportion to it."
+    )
 
 
 def _scan_delays(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Fit:

@@ -4,7 +4,7 @@ After a time T an error dP of the period P has moved the ticks by T dP / P; once
 forgotten their phase. What a hold does to the size of the response it still knows, and that tells the rate 1/P roughly: a
 coarse scan leaves a band of rates. Slow rates join it in any case, for their images of the command lie where the machine
 answers, and ticks of the wrong phase hide the right rate there. The rates are tried on a grid of 1 / (4 T), over a first
-stretch where the whole record asks for too many, and the best of them followed while the grid gets finer. The mean delay, of which half a period is the
+stretch where the whole record asks for too many, and the best of them, different ones, followed while the grid gets finer. The mean delay, of which half a period is the
 hold's, is kept at first, and shifted a little with the rate in the end: it decides which command a tick finds. What small
 changes of the other parameters and of the initial states do is projected off each residual.
 """
@@ -32,9 +32,13 @@ SLOW = 2.5  # times the slowest rate, up to which rates join the band
 MOST = 3000  # rates tried over the first stretch
 SERIES = 2  # looked at, those with the strongest command at first
 FASTEST = 100.0  # [Hz] beyond which a hold is little but a delay, and its ticks do not matter
-FOLLOWED = 12  # cases that are followed
+FOLLOWED, LEAST = 24, 6  # rates that are followed at first and in the end
+APART = 0.25  # over the length looked at, within which two rates are one
 FOUND = 2  # guesses returned
-FINEST = 0.008  # spacing of the rates at the end, over the inverse length of the record
+FINEST = 0.02  # reach of the grid at the end, over the inverse length of the record
+FINER = 0.4  # of a grid's reach is that of the next, two of its steps: as rough as the cost is over a step
+STEPS = np.linspace(-1.0, 1.0, 11)
+SHIFTS = np.linspace(-1.0, 1.0, 5)
 
 
 def scanned(
@@ -82,16 +86,27 @@ def scanned(
     spacing, late = 0.25 / length, 0.5 * chosen[0].period
     rates = np.concatenate([np.arange(slowest, slow, spacing), np.arange(low, high, spacing)])
     cases, _ = best_of(length, _unshifted(rates), cases[0])
+    followed, shifts = FOLLOWED, np.zeros(1)
     while spacing > FINEST / longest:
+        around = [(step * spacing, shift) for step in STEPS for shift in shifts]
+        cases = _apart(cases, followed, APART / length)
         length = min(2.0 * length, whole)
-        around = np.array(
-            [(r * spacing, d * late) for r in (-1.0, -0.5, 0.0, 0.5, 1.0) for d in (-1.0, 0.0, 1.0)]
-        )
-        tried = (cases[:FOLLOWED, None, :] + around).reshape(-1, 2)
+        tried = (cases[:, None, :] + np.array(around)).reshape(-1, 2)
         cases, _ = best_of(length, np.unique(np.round(tried, 9), axis=0), cases[0])
-        spacing, late = 0.5 * spacing, 0.5 * late
-    apart = cases[np.abs(cases[:, 0] - cases[0, 0]) > 0.25 / longest]
-    return [guess(*case) for case in (cases[0], *apart)[:FOUND]]
+        spacing, late, shifts = FINER * spacing, 0.5 * late, late * SHIFTS
+        followed = max(followed // 2, LEAST)
+    return [guess(*case) for case in _apart(cases, FOUND, APART / longest)]
+
+
+def _apart(cases: Array, count: int, least: float) -> Array:
+    """The first `count` of the cases (n, 2) whose rates differ by more than `least` from all before them."""
+    kept: list[Array] = []
+    for case in cases:
+        if len(kept) == count:
+            break
+        if all(abs(case[0] - other[0]) > least for other in kept):
+            kept.append(case)
+    return np.array(kept)
 
 
 def _unshifted(rates: Array) -> Array:

@@ -23,6 +23,7 @@ GROWTH = 1.5
 PERIODS = 2.0  # of the dominant motion in a window
 FEWEST = 4  # windows a record
 LEAST = 24  # blocks in a window
+MOST = 200  # windows of all records; every one costs a run
 
 
 def _around(signal: PPoly | None, begin: float, end: float) -> PPoly | None:
@@ -65,12 +66,13 @@ def periods_long(series: Series) -> float:
 
 
 def windows(series: Sequence[Series], length: float) -> list[Series]:
-    """All series cut into windows of about `length` [s]; a short rest at the end of one is left out."""
+    """All series cut into windows of about `length` [s]; a short rest at the end of one is left out, and of very many
+    windows only every second, third, … is kept."""
     found: list[Series] = []
     for one in series:
         parts = split(one, length)
         found += [part for part in parts if part.blocks >= parts[0].blocks // 2]
-    return found
+    return found[:: math.ceil(len(found) / MOST)]
 
 
 def forgets(model: Model, series: Sequence[Series]) -> bool:
