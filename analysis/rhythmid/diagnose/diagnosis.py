@@ -20,6 +20,7 @@ from rhythmid.diagnose.elsewhere import elsewhere
 from rhythmid.diagnose.exclusions import unscored
 from rhythmid.diagnose.fine_steps import finely_stepped
 from rhythmid.diagnose.gate import admitted
+from rhythmid.diagnose.given_value import wrong_value
 from rhythmid.diagnose.heldout import HeldOut, tail_error
 from rhythmid.diagnose.limiting_case import limiting_cases
 from rhythmid.diagnose.locate import Dependence, dependences
@@ -149,6 +150,8 @@ def diagnose(
         after = dependences(trajectories(found.fit), pool) if found.best.added else before
         judge = HeldOut(found, unseen if holdout else None)
         diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful, imitating)
+        if diagnosis.verdict == "unknown_physics":
+            notes[wrong_value(found)] = None
         said = (*diagnosis.notes, *(note for note in notes if note is not None))
         excluded = (*diagnosis.excluded, *unscored(found, known, pool))
         diagnosis = replace(diagnosis, scoring=scoring.words, notes=said, excluded=excluded)

@@ -72,7 +72,7 @@ def windows(series: Sequence[Series], length: float) -> list[Series]:
     for one in series:
         parts = split(one, length)
         found += [part for part in parts if part.blocks >= parts[0].blocks // 2]
-    return found[:: math.ceil(len(found) / MOST)]
+    return found[:: max(1, math.ceil(len(found) / MOST))]
 
 
 def forgets(model: Model, series: Sequence[Series]) -> bool:
