@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.calibrate import calibrate
+from rhythmid.diagnose.calibrate import NO_ORIGIN, calibrate
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
@@ -32,3 +32,13 @@ def test_a_mass_of_which_no_force_tells_is_kept_as_it_was_given_and_it_is_said(f
         1.3 * (12.0**2 + 0.2**2), rel=0.01
     )
     assert len(found.notes) == said and all("1.3 kg" in note for note in found.notes)
+
+
+def test_where_no_position_is_measured_the_rest_length_is_kept_as_it_was_given_and_it_is_said():
+    time = np.arange(0.0, 6.0, 4e-3)
+    swing = -0.05 * 12.0**2 * np.exp(-0.2 * time) * np.cos(12.0 * time)
+    noisy = swing + 0.02 * np.random.default_rng(8).standard_normal(len(time))
+    record = Record("decay", Channel(time, noisy, "m/s^2"), output_kind="acceleration")
+    found = calibrate(Model.from_text(NOMINAL.format(fixed=", fixed: true")), prepare([record]), CATALOGUE)
+    assert "linear_spring.rest_length" not in found.fit.names and found.notes == (NO_ORIGIN,)
+    assert found.fit.model.value("linear_spring.rest_length") == 0.0

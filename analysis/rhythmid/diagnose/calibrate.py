@@ -15,12 +15,13 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
-from rhythmid.identify.series import Series, dominant_frequency
+from rhythmid.identify.series import REST_LENGTH, Series, dominant_frequency
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.signal import band_limited, first_order_hold
 
 INPUT_DELAY = "input_delay.delay"
+NO_ORIGIN = "No position was measured, so that its origin is arbitrary: the spring's rest length is kept as it was given."
 EVEN = 1e-3  # of the period; spread of the times between samples that still counts as even
 FOLLOWS = 0.3  # error, as a share of the motion, below which a model follows the machine
 GAIN = 0.7  # share to which a delay far from its start has to lower the error, or it but stands in for what is missing
@@ -90,6 +91,9 @@ def calibrate(
             "free those that are not known exactly (drop 'fixed: true')"
         )
     model = with_delays(model, series, catalogue)
+    notes: tuple[str, ...] = ()
+    if REST_LENGTH in model.free and any(one.measured != "position" for one in series):
+        model, notes = _as_given(model, REST_LENGTH), (NO_ORIGIN,)
     tell("refitting the nominal model")
     best: Fit | None = None
     failure: InputError | None = None
@@ -110,15 +114,17 @@ def calibrate(
         assert failure is not None
         raise failure
     if INERTIA in best.names and best.std[INERTIA] > best.model.value(INERTIA):
-        found = calibrate(_with_mass_as_given(model), series, catalogue, pool, tell)
-        return replace(found, notes=(_no_mass(model), *found.notes))
+        found = calibrate(_as_given(model, INERTIA), series, catalogue, pool, tell)
+        return replace(found, notes=(*notes, _no_mass(model), *found.notes))
     if best.nrmse() > FOLLOWS:
         best = _scan_delays(best, series, pool)
-    return _hold(best, series, pool, tell)
+    found = _hold(best, series, pool, tell)
+    return replace(found, notes=(*notes, *found.notes))
 
 
-def _with_mass_as_given(model: Model) -> Model:
-    return model.with_parameters({INERTIA: replace(model.mass, fixed=True)})
+def _as_given(model: Model, name: str) -> Model:
+    """The model with a parameter held at its value."""
+    return model.with_parameters({name: replace(model.parameters[name], fixed=True)})
 
 
 def _no_mass(model: Model) -> str:
