@@ -1,4 +1,4 @@
-"""A rig whose damper and stop ride on the base that shakes it, by equations of its own: both are named for what they are."""
+"""A rig whose damper rides on the base that shakes it, by equations of its own: it is not taken for the drag of the air."""
 
 from collections.abc import Callable
 
@@ -19,10 +19,6 @@ force:
 """
 LAWS: dict[str, tuple[Callable[[float, float], float], dict[str, float]]] = {
     "quadratic_damping": (lambda e, de: -12.0 * de * abs(de), {"coefficient": 12.0}),
-    "travel_stop": (
-        lambda e, de: -max(0.0, 6000.0 * (e - 4e-3) + 25.0 * de) if e > 4e-3 else 0.0,
-        {"stiffness": 6000.0, "position": 4e-3},
-    ),
 }
 
 

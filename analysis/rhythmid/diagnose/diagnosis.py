@@ -134,7 +134,7 @@ def diagnose(
                 *(name for name, element in known.elements.items() if element.slot == "sensor")
             )
             notes[TIED_SENSOR] = None
-        found = search(seen, calibration.fit, known, pool, tell)
+        found = search(seen, calibration.fit, model, known, pool, tell)
         tell("judging on held-out records")
         found, harmful = admitted(found, unseen if holdout else None, pool)
         fitted = scales(seen, found.fit.model)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.diagnose.calibrate import FOLLOWS
 from rhythmid.diagnose.defend import defend
 from rhythmid.diagnose.order import in_best_order
 from rhythmid.diagnose.refit import (
@@ -38,10 +39,11 @@ from rhythmid.diagnose.screen import (
     under,
 )
 from rhythmid.elements.catalogue import Catalogue
+from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.free_run import accurate
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
-from rhythmid.identify.output_error import Fit, noise_of
+from rhythmid.identify.output_error import Fit, minimise, noise_of
 from rhythmid.identify.series import Series, scales
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
@@ -159,14 +161,43 @@ def _proposals(
     return made, enough
 
 
+def _from_given(
+    nominal: Fit, given: Model, catalogue: Catalogue, chi2: float, pool: ThreadPoolExecutor | None
+) -> list[Proposal]:
+    """Structures worth a refit from the values that the nominal model was given with.
+
+    Where it loses the machine all the same, its refit has bent them to stand in for what is missing: the spring of a hopper
+    that leaves the ground comes out far too soft and too long.
+    """
+    values = {name: given.value(name) for name in nominal.names if name in given.parameters}
+    model = nominal.model.with_values(values)
+    try:
+        fit = minimise(model, nominal.run, nominal.names, nominal.noise, nominal.starts, 0, pool)
+        known = trajectories(fit)
+    except InputError:
+        return []
+    candidates = guesses(catalogue, model, scales(fit.run.series, model))
+    scores = score(fit, changes_of(known, candidates, pool))
+    return _proposals(model, (), scores, REFITTED, chi2)[0]
+
+
+def _better_of(trials: Sequence[Trial]) -> list[Trial]:
+    """The better one of each two trials of the same structure, best first."""
+    kept: dict[tuple[str, ...], Trial] = {}
+    for trial in sorted(trials, key=lambda t: t.bic()):
+        kept.setdefault(trial.added, trial)
+    return list(kept.values())
+
+
 def search(
     series: Sequence[Series],
     nominal: Fit,
+    given: Model,
     catalogue: Catalogue,
     pool: ThreadPoolExecutor | None,
     tell: Tell = lambda _: None,
 ) -> Search:
-    """Search the catalogue for what the nominal model lacks; `nominal` is its fit to the same series."""
+    """Search the catalogue for what the nominal model lacks; `nominal` is the fit to the same series of the one `given`."""
     step = nominal.run.max_step
     floor = 1e-9 * max(float(np.std(one.averaged)) for one in series)
     tell("scoring the catalogue")
@@ -198,6 +229,12 @@ def search(
         found, failed = run_trials(
             proposals, series, here.starts, current.run.compiled.layout.states, here.noise, step, enough
         )
+        if not best.added and nominal.nrmse() > FOLLOWS:
+            proposals = _from_given(nominal, given, catalogue, here.chi2, pool)
+            others, failed_too = run_trials(
+                proposals, series, here.starts, current.run.compiled.layout.states, here.noise, step
+            )
+            found, failed = _better_of([*found, *others]), failed + failed_too
         excluded += failed
         found = [t for t in found if t.chi2 < here.chi2]  # a richer model that does worse got lost
         if not found:
