@@ -34,6 +34,8 @@ ELEMENT = Element(
     starts=lambda s: [
         {"stiffness": 0.02 * s.stiffness / w, "yield_displacement": w * s.position} for w in (0.1, 0.4, 1.5)
     ],
+    # what does not yield within the travel is a spring
+    ranges=lambda s: {"yield_displacement": (0.0, s.high - s.low)},
     also_known_as=(
         "Jenkins element",
         "Iwan element",
