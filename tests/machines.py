@@ -2,9 +2,12 @@
 
 from pathlib import Path
 
+from rhythmid.diagnose.refit import Trial
+from rhythmid.diagnose.search import Search
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.excitation.sequence import build
 from rhythmid.experiment import Delay, Experiment, Forcing, Noise, TimeMode, perform
+from rhythmid.identify.output_error import Fit
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 
@@ -61,3 +64,11 @@ def records(machine: Model, protocol=SHORT, seed: int = 0, **options) -> list[Re
         record(machine, spec, forcing, seed=10 * seed + i, **options)
         for i, (spec, forcing) in enumerate(protocol)
     ]
+
+
+def search_of(fit: Fit, label: str) -> Search:
+    """A search that ended in this fit, whose model has one more element."""
+    trial = Trial(
+        (label,), fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), True, fit.noise, fit.differences
+    )  # fmt: skip
+    return Search(fit, trial, fit, fit.noise, (trial,), (), ())

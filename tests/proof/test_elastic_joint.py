@@ -4,7 +4,7 @@ A rigid nominal model loses it altogether; tied to the record, what it lacks is 
 """
 
 import numpy as np
-from twins import integrate, noisy, tones
+from synthetic import integrate, noisy, tones
 
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.model import Model

@@ -5,7 +5,7 @@ Refitted, the nominal model comes out far too soft; what is missing is found fro
 
 import numpy as np
 import pytest
-from twins import integrate, noisy, tones
+from synthetic import integrate, noisy, tones
 
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.model import Model

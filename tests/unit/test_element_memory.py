@@ -72,6 +72,14 @@ def test_a_vanishing_yield_displacement_becomes_coulomb_friction(rig):
     assert run["elastoplastic_hysteresis"] == pytest.approx(run["coulomb_friction"], abs=1e-3)
 
 
+def test_a_hysteresis_yields_within_the_travel(catalogue, scales):
+    element = catalogue["elastoplastic_hysteresis"].within(scales)
+    travel = scales.high - scales.low
+    assert element.parameter("yield_displacement").bounds == (0.0, travel)
+    assert element.starts(scales)
+    assert all(start["yield_displacement"] <= travel for start in element.starts(scales))
+
+
 def test_relaxation_has_the_complex_stiffness_of_a_maxwell_branch(rig):
     tau, frequency, amplitude = 0.08, 1.5, 0.01
     values = {"stiffness": 30.0, "time_constant": tau}

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from machines import CATALOGUE, SHORT, hopper, records
+from machines import CATALOGUE, SHORT, hopper, records, search_of
 from rhythmid.diagnose import elsewhere as module
 from rhythmid.diagnose.elsewhere import elsewhere
 from rhythmid.diagnose.refit import Trial
@@ -24,10 +24,7 @@ def search_for(true: str, named: str) -> Search:
     series = prepare(records(machine, SHORT, delays=(0.0203, 0.0151)), 4)
     begin = hopper().with_element(CATALOGUE[named], LAG)
     fit = estimate(begin, series, noise=NOISE, max_step=1e-3)
-    trial = Trial(
-        (named,), fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), True, fit.noise, fit.differences
-    )  # fmt: skip
-    return Search(fit, trial, fit, fit.noise, (trial,), (), ())
+    return search_of(fit, named)
 
 
 @pytest.mark.parametrize(

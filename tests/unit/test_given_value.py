@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from machines import CATALOGUE, SHORT, hopper, records
+from machines import CATALOGUE, SHORT, hopper, records, search_of
 from rhythmid.diagnose.given_value import wrong_value
-from rhythmid.diagnose.refit import Trial
 from rhythmid.diagnose.search import Search
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate
@@ -24,11 +23,7 @@ def search_with(truth: Model, given_mass: float) -> Search:
     begin = hopper().with_parameters({INERTIA: mass})
     begin = begin.with_element(CATALOGUE["actuator_fade"], {"rate": 1e-3})
     fit = estimate(begin, series, noise=NOISE, max_step=1e-3)
-    trial = Trial(
-        ("actuator_fade",), fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), True, fit.noise,
-        fit.differences,
-    )  # fmt: skip
-    return Search(fit, trial, fit, fit.noise, (trial,), (), ())
+    return search_of(fit, "actuator_fade")
 
 
 def test_a_mass_that_is_held_at_a_wrong_value_is_told_with_the_right_one():

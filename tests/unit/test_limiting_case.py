@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from machines import CATALOGUE, SHORT, hopper, records
+from machines import CATALOGUE, SHORT, hopper, records, search_of
 from rhythmid.diagnose.limiting_case import limiting_cases
-from rhythmid.diagnose.refit import Trial
 from rhythmid.diagnose.search import Search
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate
@@ -19,10 +18,7 @@ def search_for(true: str, true_values: dict[str, float], named: str, values: dic
     series = prepare(records(machine, SHORT), 4)
     begin = hopper().with_element(CATALOGUE[named], values)
     fit = estimate(begin, series, noise=NOISE, max_step=1e-3)
-    trial = Trial(
-        (named,), fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), True, fit.noise, fit.differences
-    )  # fmt: skip
-    return Search(fit, trial, fit, fit.noise, (trial,), (), ())
+    return search_of(fit, named)
 
 
 def test_a_damper_that_depends_on_a_position_far_away_is_a_plain_one_and_no_name():

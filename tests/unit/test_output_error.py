@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from machines import CATALOGUE, SHORT, hopper, record, records
 from rhythmid.errors import InputError
-from rhythmid.identify.multiple_shooting import split
+from rhythmid.identify.multiple_shooting import split, windows
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate, start_only
 from rhythmid.identify.series import block_length, hold_out_tail, prepare
@@ -100,6 +100,17 @@ def test_windows_keep_all_samples_in_order():
     assert len(parts) == 10
     assert np.array_equal(joined, series.value[: len(joined)])
     assert len(series.value) - len(joined) < 4 * series.block
+
+
+def test_very_many_windows_are_thinned_evenly_and_few_are_all_kept():
+    series = prepare(records(hopper(), SHORT[:1]))[0]
+    assert len(windows([series], 1.0)) == 10
+    count = len(split(series, 0.02))
+    kept = windows([series] * 4, 0.02)
+    assert 4 * count > 400
+    assert 100 <= len(kept) <= 200
+    assert kept[-1].time[0] > 0.95 * series.time[-1]
+    assert windows([], 1.0) == []
 
 
 def test_block_averages_of_the_simulation_equal_averages_of_its_samples():

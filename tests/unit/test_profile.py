@@ -6,24 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from machines import CATALOGUE, SHORT, hopper, records
+from machines import CATALOGUE, SHORT, hopper, records, search_of
 from rhythmid.diagnose.profile import profiled
-from rhythmid.diagnose.refit import Trial
-from rhythmid.diagnose.search import Search
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 
 NOISE = NoiseModel(np.empty(0), 0.5e-4)  # of averages of four samples
-
-
-def search_of(fit: Fit, label: str) -> Search:
-    """A search that ended in this fit, whose model has one more element."""
-    trial = Trial(
-        (label,), fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), True, fit.noise, fit.differences
-    )  # fmt: skip
-    return Search(fit, trial, fit, fit.noise, (trial,), (), ())
 
 
 def fitted(truth: Model, begin: Model) -> Fit:

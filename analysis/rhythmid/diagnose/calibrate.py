@@ -130,8 +130,8 @@ def _as_given(model: Model, name: str) -> Model:
 def _no_mass(model: Model) -> str:
     mass = model.mass
     return (
-        f"The records do not determine the mass, for no force in them is known: it is kept at {mass.value:g} {mass.unit}, and "
-        "stiffnesses, dampings and forces are in proportion to it."
+        f"The records do not determine the mass: it is kept at {mass.value:g} {mass.unit} as given, and stiffnesses, dampings and "
+        "forces are in proportion to it."
     )
 
 

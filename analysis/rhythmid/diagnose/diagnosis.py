@@ -151,6 +151,7 @@ def diagnose(
         judge = HeldOut(found, unseen if holdout else None)
         diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful, imitating)
         if diagnosis.verdict == "unknown_physics":
+            tell("trying the values that the nominal model holds fixed")
             notes[wrong_value(found)] = None
         said = (*diagnosis.notes, *(note for note in notes if note is not None))
         excluded = (*diagnosis.excluded, *unscored(found, known, pool))

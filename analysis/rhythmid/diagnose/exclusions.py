@@ -1,25 +1,22 @@
 """Candidates that could not even be scored because the simulation blows up with them: said, not passed over."""
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import numpy as np
 
-from rhythmid.diagnose.screen import change_of_output, guesses, residual_line, trajectories
+from rhythmid.diagnose.screen import change_of_output, guesses, sizes_along, trajectories
 from rhythmid.diagnose.search import Search
 from rhythmid.elements.catalogue import Catalogue
-from rhythmid.identify.series import scales
 
 
 def unscored(found: Search, catalogue: Catalogue, pool: ThreadPoolExecutor | None = None) -> list[str]:
     """A sentence about each element of the catalogue that makes the simulation diverge whatever its size."""
     fit = found.nominal
     scored = {score.element.name for score in found.rounds[0].scores}
-    sizes = replace(scales(fit.run.series, fit.model), residual_frequency=residual_line(fit))
-    left = [case for case in guesses(catalogue, fit.model, sizes) if case[0].name not in scored]
+    known = trajectories(fit)
+    left = [case for case in guesses(catalogue, fit.model, sizes_along(known)) if case[0].name not in scored]
     if not left:
         return []
-    known = trajectories(fit)
 
     def diverges(case) -> bool:
         with np.errstate(all="ignore"):

@@ -24,6 +24,7 @@ from rhythmid.identify.drive import controlled
 from rhythmid.identify.free_run import FreeRun, prepare_run, with_series
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, minimise
+from rhythmid.identify.series import scales
 from rhythmid.model import Model
 from rhythmid.signal import first_order_hold
 from rhythmid.simulate import delay_of_command, delayed_command, physical_times
@@ -220,6 +221,20 @@ def parameter_basis(fit: Fit) -> Array:
         return np.zeros((len(fit.linearisation.residual), 0))
     left, singular, _ = np.linalg.svd(jacobian[:, norms > 0] / norms[norms > 0], full_matrices=False)
     return left[:, singular > 1e-9 * singular[0]]
+
+
+def sizes_along(known: Trajectories) -> Scales:
+    """Yardstick for first guesses at a fit: the records' scales, and what only the fitted run tells."""
+    fit = known.fit
+    sizes = replace(scales(fit.run.series, fit.model), residual_frequency=residual_line(fit))
+    if not controlled(fit.model):
+        return sizes
+    efforts = [path.effort for path in known.paths]  # the controller's force
+    return replace(
+        sizes,
+        effort=max(float(np.std(effort)) for effort in efforts) or sizes.effort,
+        peak_effort=max(float(np.abs(effort).max()) for effort in efforts),
+    )
 
 
 def guesses(catalogue: Catalogue, model: Model, sizes: Scales) -> list[tuple[Element, dict[str, float]]]:

@@ -33,18 +33,17 @@ from rhythmid.diagnose.screen import (
     changes_of,
     guesses,
     p_value,
-    residual_line,
     score,
+    sizes_along,
     trajectories,
     under,
 )
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
-from rhythmid.identify.drive import controlled
 from rhythmid.identify.free_run import accurate
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.output_error import Fit, minimise, noise_of
-from rhythmid.identify.series import Series, scales
+from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
 from rhythmid.progress import Tell
@@ -128,15 +127,7 @@ def _one_round(
     What is missing, such as a slow drift, would otherwise pass for the colour of the noise, in later rounds as in the first.
     """
     known = trajectories(fit)
-    sizes = replace(scales(fit.run.series, fit.model), residual_frequency=residual_line(fit))
-    if controlled(fit.model):  # the actuator's force is the controller's, which only the simulation knows
-        efforts = [path.effort for path in known.paths]
-        sizes = replace(
-            sizes,
-            effort=max(float(np.std(effort)) for effort in efforts) or sizes.effort,
-            peak_effort=max(float(np.abs(effort).max()) for effort in efforts),
-        )
-    changes = changes_of(known, guesses(catalogue, fit.model, sizes), pool)
+    changes = changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
     noise = noise_without(fit, changes)
     if fit.nrmse() > MISFIT and noise.variance > PREDICTED * noise.std**2:
         # motion that is missed, not noise: do not whiten it away
@@ -176,8 +167,7 @@ def _from_given(
         known = trajectories(fit)
     except InputError:
         return []
-    candidates = guesses(catalogue, model, scales(fit.run.series, model))
-    scores = score(fit, changes_of(known, candidates, pool))
+    scores = score(fit, changes_of(known, guesses(catalogue, model, sizes_along(known)), pool))
     return _proposals(model, (), scores, REFITTED, chi2)[0]
 
 

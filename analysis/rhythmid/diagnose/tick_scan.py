@@ -83,17 +83,17 @@ def scanned(
     low, high = near.min() / 1.05, near.max() * 1.05
     slow = min(SLOW * slowest, low)
     length = min(whole, 0.25 * MOST / (high - low + slow - slowest))
-    spacing, late = 0.25 / length, 0.5 * chosen[0].period
-    rates = np.concatenate([np.arange(slowest, slow, spacing), np.arange(low, high, spacing)])
+    reach, late = 0.25 / length, 0.5 * chosen[0].period
+    rates = np.concatenate([np.arange(slowest, slow, reach), np.arange(low, high, reach)])
     cases, _ = best_of(length, _unshifted(rates), cases[0])
     followed, shifts = FOLLOWED, np.zeros(1)
-    while spacing > FINEST / longest:
-        around = [(step * spacing, shift) for step in STEPS for shift in shifts]
+    while reach > FINEST / longest:
+        around = [(step * reach, shift) for step in STEPS for shift in shifts]
         cases = _apart(cases, followed, APART / length)
         length = min(2.0 * length, whole)
         tried = (cases[:, None, :] + np.array(around)).reshape(-1, 2)
         cases, _ = best_of(length, np.unique(np.round(tried, 9), axis=0), cases[0])
-        spacing, late, shifts = FINER * spacing, 0.5 * late, late * SHIFTS
+        reach, late, shifts = FINER * reach, 0.5 * late, late * SHIFTS
         followed = max(followed // 2, LEAST)
     return [guess(*case) for case in _apart(cases, FOUND, APART / longest)]
 

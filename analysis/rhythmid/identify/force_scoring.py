@@ -2,7 +2,7 @@
 
 Where a machine integrates, or sticks and slips, a free run adds up every small disturbance until it means nothing. Tied to
 the record it cannot get far: what it stays behind by is the force that the model lacks, seen through
-1 / m (s² + d s + k). This is inverse dynamics without a derivative of the measurement: force and simulation are compared
+1 / (m (s² + d s + k)). This is inverse dynamics without a derivative of the measurement: force and simulation are compared
 below the observer's bandwidth, and all else goes on as in a free run. A machine of which the velocity was measured is
 drawn by the damper alone; what it lags behind is the force over m (s + d).
 """

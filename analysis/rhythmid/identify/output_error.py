@@ -105,20 +105,11 @@ def minimise(
     )
     edge = on_the_edge(fit.model, names, fit.covariance)
     if edge:
+        put = fit.model.with_values(edge)
         try:
-            end = descend(
-                fit.model.with_values(edge),
-                run,
-                names,
-                noise,
-                fit.starts,
-                max(iterations, 3),
-                pool,
-                tolerance,
-            )
-        except (
-            InputError
-        ):  # such as without inertia: what is far from its bound, but undetermined with others
+            end = descend(put, run, names, noise, fit.starts, max(iterations, 3), pool, tolerance)
+        except InputError:
+            # such as without inertia: a value far from its bound, but undetermined together with others
             return fit
         if end.chi2 < fit.chi2 + FALSE_EDGE:
             return _fit(end, run, names, noise, pool)
