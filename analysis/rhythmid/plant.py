@@ -133,7 +133,7 @@ class Plant:
         if len(stamps) == 0:
             none = np.empty(0)
             return Samples(stamps, none, none, none, none)
-        grid = stamps * 1e-9
+        grid = (stamps * 1e-9).astype(np.float64)
         physical = np.maximum(physical_times(self._model, grid), self._time)
         first = self._next == 0
         times = physical if first else np.concatenate([[self._time], physical])
@@ -172,5 +172,5 @@ class Plant:
         for sample in self._samplers:
             position = sample(grid, position)
         return Samples(
-            stamps, position, rows[:, 1].copy(), rows[:, n + 1].copy(), forcing_at(self._model, physical)
+            stamps, position, rows[:, 1].copy(), rows[:, n + 1].copy(), forcing_at(self._model, grid)
         )

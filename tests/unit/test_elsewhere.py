@@ -15,14 +15,15 @@ from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare
 
 NOISE = NoiseModel(np.empty(0), 0.5e-4)  # of averages of four samples
-LAG = {"time_constant": 0.03}
+LAG, DRIFT = {"time_constant": 0.03}, {"rate": 2e-3}
 
 
-def search_for(true: str, named: str) -> Search:
+def search_for(true: str, named: str, values: dict[str, float] | None = None) -> Search:
     """A search that named one effect in records of a machine with another."""
-    machine = hopper().with_element(CATALOGUE[true], LAG)
+    values = LAG if values is None else values
+    machine = hopper().with_element(CATALOGUE[true], values)
     series = prepare(records(machine, SHORT, delays=(0.0203, 0.0151)), 4)
-    begin = hopper().with_element(CATALOGUE[named], LAG)
+    begin = hopper().with_element(CATALOGUE[named], values)
     fit = estimate(begin, series, noise=NOISE, max_step=1e-3)
     return search_of(fit, named)
 
@@ -39,6 +40,26 @@ def test_a_lag_that_the_catalogue_lacks_is_told_from_the_one_that_stands_in_for_
     others = {"command_lag", "actuator_lag", "sensor_lag"} - {named}
     said = elsewhere(search_for(true, named), CATALOGUE.without(*others))
     assert len(said) == 1 and named.replace("_", " ") in said[0] and place in said[0]
+
+
+@pytest.mark.parametrize(
+    ("true", "named", "place"),
+    [
+        ("delay_drift", "input_delay_drift", "in the measurement's time"),
+        ("input_delay_drift", "delay_drift", "in the command path"),
+    ],
+)
+def test_a_drift_of_a_delay_that_the_catalogue_lacks_is_told_from_the_one_that_stands_in_for_it(
+    true, named, place
+):
+    others = {"delay_drift", "input_delay_drift", "clock_skew"} - {named}
+    said = elsewhere(search_for(true, named, DRIFT), CATALOGUE.without(*others))
+    assert len(said) == 1 and named.replace("_", " ") in said[0] and place in said[0]
+
+
+def test_a_drift_that_is_where_it_is_named_stays_its_name():
+    found = search_for("input_delay_drift", "input_delay_drift", DRIFT)
+    assert elsewhere(found, CATALOGUE.without("delay_drift", "clock_skew")) == []
 
 
 def test_what_may_only_have_made_up_for_the_wrong_place_is_tried_without_as_well(monkeypatch):

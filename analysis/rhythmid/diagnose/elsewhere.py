@@ -1,7 +1,7 @@
 """Elsewhere: whether an effect on a signal does as well in another place of the path, where the catalogue has nothing like it.
 
-A lag is one law, whether the command, the actuator or the sensor has it, and what it does to a recording differs by little.
-Where the catalogue lacks it in one place, the one that it has in another stands in for it, down to the noise nearly.
+A lag is one law, whether the command, the actuator or the sensor has it, and so is a drift of a delay, the command's or the
+measurement's; what it does to a recording differs by little. Where the catalogue lacks it in one place, the one that it has in another stands in for it, down to the noise nearly.
 """
 
 from collections.abc import Iterator
@@ -18,13 +18,16 @@ PLACES: dict[Slot, str] = {
     "command": "in the command path",
     "actuator": "in the actuator",
     "sensor": "between the mass and the measurement",
+    "timing": "in the measurement's time",
 }
+SIGNALS: tuple[Slot, ...] = ("command", "actuator", "sensor")  # what a law with times acts on
+CLOCKS: tuple[Slot, ...] = ("command", "timing")  # what has a delay that may drift
 
 
 def elsewhere(found: Search, catalogue: Catalogue) -> list[str]:
     """A sentence about each chosen effect that explains the records as well in another place.
 
-    Only effects that have the same parameters in every place can be moved: those that know times, but no sizes.
+    Only effects that have the same parameters in every place can be moved: those that know times or rates of them, but no sizes.
     """
     series = found.fit.run.series
     tied = series[0].observer is not None  # which takes the measurement for the motion
@@ -52,21 +55,22 @@ def elsewhere(found: Search, catalogue: Catalogue) -> list[str]:
 
 
 def _free_places(element: Element, catalogue: Catalogue) -> Iterator[Slot]:
-    """Places where the element would make sense, and where the catalogue has none of its family."""
-    movable = (
-        element.slot in PLACES
-        and element.kernel is not None
-        and element.acts == Element.acts
-        and not element.memories
-        and bool(element.parameters)
-        and all(parameter.unit == "s" for parameter in element.parameters)
-    )
-    if not movable:
-        return
-    for place in PLACES:
+    """Other places where the element would make sense, and where the catalogue has none of its family."""
+    for place in _places(element):
         there = [one for one in catalogue.values() if one.slot == place and one.candidate]
         if place != element.slot and element.family not in {one.family for one in there if one.family}:
             yield place
+
+
+def _places(element: Element) -> tuple[Slot, ...]:
+    """Places where the law of the element would make sense, its own among them."""
+    units = {parameter.unit for parameter in element.parameters}
+    if element.delay is not None and units == {"1"}:
+        return CLOCKS
+    plain = element.kernel is not None and element.acts == Element.acts and not element.memories
+    if plain and element.slot in SIGNALS and units == {"s"}:
+        return SIGNALS
+    return ()
 
 
 def _moved(found: Search, term: Term, place: Slot) -> Iterator[Proposal]:
