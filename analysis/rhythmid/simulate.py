@@ -95,7 +95,9 @@ def start_states(
             for state, value in zip(
                 term.element.own, term.element.initial(position, velocity, signal, **arguments)
             ):
-                start[index[f"{term.label}.{state}"]] = value
+                place = index.get(f"{term.label}.{state}")
+                if place is not None:  # none in the command path of a machine that its base drives
+                    start[place] = value
     return start
 
 

@@ -5,9 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.screen import guesses
+from rhythmid.diagnose.screen import changes_of, guesses, trajectories
 from rhythmid.elements.catalogue import load_catalogue
-from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.free_run import prepare_run, start_of
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.output_error import start_only
 from rhythmid.identify.series import Series, prepare, scales
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
@@ -69,3 +71,20 @@ def test_they_are_candidates_only_where_the_input_displaces_the_base(kind, there
     model, given = mass("linear_spring", {"stiffness": 800.0, "rest_length": 0.0}), series(kind)
     names = {element.name for element, _ in guesses(CATALOGUE, model, scales(given, model))}
     assert (names >= ONLY_THERE) is there and bool(names & ONLY_THERE) is there
+
+
+@pytest.mark.parametrize("kind", ["base_displacement", "base_acceleration"])
+def test_what_lags_commands_neither_moves_a_machine_that_its_base_drives_nor_is_sought_in_it(kind):
+    given = series(kind)
+    plain = mass("linear_spring", {"stiffness": 800.0, "rest_length": 0.0})
+    lagging = plain.with_element(CATALOGUE["command_lag"], {"time_constant": 0.02})
+    both = [prepare_run(model, given, 1e-4) for model in (plain, lagging)]
+    starts = [start_of(model, run, 0, 0.1, 0.0) for model, run in zip((plain, lagging), both)]
+    first, second = (run.outputs(m, [s]) for m, run, s in zip((plain, lagging), both, starts))
+    assert first is not None and second is not None
+    assert np.ptp(first[0]) > 0.1 and np.array_equal(first[0], second[0])
+    known = trajectories(start_only(plain, given, NoiseModel(np.empty(0), 1.0), 1e-4))
+    named = [(CATALOGUE[name], values) for name, values in (
+        ("command_lag", {"time_constant": 0.02}), ("cubic_stiffness", {"coefficient": 1.0})
+    )]  # fmt: skip
+    assert [change.element.name for change in changes_of(known, named)] == ["cubic_stiffness"]

@@ -5,7 +5,7 @@ lacks, the winner is held against noise, rivals and records that no fit has seen
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -35,7 +35,7 @@ from rhythmid.diagnose.result import (
     MissingEffect,
     Remainder,
 )
-from rhythmid.diagnose.scoring import settle
+from rhythmid.diagnose.scoring import Scoring, settle
 from rhythmid.diagnose.screen import trajectories
 from rhythmid.diagnose.search import WORTH, Search, search
 from rhythmid.diagnose.stand_ins import stand_ins
@@ -118,46 +118,62 @@ def diagnose(
     # the matrices are tall and thin, and workers run side by side: threads inside linear algebra only get in the way
     with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
         check_units(model, everything[:count], pool)
-        scoring = settle(model, everything[:count], everything[count:], known, pool, tell)
-        calibration, seen, unseen = (
-            scoring.calibration,
-            list(scoring.calibration.series),
-            list(scoring.unseen),
-        )
-        if holdout:
-            heldout = f"held out: {', '.join(record.name for record in holdout)}"
-        else:
-            heldout = f"held out: the last fifth of every {'record' if scoring.whole else 'window'}"
-        known = known.within(scales(seen, calibration.fit.model))
-        if seen[0].observer is not None:  # which takes the measurement for the motion
-            known = known.without(
-                *(name for name, element in known.elements.items() if element.slot == "sensor")
-            )
-            notes[TIED_SENSOR] = None
-        found = search(seen, calibration.fit, model, known, pool, tell)
-        tell("judging on held-out records")
-        found, harmful = admitted(found, unseen if holdout else None, pool)
-        fitted = scales(seen, found.fit.model)
-        imitating = [
-            *stand_ins(trajectories(found.fit), found.best.added, fitted),
-            *elsewhere(found, known),
-        ]
-        found = finely_stepped(found, pool)
-        imitating += limiting_cases(found)
-        found = profiled(found, pool)
-        tell("locating the mismatch")
-        before = dependences(trajectories(found.nominal), pool)
-        after = dependences(trajectories(found.fit), pool) if found.best.added else before
-        judge = HeldOut(found, unseen if holdout else None)
-        diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful, imitating)
-        if diagnosis.verdict == "unknown_physics":
-            tell("trying the values that the nominal model holds fixed")
-            notes[wrong_value(found)] = None
-        said = (*diagnosis.notes, *(note for note in notes if note is not None))
-        excluded = (*diagnosis.excluded, *unscored(found, known, pool))
-        diagnosis = replace(diagnosis, scoring=scoring.words, notes=said, excluded=excluded)
-        diagnosis = tempered(diagnosis, everything[:count], found, pool)
-        nominal_run, augmented_run = judge.fit(found.nominal.model), judge.fit(found.fit.model)
+        ways = settle(model, everything[:count], everything[count:], known, pool, tell)
+        answers: list[Answer] = []
+        for scoring in ways:
+            if answers:
+                tell(f"no name found; scoring in {scoring.words}")
+            answers.append(_diagnosed(model, everything[:count], scoring, holdout, known, notes, pool, tell))
+            if answers[-1].diagnosis.verdict == "missing_physics":
+                return answers[-1]
+    return answers[0]
+
+
+def _diagnosed(
+    model: Model,
+    whole: Sequence[Series],
+    scoring: Scoring,
+    holdout: Sequence[Record],
+    known: Catalogue,
+    remarks: Iterable[str | None],
+    pool: ThreadPoolExecutor,
+    tell: Tell,
+) -> Answer:
+    """The diagnosis of `whole` records scored in one way; `remarks` on the records are told with it."""
+    notes = dict.fromkeys(remarks)
+    calibration, seen, unseen = scoring.calibration, list(scoring.calibration.series), list(scoring.unseen)
+    if holdout:
+        heldout = f"held out: {', '.join(record.name for record in holdout)}"
+    else:
+        heldout = f"held out: the last fifth of every {'record' if scoring.whole else 'window'}"
+    known = known.within(scales(seen, calibration.fit.model))
+    if seen[0].observer is not None:  # which takes the measurement for the motion
+        known = known.without(*(name for name, element in known.elements.items() if element.slot == "sensor"))
+        notes[TIED_SENSOR] = None
+    found = search(seen, calibration.fit, model, known, pool, tell)
+    tell("judging on held-out records")
+    found, harmful = admitted(found, unseen if holdout else None, pool)
+    fitted = scales(seen, found.fit.model)
+    imitating = [
+        *stand_ins(trajectories(found.fit), found.best.added, fitted),
+        *elsewhere(found, known),
+    ]
+    found = finely_stepped(found, pool)
+    imitating += limiting_cases(found)
+    found = profiled(found, pool)
+    tell("locating the mismatch")
+    before = dependences(trajectories(found.nominal), pool)
+    after = dependences(trajectories(found.fit), pool) if found.best.added else before
+    judge = HeldOut(found, unseen if holdout else None)
+    diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful, imitating)
+    if diagnosis.verdict == "unknown_physics":
+        tell("trying the values that the nominal model holds fixed")
+        notes[wrong_value(found)] = None
+    said = (*diagnosis.notes, *(note for note in notes if note is not None))
+    excluded = (*diagnosis.excluded, *unscored(found, known, pool))
+    diagnosis = replace(diagnosis, scoring=scoring.words, notes=said, excluded=excluded)
+    diagnosis = tempered(diagnosis, whole, found, pool)
+    nominal_run, augmented_run = judge.fit(found.nominal.model), judge.fit(found.fit.model)
     evidence = Evidence(
         tuple(seen),
         tuple(unseen),

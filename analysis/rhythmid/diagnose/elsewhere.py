@@ -12,6 +12,7 @@ from rhythmid.diagnose.refit import Proposal, propose, run_trials
 from rhythmid.diagnose.search import WORTH, Search
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Slot
+from rhythmid.generated_source import DRIVES
 from rhythmid.model import Term
 
 PLACES: dict[Slot, str] = {
@@ -39,7 +40,7 @@ def elsewhere(found: Search, catalogue: Catalogue) -> list[str]:
         moved = [
             proposal
             for place in _free_places(term.element, catalogue)
-            if not (tied and place == "sensor")
+            if not (tied and place == "sensor") and not (place == "command" and series[0].kind not in DRIVES)
             for proposal in _moved(found, term, place)
         ]
         if not moved:

@@ -20,6 +20,7 @@ from rhythmid.effect import Path, effect_along
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales
 from rhythmid.errors import InputError
+from rhythmid.generated_source import DRIVES
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.free_run import FreeRun, prepare_run, with_series
 from rhythmid.identify.noise import NoiseModel, runs
@@ -165,6 +166,9 @@ def change_of_output(
         if element.slot == "actuator":
             path = replace(path, signal=path.effort)
         elif element.slot == "command":
+            if one.kind not in DRIVES:
+                changes.append(np.zeros(one.blocks))
+                continue
             path = replace(path, signal=known.commands[index])
             if controlled(fit.model):
                 change = _change_of_reference(known, index, effect_along(element, values, fit.model, path))
