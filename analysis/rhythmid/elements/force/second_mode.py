@@ -48,8 +48,8 @@ ELEMENT = Element(
     initial=lambda x, v, f, mass, frequency, damping_ratio, step: (x, v),
     size="mass",
     starts=starts,
-    # slower than the motion it is a mass at rest, and its damper a viscous one
-    ranges=lambda s: {"frequency": (0.3 * min(s.natural_frequency, s.frequency), math.inf)},
+    # slower than the motion it is a mass at rest, and its damper a viscous one; faster than the samples, an added mass
+    ranges=lambda s: {"frequency": (0.3 * min(s.natural_frequency, s.frequency), 0.5 / s.period)},
     also_known_as=("attached mass", "tuned mass", "structural resonance", "flexible payload"),
     family="resonance",
     confusable={
