@@ -96,14 +96,17 @@ def test_a_ripple_as_long_as_it_may_be_is_a_spring(share, edge):
     assert ["the edge of what it can be (wavelength)" in one for one in said] == ([True] if edge else [])
 
 
-@pytest.mark.parametrize(("share", "edge"), [(1.0, True), (0.5, False)])
-def test_a_mode_as_fast_as_the_samples_is_an_added_mass(share, edge):
+@pytest.mark.parametrize(
+    ("share", "damping", "edge"),
+    [(1.0, 0.1, "frequency"), (0.5, 1.0, "damping_ratio"), (0.5, 0.1, None), (0.5, 0.0, None)],
+)
+def test_a_mode_as_fast_as_the_samples_or_overdamped_is_something_else(share, damping, edge):
     mode = CATALOGUE["second_mode"].within(SIZES)
-    values = {"mass": 0.01, "frequency": share * 0.5 / SIZES.period, "damping_ratio": 0.1}
+    values = {"mass": 0.01, "frequency": share * 0.5 / SIZES.period, "damping_ratio": damping}
     fit = SimpleNamespace(model=hopper().with_element(mode, values))
     known = replace_fit(motion("viscous_damper", {"damping": 0.1}), fit)
     said = stand_ins(known, ("second_mode",), SIZES)
-    assert ["the edge of what it can be (frequency)" in one for one in said] == ([True] if edge else [])
+    assert [f"the edge of what it can be ({edge})" in one for one in said] == ([True] if edge else [])
 
 
 @pytest.mark.parametrize(

@@ -48,8 +48,12 @@ ELEMENT = Element(
     initial=lambda x, v, f, mass, frequency, damping_ratio, step: (x, v),
     size="mass",
     starts=starts,
-    # slower than the motion it is a mass at rest, and its damper a viscous one; faster than the samples, an added mass
-    ranges=lambda s: {"frequency": (0.3 * min(s.natural_frequency, s.frequency), 0.5 / s.period)},
+    # slower than the motion it is a mass at rest, and its damper a viscous one; faster than the samples, an added mass;
+    # overdamped, something that relaxes
+    ranges=lambda s: {
+        "frequency": (0.3 * min(s.natural_frequency, s.frequency), 0.5 / s.period),
+        "damping_ratio": (0.0, 1.0),
+    },
     also_known_as=("attached mass", "tuned mass", "structural resonance", "flexible payload"),
     family="resonance",
     confusable={
