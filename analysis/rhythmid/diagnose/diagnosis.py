@@ -165,10 +165,15 @@ def _diagnosed(
     before = dependences(trajectories(found.nominal), pool)
     after = dependences(trajectories(found.fit), pool) if found.best.added else before
     judge = HeldOut(found, unseen if holdout else None)
+    # a mass on a mass is what a mass that is given wrongly looks like
+    heavier = any(found.best.element(label).family == "resonance" for label in found.best.added)
+    mistaken = wrong_value(found) if heavier else None
+    if mistaken is not None:
+        imitating.append("second mode stands for a value that the nominal model holds fixed")
     diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful, imitating)
     if diagnosis.verdict == "unknown_physics":
         tell("trying the values that the nominal model holds fixed")
-        notes[wrong_value(found)] = None
+        notes[mistaken or wrong_value(found)] = None
     said = (*diagnosis.notes, *(note for note in notes if note is not None))
     excluded = (*diagnosis.excluded, *unscored(found, known, pool))
     diagnosis = replace(diagnosis, scoring=scoring.words, notes=said, excluded=excluded)

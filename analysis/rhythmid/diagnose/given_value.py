@@ -15,19 +15,21 @@ BESIDE = 2  # effects at most
 
 def wrong_value(found: Search) -> str | None:
     """A sentence about the fixed value that explains the records better when it is free, beside the first of the chosen
-    effects or none, than all of them do; None where there is no such value."""
+    effects, all but one or none, than all of them do; None where there is no such value."""
     fit, best = found.fit, found.best
     proposals: list[Proposal] = []
-    for count in range(min(len(best.added), BESIDE) + 1):
-        kept, model = best.added[:count], fit.model
-        for label in best.added[count:]:
+    first = [best.added[:count] for count in range(min(len(best.added), BESIDE) + 1)]
+    but_one = [tuple(label for label in best.added if label != idle) for idle in best.added]
+    for kept in dict.fromkeys((*first, *but_one)):
+        model = fit.model
+        for label in set(best.added) - set(kept):
             model = model.without(label)
         for name in _given(model, kept):
             freed = model.with_parameters({name: replace(model.parameters[name], fixed=False)})
             proposals.append(Proposal((*kept, name), freed, ({},)))
     known = compile_model(fit.model).layout.states
     trials, _ = run_trials(proposals, fit.run.series, fit.starts, known, found.noise, fit.run.max_step)
-    if not trials or trials[0].bic() > best.bic() - WORTH:
+    if not trials or trials[0].bic() > best.bic() - (WORTH if trials[0].free >= best.free else 0.0):
         return None
     *effects, name = trials[0].added
     value, free = fit.model.parameters[name], trials[0].model.value(name)
