@@ -79,11 +79,13 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Answer:
-    """A diagnosis, the augmented model and the evidence."""
+    """A diagnosis, the augmented model and the evidence; `mistaken` tells of a value that the nominal model holds fixed and that
+    explains the records when it is free, if there is one."""
 
     diagnosis: Diagnosis
     model: Model
     evidence: Evidence
+    mistaken: str | None = None
 
 
 def diagnose(
@@ -124,7 +126,7 @@ def diagnose(
             if answers:
                 tell(f"no name found; scoring in {scoring.words}")
             answers.append(_diagnosed(model, everything[:count], scoring, holdout, known, notes, pool, tell))
-            if answers[-1].diagnosis.verdict == "missing_physics":
+            if answers[-1].diagnosis.verdict == "missing_physics" or answers[-1].mistaken:
                 return answers[-1]
     return answers[0]
 
@@ -173,7 +175,8 @@ def _diagnosed(
     diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful, imitating)
     if diagnosis.verdict == "unknown_physics":
         tell("trying the values that the nominal model holds fixed")
-        notes[mistaken or wrong_value(found)] = None
+        mistaken = mistaken or wrong_value(found)
+        notes[mistaken] = None
     said = (*diagnosis.notes, *(note for note in notes if note is not None))
     excluded = (*diagnosis.excluded, *unscored(found, known, pool))
     diagnosis = replace(diagnosis, scoring=scoring.words, notes=said, excluded=excluded)
@@ -189,7 +192,7 @@ def _diagnosed(
         nominal_run,
         augmented_run,
     )
-    return Answer(diagnosis, causal(found.fit.model), evidence)
+    return Answer(diagnosis, causal(found.fit.model), evidence, mistaken)
 
 
 def check_comparable(series: Sequence[Series]) -> None:
