@@ -168,15 +168,16 @@ def _diagnosed(
     after = dependences(trajectories(found.fit), pool) if found.best.added else before
     judge = HeldOut(found, unseen if holdout else None)
     # a mass on a mass is what a mass that is given wrongly looks like
-    heavier = any(found.best.element(label).family == "resonance" for label in found.best.added)
+    heavier = [label for label in found.best.added if found.best.element(label).family == "resonance"]
     mistaken = wrong_value(found) if heavier else None
     if mistaken is not None:
-        imitating.append("second mode stands for a value that the nominal model holds fixed")
+        modes = " and ".join(heavier).replace("_", " ")
+        imitating.append(f"{modes} may stand for a value that the nominal model holds fixed")
     diagnosis = _conclude(model, found, calibration, before, after, judge, heldout, harmful, imitating)
-    if diagnosis.verdict == "unknown_physics":
+    if diagnosis.verdict == "unknown_physics" and not heavier:
         tell("trying the values that the nominal model holds fixed")
-        mistaken = mistaken or wrong_value(found)
-        notes[mistaken] = None
+        mistaken = wrong_value(found)
+    notes[mistaken] = None
     said = (*diagnosis.notes, *(note for note in notes if note is not None))
     excluded = (*diagnosis.excluded, *unscored(found, known, pool))
     diagnosis = replace(diagnosis, scoring=scoring.words, notes=said, excluded=excluded)

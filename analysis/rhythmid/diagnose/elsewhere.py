@@ -1,7 +1,8 @@
 """Elsewhere: whether an effect on a signal does as well in another place of the path, where the catalogue has nothing like it.
 
 A lag is one law, whether the command, the actuator or the sensor has it, and so is a drift of a delay, the command's or the
-measurement's; what it does to a recording differs by little. Where the catalogue lacks it in one place, the one that it has in another stands in for it, down to the noise nearly.
+measurement's; what it does to a recording differs by little. Where the catalogue lacks it in one place, the one that it has
+in another stands in for it, down to the noise nearly.
 """
 
 from collections.abc import Iterator

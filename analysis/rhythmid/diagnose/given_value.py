@@ -1,6 +1,7 @@
 """Given values: where nothing in the catalogue explains the records, one that the nominal model holds fixed may be wrong.
 
 A mass that is given wrongly is missed like physics, but effects are like it only in part; freed, it does what several cannot.
+A second mode, a mass on the mass, is like it altogether where it is fast, so that one has to do better than a freed value.
 """
 
 from dataclasses import replace
