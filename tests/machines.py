@@ -8,6 +8,7 @@ from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.excitation.sequence import build
 from rhythmid.experiment import Delay, Experiment, Forcing, Noise, TimeMode, perform
 from rhythmid.identify.output_error import Fit
+from rhythmid.identify.start_cost import start_cost
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 
@@ -68,7 +69,8 @@ def records(machine: Model, protocol=SHORT, seed: int = 0, **options) -> list[Re
 
 def search_of(fit: Fit, label: str) -> Search:
     """A search that ended in this fit, whose model has one more element."""
+    cost = start_cost(fit.model, fit.run, fit.noise, fit.starts, fit.residuals, fit.differences[1])
     trial = Trial(
-        (label,), fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), True, fit.noise, fit.differences
+        (label,), fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), True, fit.noise, fit.differences, cost
     )  # fmt: skip
     return Search(fit, trial, fit, fit.noise, (trial,), (), ())

@@ -20,6 +20,7 @@ from rhythmid.identify.free_run import FreeRun, prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.identify.series import Series, scales
+from rhythmid.identify.start_cost import start_cost
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
 
@@ -46,10 +47,11 @@ class Trial:
     converged: bool
     noise: NoiseModel  # under which chi2 was reached
     differences: tuple[Array, Array] | None = None  # steps by which its sensitivities were taken
+    start_cost: float = 0.0  # of the starts of its elements' own states
 
-    def bic(self, inflation: float = 1.0) -> float:
-        """Bayesian information criterion (G. Schwarz, Ann. Stat. 6 (1978) 461); `inflation` >= 1 deflates chi2."""
-        return self.chi2 / inflation + self.free * math.log(max(self.samples, 2))
+    def bic(self) -> float:
+        """Bayesian information criterion (G. Schwarz, Ann. Stat. 6 (1978) 461), with what free starts cost."""
+        return self.chi2 + self.free * math.log(max(self.samples, 2)) + self.start_cost
 
     def element(self, label: str) -> Element:
         """The element that the model has under a label; KeyError if there is none."""
@@ -70,12 +72,14 @@ class _Outcome:
     samples: int
     converged: bool
     differences: tuple[Array, Array]
+    start_cost: float
 
 
-def _outcome(end: Descent) -> _Outcome:
+def _outcome(end: Descent, run: FreeRun, noise: NoiseModel) -> _Outcome:
     values = {name: value.value for name, value in end.model.parameters.items()}
+    cost = start_cost(end.model, run, noise, end.starts, end.residuals, end.differences[1])
     return _Outcome(
-        values, len(end.model.free), end.starts, end.chi2, end.samples, end.converged, end.differences
+        values, len(end.model.free), end.starts, end.chi2, end.samples, end.converged, end.differences, cost
     )
 
 
@@ -91,6 +95,7 @@ def _trial(added: tuple[str, ...], model: Model, done: _Outcome, noise: NoiseMod
         done.converged,
         noise,
         done.differences,
+        done.start_cost,
     )
 
 
@@ -190,7 +195,7 @@ def _fit_proposal(
     hops = _hops(proposal, series) if best.chi2 < proposal.ceiling else {}
     for name, distance in hops.items():
         best = _hopped(best, run, names, noise, name, distance)
-    return _outcome(best)
+    return _outcome(best, run, noise)
 
 
 def _carried_on(end: Descent, run: FreeRun, names: tuple[str, ...], noise: NoiseModel) -> Descent:
@@ -267,13 +272,11 @@ def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
         if not found:
             continue
         lead = min(found, key=lambda end: end.chi2)
-        end = _outcome(
-            descend(
-                lead.model, run, free, trial.noise, lead.starts, THOROUGH, None, TOLERANCE, lead.differences
-            )
+        end = descend(
+            lead.model, run, free, trial.noise, lead.starts, THOROUGH, None, TOLERANCE, lead.differences
         )
         if end.chi2 < best.chi2:
-            best = _trial(trial.added, trial.model, end, trial.noise)
+            best = _trial(trial.added, trial.model, _outcome(end, run, trial.noise), trial.noise)
     return best
 
 
@@ -341,15 +344,16 @@ def whole_fit(
     )
 
 
-def _end(
+def _again(
     trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int
-) -> Descent:
+) -> _Outcome:
     """Where a trial's descent under a noise model ends; without `iterations`, the trial as it is."""
     run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
     names = tuple(trial.model.free)
-    return descend(
+    end = descend(
         trial.model, run, names, noise, trial.starts, iterations, None, TOLERANCE, trial.differences
     )
+    return _outcome(end, run, noise)
 
 
 def under_noise(
@@ -364,7 +368,7 @@ def under_noise(
     others = [trial for trial in trials if not (trial.noise is noise and trial.converged)]
 
     def one(trial: Trial) -> _Outcome:
-        return _outcome(_end(trial, series, noise, max_step, iterations))
+        return _again(trial, series, noise, max_step, iterations)
 
     again = [
         _trial(others[index].added, others[index].model, result, noise)

@@ -44,6 +44,7 @@ from rhythmid.identify.free_run import accurate
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.output_error import Fit, minimise, noise_of
 from rhythmid.identify.series import Series
+from rhythmid.identify.start_cost import start_cost
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
 from rhythmid.progress import Tell
@@ -203,6 +204,9 @@ def search(
         nominal.converged,
         noise,
         nominal.differences,
+        start_cost(
+            nominal.model, nominal.run, noise, nominal.starts, nominal.residuals, nominal.differences[1]
+        ),
     )
     trials: dict[tuple[str, ...], Trial] = {(): base}
     # the same model under the noise that it leaves, and under a round's, out of which the catalogue's guesses are taken

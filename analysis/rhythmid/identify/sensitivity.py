@@ -43,7 +43,7 @@ class Problem:
             [s for s in runs(one.used) if s.stop - s.start > noise.order + 1] for one in run.series
         ]
         self.ignored = [
-            None if one.ignored is None else _basis(self._white(i, one.ignored))
+            None if one.ignored is None else span(self._white(i, one.ignored))
             for i, one in enumerate(run.series)
         ]
 
@@ -190,7 +190,7 @@ class Problem:
             known[:, 0] = self.departure(index, starts[index])
             known[:, 1 + p + 2 :] = np.diag(state_steps[2:] / self.hidden[index][1])
             joined = np.vstack([white, known])
-            basis = _basis(joined[:, 1 + p :])
+            basis = span(joined[:, 1 + p :])
             projected = joined[:, : 1 + p] - basis @ (basis.T @ joined[:, : 1 + p])
             if (
                 self.ignored[index] is not None
@@ -224,7 +224,7 @@ def state_update(sensitivity: Array, target: Array, damping: Array | None = None
     return change
 
 
-def _basis(columns: Array) -> Array:
+def span(columns: Array) -> Array:
     """Orthonormal basis of the columns' span; dependent ones are dropped."""
     norms, live = _felt(columns)
     if not live.any():

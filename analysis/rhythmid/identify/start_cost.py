@@ -1,0 +1,50 @@
+"""What it costs a model that the elements' own states start where they like.
+
+Every series, and in multiple shooting every window, gives a state of an element a start of its own. An element with states gains
+by that alone, about one of chi2 a start, whatever its physics; over hundreds of windows that is more than what a faint effect
+is worth. A fair criterion takes the average over the starts' usual range, not the best of it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.identify.free_run import FreeRun
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.sensitivity import Problem, span
+from rhythmid.model import Model
+
+Array = NDArray[np.float64]
+
+
+def start_cost(
+    model: Model,
+    run: FreeRun,
+    noise: NoiseModel,
+    starts: Sequence[Array],
+    residuals: Sequence[Array],
+    state_steps: Array,
+) -> float:
+    """Minus twice the logarithm of what remains of the likelihood, averaged over the starts of the elements' states.
+
+    In Laplace's approximation (D. J. C. MacKay, Neural Computation 4 (1992) 415) d'd + ln det(I + H'H) for each series: d (h,) the
+    departures of its starts from the states' usual mean in units of their usual scatter, H (n, h) the sensitivities of
+    the whitened output to them, less what position and velocity at the start can do. `state_steps` (2 + h,) are the differences by
+    which sensitivities are taken. Zero without such states.
+    """
+    if run.states == 2:
+        return 0.0
+    problem = Problem(run, (), noise, None)
+    problem.learn_hidden(model, starts)
+    _, states, _, _ = problem.linearise(model, starts, residuals, np.empty(0), state_steps)
+    hidden = run.states - 2
+    total = 0.0
+    for error, _, sensitivity in states:
+        white, scatters = sensitivity[:-hidden], np.diag(sensitivity[-hidden:, 2:])
+        basis = span(white[:, :2])
+        felt = white[:, 2:] / scatters
+        felt = felt - basis @ (basis.T @ felt)
+        total += float(np.sum(error[-hidden:] ** 2))
+        total += float(np.linalg.slogdet(np.eye(hidden) + felt.T @ felt)[1])
+    return total
