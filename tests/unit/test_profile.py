@@ -56,3 +56,26 @@ def test_where_chi2_falls_at_an_intervals_end_the_descent_goes_on():
     assert found.fit.chi2 == pytest.approx(fit.chi2, abs=0.1) and found.best.chi2 == found.fit.chi2
     assert found.trials == (found.best,)
     assert found.fit.model.value("quadratic_drag.coefficient") == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_narrow_notch_beside_a_plain_of_the_likelihood_does_not_hide_the_plain():
+    # one touch in one record tells little of the stop; that the other record hardly reaches it fits its noise a little better
+    swing = {"type": "silence", "length": 20.0}
+    protocol = [(SHORT[1][0] | {"amplitude": 0.53}, 1.0), (swing, 4.0)]
+    free = prepare(records(hopper(), protocol, delays=(0.0, 0.0)), 4)
+    stop = {
+        "stiffness": 300.0,
+        "damping_ratio": 0.4,
+        "position": float(free[1].value.min()) - 3e-4,
+        "side": -1.0,
+    }
+    machine = hopper().with_element(CATALOGUE["end_stop_contact"], stop)
+    fit = estimate(
+        machine, prepare(records(machine, protocol, delays=(0.0, 0.0)), 4), noise=NOISE, max_step=1e-3
+    )
+    found = profiled(search_of(fit, "end_stop_contact")).fit
+    for name, bias in (("stiffness", 5.0), ("damping_ratio", 10.0), ("position", 100.0)):
+        label = f"end_stop_contact.{name}"
+        off = abs(fit.model.value(label) - stop[name])
+        assert off > bias * fit.std[label]
+        assert off < 2.0 * found.std[label] < 5.0 * off

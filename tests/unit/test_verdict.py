@@ -55,6 +55,18 @@ def test_a_rival_that_replaces_an_effect_is_its_twin_once_and_never_one_that_con
     assert twins_of(best, rivals) == [("flight_damping", "viscous_damper", "quadratic_drag")]
 
 
+@pytest.mark.parametrize(
+    ("chi2", "expected"), [(95.0, []), (90.0, [("coulomb_friction", "asymmetric_coulomb_friction")])]
+)
+def test_what_contains_an_effect_is_its_twin_where_it_does_better_by_more_than_its_parameters_cost(
+    chi2, expected
+):
+    best = trial(hopper(), "coulomb_friction", force=0.1, transition=0.01)
+    wider = trial(hopper(), "asymmetric_coulomb_friction", force=0.1, asymmetry=0.01, transition=0.01)
+    assert wider.free == best.free + 1  # worth 7.6
+    assert twins_of(best, [replace(wider, chi2=chi2)]) == expected
+
+
 def several(base: Model, chi2: float = 100.0, **elements: dict[str, float]) -> Trial:
     """A model with several more elements, as if it had been fitted."""
     for name, values in elements.items():

@@ -2,9 +2,11 @@
 
 A covariance knows the likelihood's curvature at one point. An effect with a corner (a stop that is touched for a moment, a play
 whose far edge is never reached) can be curved there and flat or falling further on. So every parameter of an effect is
-moved to both ends of its 95 % interval, the others along with it as their covariance says: chi2 has to rise by four. Where
-it does not, the others are fitted again for the moved parameter. If chi2 then falls, the descent goes on from there; if it
-hardly rises, the interval is widened until it does, or is open.
+moved to both ends of its 95 % interval and far beyond, the others along with it as their covariance says: chi2 has to rise by the
+square of the way in standard deviations. Where it does not, the others are fitted again for the moved parameter. If chi2
+then falls, the descent goes on from there; if it hardly rises, the interval is widened until it does, or is open, and
+those of all that was fitted again with it. A plain beside a narrow notch outweighs the notch by its width, so that chi2 has to
+rise the more the further away it is.
 (Profile likelihood: S. A. Murphy, A. W. van der Vaart, J. Am. Stat. Assoc. 95 (2000) 449.)
 """
 
@@ -26,7 +28,10 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 END = 2.0  # standard deviations at which chi2 should have risen by their square
-FLAT = 0.25  # of that rise, below which an interval is too narrow
+FAR = 8.0, 32.0  # further ones at which it is looked whether it has
+ODD = 2.0  # times more or less than that rise, from which on the others are fitted again;
+LITTLE = 8.0  # times less further on, where few likelihoods are parabolas
+FLAT = 0.25  # of that rise with the others fitted, below which an interval is too narrow
 FALLS = 2.0  # by how much chi2 has to be lower elsewhere to go there
 WIDEST = 2.0**20  # standard deviations up to which the rise is sought,
 BEYOND = 30.0  # but no further than this times the parameter's value
@@ -52,14 +57,14 @@ def profiled(found: Search, pool: ThreadPoolExecutor | None = None) -> Search:
     A parameter whose likelihood does not rise before its bound, or before it has lost all relation to its value, is
     undetermined: its variance is infinite.
     """
-    flat: list[_Way] = []
+    reach = np.zeros(len(found.fit.names))
     for _ in range(DESCENTS):
-        flat, lower = _flat(found.fit, _places(found), pool)
+        reach, lower = _reach(found.fit, _places(found), pool)
         better = None if lower is None else _descended(found, lower, pool)
         if better is None:
             break
         found = better
-    return replace(found, fit=_widened(found.fit, flat, pool))
+    return replace(found, fit=_widened(found.fit, reach))
 
 
 def _places(found: Search) -> list[int]:
@@ -73,21 +78,69 @@ def _places(found: Search) -> list[int]:
     return [int(i) for i in np.flatnonzero(known) if own[i] or np.any(alike[i, own] > TIED)]
 
 
-def _flat(
-    fit: Fit, places: Sequence[int], pool: ThreadPoolExecutor | None
-) -> tuple[list[_Way], Model | None]:
-    """The ways along which chi2 hardly rises, up to one that leads to a lower minimum, and the model there."""
-    ways = [_Way(place, sign * END) for place in places for sign in (-1.0, 1.0)]
-    found: list[_Way] = []
-    for way, rise in zip(ways, _rises(fit, ways, pool)):
-        if rise >= FLAT * END**2:
-            continue
-        rise, model = _again(fit, way, pool)
+def _reach(fit: Fit, places: Sequence[int], pool: ThreadPoolExecutor | None) -> tuple[Array, Model | None]:
+    """How far from the fit each parameter (p,) is still likely, as far as the covariance does not say so: infinite where it
+    is undetermined, 0 without such a finding. And the model where chi2 falls, if there is one."""
+    ways = [
+        [_Way(place, sign * deviations) for deviations in (END, *FAR)]
+        for place in places
+        for sign in (-1.0, 1.0)
+    ]
+    rises = iter(_rises(fit, [way for along in ways for way in along], pool))
+    reach = np.zeros(len(fit.names))
+    for along in ways:
+        for way, rise in [(way, next(rises)) for way in along]:
+            if not _odd(way, rise):
+                continue
+            likely, lower = _followed(fit, way, pool)
+            if lower is not None:
+                return reach, lower
+            if likely is not None:
+                reach = np.maximum(reach, likely)
+                break
+    return reach, None
+
+
+def _odd(way: _Way, rise: float) -> bool:
+    """Whether chi2 rises otherwise than a parabola along a way."""
+    due = way.deviations**2
+    if abs(way.deviations) > END:
+        return rise < due / LITTLE
+    return rise < due / ODD or ODD * due < rise < math.inf
+
+
+def _enough(way: _Way) -> float:
+    """Rise of chi2 at the end of a way, beyond which a parameter is not likely to be."""
+    far = abs(way.deviations) / END
+    return END**2 + 2.0 * math.log(far) if far > 1.0 else FLAT * END**2
+
+
+def _followed(fit: Fit, way: _Way, pool: ThreadPoolExecutor | None) -> tuple[Array | None, Model | None]:
+    """How far all parameters (p,) get along a way until chi2 rises as it should, None where it does at once; or the model
+    where it falls."""
+    rise, model = _again(fit, way, pool)
+    if rise >= _enough(way):
+        return None, None
+    reach = np.zeros(len(fit.names))
+    while rise < _enough(way):
         if rise < -FALLS:
-            return found, model
-        if rise < FLAT * END**2:
-            found.append(way)
-    return found, None
+            return None, model
+        reach = np.maximum(reach, _distance(fit, model))
+        way = way.further(2.0)
+        if not _within(fit, way):
+            reach[way.place] = math.inf
+            return reach, None
+        rise, model = _again(fit, way, pool)
+    before = way.further(0.75)
+    rise, model = _again(fit, before, pool)
+    if rise < _enough(before):
+        reach = np.maximum(reach, _distance(fit, model))
+    reach[way.place] = abs(way.deviations) * math.sqrt(fit.covariance[way.place, way.place])
+    return reach, None
+
+
+def _distance(fit: Fit, model: Model) -> Array:
+    return np.abs([model.value(name) - value for name, value in zip(fit.names, fit.values)])
 
 
 def _moved(fit: Fit, way: _Way) -> Model | None:
@@ -171,15 +224,12 @@ def _descended(found: Search, model: Model, pool: ThreadPoolExecutor | None) -> 
     return replace(found, fit=again, best=best, trials=trials)
 
 
-def _widened(fit: Fit, ways: Sequence[_Way], pool: ThreadPoolExecutor | None) -> Fit:
-    """The fit with the standard deviations along these ways as wide as it takes for chi2 to rise."""
-    factors = np.ones(len(fit.names))
-    for way in ways:
-        factor = 2.0
-        while _within(fit, way.further(factor)) and _again(fit, way.further(factor), pool)[0] < END**2:
-            factor *= 2.0
-        inside = _within(fit, way.further(factor))
-        factors[way.place] = max(factors[way.place], factor if inside else math.inf)
+def _widened(fit: Fit, reach: Array) -> Fit:
+    """The fit with intervals that hold what is likely; an undetermined parameter leaves the others alone."""
+    std = np.sqrt(np.diag(fit.covariance))
+    factors = np.ones(len(std))
+    known = (std > 0.0) & np.isfinite(std)
+    factors[known] = np.maximum(1.0, reach[known] / (END * std[known]))
     open_ones = np.isinf(factors)
     factors[open_ones] = 0.0
     covariance = fit.covariance * np.outer(factors, factors)

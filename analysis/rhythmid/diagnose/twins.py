@@ -21,8 +21,9 @@ def twins_of(best: Trial, rivals: Sequence[Trial]) -> list[tuple[str, ...]]:
             come = set(rival.added) - set(best.added)
             if gone == {label} and len(come) == 1:
                 other = rival.element(come.pop()).name
-                # what contains the element is no rival
-                if other not in others and other not in element.special_case_of:
+                # what contains the element is no rival, unless it does better with all its parameters
+                wider = other in element.special_case_of and rival.bic() >= best.bic()
+                if other not in others and not wider:
                     others.append(other)
         if others:
             groups.append((element.name, *others))
