@@ -1,10 +1,12 @@
-"""An effect that does as well with a tenth of its size is but the limit that its other parameters take."""
+"""An effect that does as well however small it is is but the limit that its other parameters take."""
+
+from dataclasses import replace
 
 import numpy as np
 
 from machines import CATALOGUE, SHORT, hopper, records, search_of
 from rhythmid.diagnose.limiting_case import limiting_cases
-from rhythmid.diagnose.search import Search
+from rhythmid.diagnose.search import WORTH, Search
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare
@@ -24,7 +26,9 @@ def search_for(true: str, true_values: dict[str, float], named: str, values: dic
 def test_a_damper_that_depends_on_a_position_far_away_is_a_plain_one_and_no_name():
     far = {"coefficient": 0.6, "reference": -1.0, "exponent": 2.0}
     said = limiting_cases(search_for("viscous_damper", {"damping": 0.8}, "position_dependent_damping", far))
-    assert len(said) == 1 and "position dependent damping does as well with a tenth of its size" in said[0]
+    assert (
+        len(said) == 1 and "position dependent damping does as well with a hundredth of its size" in said[0]
+    )
 
 
 def test_a_damper_that_does_depend_on_position_keeps_its_name():
@@ -39,3 +43,17 @@ def test_a_stop_touched_once_is_a_stop_however_uncertain_its_stiffness():
     fit = found.fit
     assert float(np.max([one.value.max() for one in fit.run.series])) > 0.1665
     assert limiting_cases(found) == []
+
+
+def test_a_stop_that_does_as_well_with_a_tenth_of_its_stiffness_but_no_less_keeps_its_name():
+    free = prepare(records(hopper(), SHORT), 4)
+    hit = max(float(one.value.max()) for one in free) - 8e-4
+    values = {"stiffness": 3000.0, "damping_ratio": 0.1, "position": hit}
+    machine = hopper().with_element(CATALOGUE["end_stop_contact"], values)
+    known = machine.with_values({"input_delay.delay": 0.0203, "measurement_delay.delay": 0.0151})
+    fit = estimate(known, prepare(records(machine, SHORT), 4), noise=NOISE, max_step=1e-3)
+    name = "end_stop_contact.stiffness"
+    softer = replace(fit.model.parameters[name], value=0.1 * fit.model.value(name), fixed=True)
+    again = estimate(fit.model.with_parameters({name: softer}), fit.run.series, noise=NOISE, max_step=1e-3)
+    assert again.chi2 < fit.chi2 + WORTH
+    assert limiting_cases(search_of(fit, "end_stop_contact")) == []
