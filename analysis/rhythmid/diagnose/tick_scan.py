@@ -4,7 +4,8 @@ After a time T an error dP of the period P has moved the ticks by T dP / P; once
 forgotten their phase. What a hold does to the size of the response it still knows, and that tells the rate 1/P roughly: a
 coarse scan leaves a band of rates. Slow rates join it in any case, for their images of the command lie where the machine
 answers, and ticks of the wrong phase hide the right rate there. The rates are tried on a grid of 1 / (4 T), over a first
-stretch where the whole record asks for too many, and the best of them, different ones, followed while the grid gets finer. The mean delay, of which half a period is the
+stretch where the whole record asks for too many, and the best of them, different ones, followed while the grid gets finer,
+until the last tick of the record is known to a small share of a sample. The mean delay, of which half a period is the
 hold's, is kept at first, and shifted a little with the rate in the end: it decides which command a tick finds. What small
 changes of the other parameters and of the initial states do is projected off each residual.
 """
@@ -35,7 +36,7 @@ FASTEST = 100.0  # [Hz] beyond which a hold is little but a delay, and its ticks
 FOLLOWED, LEAST = 24, 6  # rates that are followed at first and in the end
 APART = 0.25  # over the length looked at, within which two rates are one
 FOUND = 2  # guesses returned
-FINEST = 0.02  # reach of the grid at the end, over the inverse length of the record
+FINEST = 0.001  # reach of the grid at the end, over the inverse length of the record
 FINER = 0.4  # of a grid's reach is that of the next, two of its steps: as rough as the cost is over a step
 STEPS = np.linspace(-1.0, 1.0, 11)
 SHIFTS = np.linspace(-1.0, 1.0, 5)
