@@ -67,10 +67,10 @@ def records(machine: Model, protocol=SHORT, seed: int = 0, **options) -> list[Re
     ]
 
 
-def search_of(fit: Fit, label: str) -> Search:
-    """A search that ended in this fit, whose model has one more element."""
+def search_of(fit: Fit, *labels: str) -> Search:
+    """A search that ended in this fit, whose model has these elements more."""
     cost = start_cost(fit.model, fit.run, fit.noise, fit.starts, fit.residuals, fit.differences[1])
     trial = Trial(
-        (label,), fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), True, fit.noise, fit.differences, cost
+        labels, fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), True, fit.noise, fit.differences, cost
     )  # fmt: skip
     return Search(fit, trial, fit, fit.noise, (trial,), (), ())

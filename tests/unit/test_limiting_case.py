@@ -3,8 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from machines import CATALOGUE, SHORT, hopper, records, search_of
+from rhythmid.diagnose.gate import faint, needed
 from rhythmid.diagnose.limiting_case import limiting_cases
 from rhythmid.diagnose.search import WORTH, Search
 from rhythmid.identify.noise import NoiseModel
@@ -57,3 +59,43 @@ def test_a_stop_that_does_as_well_with_a_tenth_of_its_stiffness_but_no_less_keep
     again = estimate(fit.model.with_parameters({name: softer}), fit.run.series, noise=NOISE, max_step=1e-3)
     assert again.chi2 < fit.chi2 + WORTH
     assert limiting_cases(search_of(fit, "end_stop_contact")) == []
+
+
+@pytest.mark.parametrize(
+    ("true", "values", "named", "begin", "told"),
+    [
+        (
+            "viscous_damper", {"damping": 0.8},
+            "position_dependent_damping", {"coefficient": 0.6, "reference": -1.0, "exponent": 2.0}, True,
+        ),
+        (
+            "position_dependent_damping", {"coefficient": 200.0, "reference": 0.12, "exponent": 2.0},
+            "position_dependent_damping", {"coefficient": 200.0, "reference": 0.12, "exponent": 2.0}, False,
+        ),
+    ],
+)  # fmt: skip
+def test_beside_another_effect_only_the_sum_is_determined_where_a_hundredth_of_the_size_does_as_well(
+    true, values, named, begin, told
+):
+    dry = CATALOGUE["coulomb_friction"], {"force": 0.05}
+    series = prepare(records(hopper().with_element(CATALOGUE[true], values).with_element(*dry), SHORT), 4)
+    model = hopper().with_element(CATALOGUE[named], begin).with_element(*dry)
+    fit = estimate(model, series, noise=NOISE, max_step=1e-3)
+    said = limiting_cases(search_of(fit, named, "coulomb_friction"))
+    sum_only = (
+        "only what position dependent damping and coulomb friction do together is determined, not the size of"
+    )
+    assert [sentence.startswith(sum_only) for sentence in said] == [True] * told
+
+
+def test_a_stop_of_hardly_determined_stiffness_keeps_its_name_beside_friction():
+    dry = CATALOGUE["coulomb_friction"], {"force": 0.05}
+    free = prepare(records(hopper().with_element(*dry), SHORT), 4)
+    hit = max(float(one.value.max()) for one in free) - 8e-4
+    values = {"stiffness": 3000.0, "damping_ratio": 0.1, "position": hit}
+    machine = hopper().with_element(CATALOGUE["end_stop_contact"], values).with_element(*dry)
+    known = machine.with_values({"input_delay.delay": 0.0203, "measurement_delay.delay": 0.0151})
+    fit = estimate(known, prepare(records(machine, SHORT), 4), noise=NOISE, max_step=1e-3)
+    found = search_of(fit, "end_stop_contact", "coulomb_friction")
+    assert faint(found, "end_stop_contact", needed(found.best))
+    assert limiting_cases(found) == []

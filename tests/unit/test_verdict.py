@@ -228,27 +228,6 @@ def test_effects_that_leave_what_a_further_one_explains_in_part_are_not_named(
     assert verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)[0] == expected
 
 
-@pytest.mark.parametrize(
-    ("stds", "expected"),
-    [
-        ({"cubic_stiffness.coefficient": 1.0, "coulomb_friction.force": 0.01}, "missing_physics"),
-        ({"cubic_stiffness.coefficient": 2.0, "coulomb_friction.force": 0.01}, "missing_physics"),
-        ({"cubic_stiffness.coefficient": 3.0, "coulomb_friction.force": 0.01}, "unknown_physics"),
-        ({"cubic_stiffness.coefficient": 9.0, "coulomb_friction.force": 0.08}, "unknown_physics"),
-        ({"cubic_stiffness.coefficient": np.inf, "coulomb_friction.force": np.inf}, "unknown_physics"),
-    ],
-)
-def test_effects_of_which_only_the_sum_is_determined_are_not_named(stds, expected):
-    best = several(hopper(), **CURVED_AND_DRY)
-    found = replace(explained(0.1, 0.01), best=best, trials=(best,))
-    found.fit.__dict__.update(std=stds, model=best.model)
-    verdict, why = verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)
-    assert verdict == expected
-    assert ("only what cubic stiffness and coulomb friction do together" in why) is (
-        expected == "unknown_physics"
-    )
-
-
 def test_effects_that_do_not_hold_on_held_out_data_are_not_named():
     verdict, why = verdict_of(explained(0.1, 0.01), 1e-9, [], [], None, [SERIES], 0.2)
     assert verdict == "unknown_physics"

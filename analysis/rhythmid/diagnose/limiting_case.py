@@ -2,13 +2,13 @@
 
 A damper that depends on position, about a point far outside the travel, is a plain damper: the further away the point, the
 smaller the coefficient. A stop that is touched once may do with a tenth of its stiffness and stays a stop, but not with a
-hundredth.
+hundredth. Beside other effects the limit may also be what these take over: of two lags in one path only the sum.
 """
 
 from dataclasses import replace
 
 from rhythmid.compiled import compile_model
-from rhythmid.diagnose.gate import faint
+from rhythmid.diagnose.gate import faint, needed
 from rhythmid.diagnose.refit import Proposal, fainter, run_trials
 from rhythmid.diagnose.search import WORTH, Search
 
@@ -18,17 +18,34 @@ DETERMINED = 20.0
 
 
 def limiting_cases(found: Search) -> list[str]:
-    """A sentence about each chosen effect of undetermined size of which nothing but a limit is determined."""
+    """A sentence about each chosen effect of undetermined size of which nothing but a limit is determined.
+
+    Beside others an effect has to be worth what the criterion asks of one more, for it was chosen for what they do together;
+    a descent that does not come to its end shows nothing there, and what the curvature says holds.
+    """
+    labels = found.best.added
+    asked = needed(found.best) if len(labels) > 1 else 0.0
     return [
-        f"{found.best.element(label).name.replace('_', ' ')} does as well with a hundredth of its size: "
-        "only what it tends to then is determined, and that is something else"
-        for label in found.best.added
-        if faint(found, label, DETERMINED) and _only_a_limit(found, label)
+        _sentence(found, label)
+        for label in labels
+        if faint(found, label, DETERMINED)
+        and _only_a_limit(found, label, max(WORTH, asked**2), faint(found, label, asked))
     ]
 
 
-def _only_a_limit(found: Search, label: str) -> bool:
-    """Whether the chosen model does as well with ever smaller sizes of an effect, all else fitted again for each."""
+def _sentence(found: Search, label: str) -> str:
+    words = {one: found.best.element(one).name.replace("_", " ") for one in found.best.added}
+    if len(words) > 1:
+        return f"only what {' and '.join(words.values())} do together is determined, not the size of {words[label]}"
+    return (
+        f"{words[label]} does as well with a hundredth of its size: "
+        "only what it tends to then is determined, and that is something else"
+    )
+
+
+def _only_a_limit(found: Search, label: str, margin: float, unless_shown: bool) -> bool:
+    """Whether ever smaller sizes of an effect cost the chosen model less than `margin` of chi2, all else fitted again for
+    each; `unless_shown` where a descent did not come to its end."""
     fit, element = found.fit, found.best.element(label)
     known = compile_model(fit.model).layout.states
     name = f"{label}.{element.size}"
@@ -42,7 +59,9 @@ def _only_a_limit(found: Search, label: str) -> bool:
             ({},),
         )
         trials, _ = run_trials([held], fit.run.series, starts, known, fit.noise, fit.run.max_step)
-        if not trials or trials[0].chi2 >= fit.chi2 + WORTH:
+        if not trials:
             return False
+        if trials[0].chi2 >= fit.chi2 + margin:
+            return unless_shown and not trials[0].converged
         model, starts = trials[0].model, trials[0].starts
     return True

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rhythmid.diagnose.gate import faint, needed
 from rhythmid.diagnose.line_test import strongest_line
 from rhythmid.diagnose.locate import Dependence
 from rhythmid.diagnose.result import Verdict
@@ -128,16 +127,6 @@ def _of_names(
         return (
             "undecided",
             f"{terms} do it together, and {law} that the catalogue does not have would do it, too",
-        )
-    # nearer to its absence than the criterion asks of one more parameter, an effect would do as well in the limit that
-    # its other parameters leave: as the gain that a curvature around a point far away is. One alone is determined by what
-    # else it does: a stop touched once by where it is
-    sizeless = [label for label in found.best.added if faint(found, label, needed(found.best))]
-    if sizeless and len(found.best.added) > 1:
-        return (
-            "unknown_physics",
-            f"only what {_words(found, found.best.added)} do together is determined, not the size of "
-            f"{_words(found, sizeless)}",
         )
     named = {found.best.element(label).name for label in found.best.added}
     if any(math.comb(len(group), len(named.intersection(group))) > TWINS for group in twins):
