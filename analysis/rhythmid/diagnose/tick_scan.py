@@ -32,6 +32,7 @@ BAND = 0.5
 SLOW = 2.5  # times the slowest rate, up to which rates join the band
 MOST = 3000  # rates tried over the first stretch
 SERIES = 2  # looked at, those with the strongest command at first
+SLOWEST = 2.0  # times the dominant frequency of the motion
 FASTEST = 100.0  # [Hz] beyond which a hold is little but a delay, and its ticks do not matter
 FOLLOWED, LEAST = 24, 6  # rates that are followed at first and in the end
 APART = 0.25  # over the length looked at, within which two rates are one
@@ -55,7 +56,7 @@ def scanned(
     ]
     if mean <= 0.0 or not driven:
         return []
-    slowest = max(0.45 / mean, 4.0 * max(dominant_frequency(one) for one, _ in driven))
+    slowest = max(0.45 / mean, SLOWEST * max(dominant_frequency(one) for one, _ in driven))
     fastest = min(FASTEST, 0.5 / max(one.period for one, _ in driven))
     if slowest >= fastest:
         return []
