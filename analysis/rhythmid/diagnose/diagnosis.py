@@ -40,6 +40,7 @@ from rhythmid.diagnose.screen import trajectories
 from rhythmid.diagnose.search import WORTH, Search, search
 from rhythmid.diagnose.stand_ins import stand_ins
 from rhythmid.diagnose.sufficiency import check_driven, tempered, without_clipped
+from rhythmid.diagnose.tick_interval import ticks_followed
 from rhythmid.diagnose.twins import twins_of
 from rhythmid.diagnose.units import check_units
 from rhythmid.diagnose.verdict import significant, verdict_of
@@ -162,7 +163,7 @@ def _diagnosed(
     ]
     found = finely_stepped(found, pool)
     imitating += limiting_cases(found)
-    found = profiled(found, pool)
+    found = ticks_followed(profiled(found, pool), pool)
     tell("locating the mismatch")
     before = dependences(trajectories(found.nominal), pool)
     after = dependences(trajectories(found.fit), pool) if found.best.added else before

@@ -64,7 +64,7 @@ def profiled(found: Search, pool: ThreadPoolExecutor | None = None) -> Search:
         if better is None:
             break
         found = better
-    return replace(found, fit=_widened(found.fit, reach))
+    return replace(found, fit=widened(found.fit, reach))
 
 
 def _places(found: Search) -> list[int]:
@@ -217,15 +217,18 @@ def _descended(found: Search, model: Model, pool: ThreadPoolExecutor | None) -> 
         return None
     if again.chi2 > fit.chi2 - FALLS:
         return None
-    best = replace(
-        found.best, model=again.model, starts=again.starts, chi2=again.chi2, converged=again.converged
-    )
+    return settled_at(found, again)
+
+
+def settled_at(found: Search, fit: Fit) -> Search:
+    """The search with another fit of its chosen model."""
+    best = replace(found.best, model=fit.model, starts=fit.starts, chi2=fit.chi2, converged=fit.converged)
     trials = tuple(best if trial is found.best else trial for trial in found.trials)
-    return replace(found, fit=again, best=best, trials=trials)
+    return replace(found, fit=fit, best=best, trials=trials)
 
 
-def _widened(fit: Fit, reach: Array) -> Fit:
-    """The fit with intervals that hold what is likely; an undetermined parameter leaves the others alone."""
+def widened(fit: Fit, reach: Array) -> Fit:
+    """The fit with 95 % intervals of at least this half-width (p,); an undetermined parameter leaves the others alone."""
     std = np.sqrt(np.diag(fit.covariance))
     factors = np.ones(len(std))
     known = (std > 0.0) & np.isfinite(std)

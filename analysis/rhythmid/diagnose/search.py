@@ -38,6 +38,8 @@ from rhythmid.diagnose.screen import (
     trajectories,
     under,
 )
+from rhythmid.diagnose.tick_likelihood import ticks_sought
+from rhythmid.diagnose.tick_scan import HOLD
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import accurate
@@ -244,8 +246,13 @@ def search(
             if finer.max_step < 0.45 * fine_enough(top.model, step):
                 step = finer.max_step
                 fit = whole_fit(replace(top, converged=False), series, here.noise, step, pool=pool)
+            sought = top
+            if HOLD in top.added:
+                fit = ticks_sought(fit, floor, pool)
+                sought = replace(top, model=fit.model, starts=fit.starts, converged=False)
+            others = [trial for trial in candidates if trial.added != top.added]
             settled = noise_of(fit.residuals, series, floor)
-            compared = under_noise([*candidates, best], series, settled, step)
+            compared = under_noise([sought, *others, best], series, settled, step)
             trials |= {tuple(sorted(t.added)): t for t in compared}
             winner = compared[0]
             before = next((t for t in compared if t.added == best.added), best)
