@@ -247,7 +247,7 @@ def search(
                 step = finer.max_step
                 fit = whole_fit(replace(top, converged=False), series, here.noise, step, pool=pool)
             sought = top
-            if HOLD in top.added:
+            if HOLD in top.added[-2:]:  # and once more beside what came after it
                 fit = ticks_sought(fit, floor, pool)
                 sought = replace(top, model=fit.model, starts=fit.starts, converged=False)
             others = [trial for trial in candidates if trial.added != top.added]
