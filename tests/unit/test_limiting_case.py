@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, SHORT, hopper, records, search_of
+from rhythmid.diagnose import limiting_case
 from rhythmid.diagnose.gate import faint, needed
 from rhythmid.diagnose.limiting_case import limiting_cases
 from rhythmid.diagnose.search import WORTH, Search
@@ -99,3 +100,23 @@ def test_a_stop_of_hardly_determined_stiffness_keeps_its_name_beside_friction():
     found = search_of(fit, "end_stop_contact", "coulomb_friction")
     assert faint(found, "end_stop_contact", needed(found.best))
     assert limiting_cases(found) == []
+
+
+@pytest.mark.parametrize(
+    ("std", "converged", "told"), [(0.02, False, True), (0.02, True, False), (0.001, False, False)]
+)
+def test_a_descent_that_does_not_come_to_its_end_leaves_a_faint_size_undetermined(
+    monkeypatch, std, converged, told
+):
+    values = {"coulomb_friction": {"force": 0.05}, "cubic_stiffness": {"coefficient": 500.0}}
+    machine = hopper()
+    for name, given in values.items():
+        machine = machine.with_element(CATALOGUE[name], given)
+    fit = estimate(machine, prepare(records(machine, SHORT[:1]), 4), noise=NOISE, max_step=1e-3)
+    variances = np.full(len(fit.names), 1e-12)
+    variances[fit.names.index("coulomb_friction.force")] = std**2
+    found = search_of(replace(fit, covariance=np.diag(variances)), *values)
+    worse = replace(found.best, chi2=fit.chi2 + 1000.0, converged=converged)
+    monkeypatch.setattr(limiting_case, "run_trials", lambda *_: ([worse], []))
+    said = limiting_cases(found)
+    assert [sentence.endswith("not the size of coulomb friction") for sentence in said] == [True] * told

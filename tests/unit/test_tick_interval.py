@@ -70,3 +70,11 @@ def test_a_model_without_a_free_period_is_left_alone():
     found = search_of(fit, "command_hold")
     assert ticks_followed(found) is found
     assert ticks_sought(fit, 1e-9) is fit
+
+
+def test_a_period_that_alone_is_free_is_followed_too():
+    model = held(**{PERIOD: TRUE[PERIOD] + 2e-6})
+    fixed = {name: replace(model.parameters[name], fixed=True) for name in model.free if name != PERIOD}
+    fit = estimate(model.with_parameters(fixed), [recorded(0)], noise=NOISE, max_step=STEP)
+    found = ticks_followed(search_of(fit, "command_hold"))
+    assert abs(found.fit.model.value(PERIOD) - TRUE[PERIOD]) < 3.0 * found.fit.std[PERIOD] < 1e-5
