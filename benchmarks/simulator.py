@@ -25,8 +25,8 @@ from scipy.integrate import solve_ivp
 import rhythmid
 from rhythmid.experiment import Forcing, Noise, plant_model
 from rhythmid.model import Model
-from rhythmid.signal import PPoly, zero_order_hold
-from rhythmid.simulate import MAX_STEP, simulate
+from rhythmid.simulation.signal import PPoly, zero_order_hold
+from rhythmid.simulation.simulate import MAX_STEP, simulate
 
 PERIOD = 1e-3
 START = (0.15, 0.0)
@@ -177,7 +177,7 @@ import time
 begin = time.perf_counter()
 import numpy as np
 from rhythmid.model import Model
-from rhythmid.simulate import simulate
+from rhythmid.simulation.simulate import simulate
 text = '''{text}'''
 imported = time.perf_counter()
 model = Model.from_text(text)

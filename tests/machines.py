@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from rhythmid.diagnose.refit import Trial
-from rhythmid.diagnose.search import Search
+from rhythmid.diagnose.search.forward import Search
+from rhythmid.diagnose.search.refit import Trial
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.excitation.sequence import build
 from rhythmid.experiment import Delay, Experiment, Forcing, Noise, TimeMode, perform

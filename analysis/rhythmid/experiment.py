@@ -220,7 +220,9 @@ def perform(experiment: Experiment) -> dict[str, Messages]:
 
     Equals the graph's lockstep run, sample by sample and stamp by stamp. Raises InputError for a run too long to keep.
     """
-    from rhythmid.plant import Plant  # the compiler behind it is slow to load, and most nodes need no plant
+    from rhythmid.simulation.plant import (
+        Plant,  # the compiler behind it is slow to load, and most nodes need no plant
+    )
 
     if experiment.count > LONGEST:
         raise InputError(

@@ -3,7 +3,7 @@
     python -m rhythmid.warm_up
 
 A short run of each goes through the code that a user will call, so that nothing has to be listed here. The machine code is
-kept (see `rhythmid.machine_code.cache_folder`); a second warm-up takes some seconds.
+kept (see `rhythmid.simulation.machine_code.cache_folder`); a second warm-up takes some seconds.
 """
 
 import sys
@@ -15,9 +15,9 @@ import numpy as np
 
 from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment, perform
-from rhythmid.machine_code import cache_folder
 from rhythmid.parallel import fork_map
 from rhythmid.record.record import Channel, Record
+from rhythmid.simulation.machine_code import cache_folder
 
 EXPERIMENT = """
 model: paper_hopper.yaml

@@ -15,8 +15,8 @@ import numpy as np
 
 from rhythmid.identify.latency import Latency
 from rhythmid.model import Model
-from rhythmid.signal import spline, zero_order_hold
-from rhythmid.simulate import simulate
+from rhythmid.simulation.signal import spline, zero_order_hold
+from rhythmid.simulation.simulate import simulate
 
 PERIOD = 0.005  # s, of the controller
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from rhythmid.diagnose.answer.present import present
 from rhythmid.diagnose.diagnosis import diagnose
-from rhythmid.diagnose.present import present
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.experiment import Experiment, perform
 from rhythmid.identify.identify import paper_hopper

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper, records
+from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.diagnosis import diagnose
-from rhythmid.diagnose.result import Diagnosis
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.calibrate import calibrate, reconstructed
+from rhythmid.diagnose.baseline import calibrate, reconstructed
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.noise import NoiseModel

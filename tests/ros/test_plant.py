@@ -12,7 +12,7 @@ from std_msgs.msg import Header
 from rhythmid.errors import InputError
 from rhythmid.experiment import Forcing, Noise, plant_model
 from rhythmid.model import Model
-from rhythmid.plant import Plant
+from rhythmid.simulation.plant import Plant
 from rhythmid_nodes.lockstep import ACK_TOPIC
 from rhythmid_nodes.plant import PlantNode
 from rhythmid_nodes.qos import latched, stream

@@ -14,8 +14,8 @@ from rhythmid.elements.element import Scales
 from rhythmid.experiment import Experiment, perform
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
-from rhythmid.signal import zero_order_hold
-from rhythmid.simulate import Trajectory, simulate
+from rhythmid.simulation.signal import zero_order_hold
+from rhythmid.simulation.simulate import Trajectory, simulate
 
 HOPPER = """
 inertia: {mass: {value: 1.0, unit: kg, fixed: true}}

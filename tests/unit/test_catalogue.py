@@ -9,7 +9,7 @@ from rhythmid.elements.catalogue import BUILT_IN, load_catalogue
 from rhythmid.elements.element import SLOTS, Element, Parameter
 from rhythmid.errors import InputError
 from rhythmid.model import Model
-from rhythmid.simulate import simulate
+from rhythmid.simulation.simulate import simulate
 
 INERTER = '''\
 """Inerter: F = -b dv/dt, here driven by the actuator alone as F = -b/(m + b) f."""

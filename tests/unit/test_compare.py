@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper, record
-from rhythmid.diagnose.align import align
-from rhythmid.diagnose.compare import Comparison, compare
+from rhythmid.compare.align import align
+from rhythmid.compare.compare import Comparison, compare
 from rhythmid.errors import InputError
 from rhythmid.record.record import Channel, Record
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper
-from rhythmid.compiled import compile_model
-from rhythmid.effect import Path, effect_along
 from rhythmid.errors import InputError
-from rhythmid.signal import first_order_hold
-from rhythmid.simulate import simulate, start_states
+from rhythmid.simulation.compiled import compile_model
+from rhythmid.simulation.effect import Path, effect_along
+from rhythmid.simulation.signal import first_order_hold
+from rhythmid.simulation.simulate import simulate, start_states
 
 T = np.arange(4000) * 1e-3
 X = 0.2 + 0.01 * np.sin(2 * np.pi * 1.3 * T)

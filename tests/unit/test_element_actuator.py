@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rhythmid.signal import spline
+from rhythmid.simulation.signal import spline
 
 
 def fundamental(rig, name, values, amplitude, harmonic=1):

@@ -9,9 +9,9 @@ import pytest
 from machines import hopper
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.model import Model
-from rhythmid.plant import Plant
-from rhythmid.signal import spline, zero_order_hold
-from rhythmid.simulate import simulate
+from rhythmid.simulation.plant import Plant
+from rhythmid.simulation.signal import spline, zero_order_hold
+from rhythmid.simulation.simulate import simulate
 
 CATALOGUE = load_catalogue()
 NOMINAL = ("gravity", "linear_spring", "switched_damper", "input_delay", "measurement_delay")

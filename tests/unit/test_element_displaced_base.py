@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.screen import changes_of, guesses, trajectories
+from rhythmid.diagnose.search.score_tests import changes_of, guesses, trajectories
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.free_run import prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel

@@ -8,8 +8,8 @@ import pytest
 from machines import CATALOGUE, SHORT, hopper, records, search_of
 from rhythmid.diagnose import elsewhere as module
 from rhythmid.diagnose.elsewhere import elsewhere
-from rhythmid.diagnose.refit import Trial
-from rhythmid.diagnose.search import Search
+from rhythmid.diagnose.search.forward import Search
+from rhythmid.diagnose.search.refit import Trial
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare

@@ -12,8 +12,8 @@ from hypothesis import strategies as some
 import rhythmid
 from rhythmid.errors import InputError
 from rhythmid.experiment import Delay, Experiment, Forcing, perform, ramped
-from rhythmid.signal import zero_order_hold
-from rhythmid.simulate import simulate
+from rhythmid.simulation.signal import zero_order_hold
+from rhythmid.simulation.simulate import simulate
 
 PAPER = Path(rhythmid.__file__).parent / "models" / "paper_hopper.yaml"
 MS = 1_000_000

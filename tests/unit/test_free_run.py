@@ -8,8 +8,8 @@ from machines import CATALOGUE, hopper
 from rhythmid.identify.free_run import _delay_of, prepare_run, start_of
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
-from rhythmid.signal import spline, zero_order_hold
-from rhythmid.simulate import simulate
+from rhythmid.simulation.signal import spline, zero_order_hold
+from rhythmid.simulation.simulate import simulate
 
 PERIOD, N = 1e-3, 1500
 TIME = PERIOD * np.arange(N)

@@ -10,8 +10,8 @@ import pytest
 
 from machines import CATALOGUE, hopper
 from rhythmid.diagnose.gate import NEEDED, admitted, faint
-from rhythmid.diagnose.refit import Trial
-from rhythmid.diagnose.search import Search
+from rhythmid.diagnose.search.forward import Search
+from rhythmid.diagnose.search.refit import Trial
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit
 

@@ -7,7 +7,7 @@ import pytest
 
 from machines import CATALOGUE, SHORT, hopper, records, search_of
 from rhythmid.diagnose.given_value import wrong_value
-from rhythmid.diagnose.search import Search
+from rhythmid.diagnose.search.forward import Search
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare

@@ -9,7 +9,7 @@ from machines import CATALOGUE, SHORT, hopper, records, search_of
 from rhythmid.diagnose import limiting_case
 from rhythmid.diagnose.gate import faint, needed
 from rhythmid.diagnose.limiting_case import limiting_cases
-from rhythmid.diagnose.search import WORTH, Search
+from rhythmid.diagnose.search.forward import WORTH, Search
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare

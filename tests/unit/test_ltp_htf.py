@@ -11,8 +11,8 @@ from rhythmid.ltp.linearisation import linearise
 from rhythmid.ltp.piecewise_lti import hybrid_spring_mass_damper
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
-from rhythmid.signal import spline
-from rhythmid.simulate import simulate
+from rhythmid.simulation.signal import spline
+from rhythmid.simulation.simulate import simulate
 
 PUMPING = Pumping.cosine(1.0, 1.0)
 SIDEBANDS = np.arange(-2, 3)

@@ -6,8 +6,8 @@ import pytest
 from rhythmid.errors import InputError
 from rhythmid.ltp.limit_cycle import limit_cycle
 from rhythmid.ltp.pumping import Pumping
-from rhythmid.signal import spline
-from rhythmid.simulate import simulate
+from rhythmid.simulation.signal import spline
+from rhythmid.simulation.simulate import simulate
 
 PUMPING = Pumping.cosine(1.0, 1.0)
 

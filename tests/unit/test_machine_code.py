@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rhythmid.machine_code import Module, load_run
+from rhythmid.simulation.machine_code import Module, load_run
 
 
 def test_threads_that_ask_for_a_module_at_once_get_the_same_whole_one(

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rhythmid.diagnose.next_experiment import _menu
+from rhythmid.diagnose.answer.next_experiment import _menu
 from rhythmid.excitation.sequence import build
 
 

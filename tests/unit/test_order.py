@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, SHORT, hopper, records
-from rhythmid.diagnose.order import in_best_order, other_orders
-from rhythmid.diagnose.refit import Trial
+from rhythmid.diagnose.search.order import in_best_order, other_orders
+from rhythmid.diagnose.search.refit import Trial
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare
@@ -79,5 +79,5 @@ def test_forces_are_not_tried_in_another_order(monkeypatch):
     model = chained("actuator_lag").with_element(CATALOGUE["cubic_stiffness"], {"coefficient": 100.0})
     series = prepare(records(model, SHORT[2:]), 4)
     begin = trial_of(model, ("actuator_lag", "cubic_stiffness"), series, 1)
-    monkeypatch.setattr("rhythmid.diagnose.order.run_trials", None)
+    monkeypatch.setattr("rhythmid.diagnose.search.order.run_trials", None)
     assert in_best_order(replace(begin), series, NOISE, 1e-3) == begin

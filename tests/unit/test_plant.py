@@ -12,9 +12,9 @@ from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.experiment import Forcing, Noise, plant_model
 from rhythmid.model import Model
-from rhythmid.plant import Plant, Samples, settled_state
-from rhythmid.signal import zero_order_hold
-from rhythmid.simulate import simulate
+from rhythmid.simulation.plant import Plant, Samples, settled_state
+from rhythmid.simulation.signal import zero_order_hold
+from rhythmid.simulation.simulate import simulate
 
 CATALOGUE = load_catalogue()
 PAPER = Model.load(Path(rhythmid.__file__).parent / "models" / "paper_hopper.yaml", CATALOGUE)

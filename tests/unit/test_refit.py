@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper
-from rhythmid.diagnose import refit
-from rhythmid.diagnose.refit import Proposal, Trial, propose, run_trials
+from rhythmid.diagnose.search import refit
+from rhythmid.diagnose.search.refit import Proposal, Trial, propose, run_trials
 from rhythmid.identify.descent import Descent
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series

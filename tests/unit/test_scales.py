@@ -7,7 +7,7 @@ import pytest
 
 from machines import CATALOGUE, hopper
 from rhythmid.identify.series import Series, scales
-from rhythmid.signal import spline
+from rhythmid.simulation.signal import spline
 
 
 def forced(frequency: float, seconds: float) -> Series:

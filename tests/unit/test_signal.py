@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from rhythmid.signal import (
+from rhythmid.simulation.signal import (
     FAR,
     band_limited,
     continuous,

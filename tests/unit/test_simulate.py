@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model
-from rhythmid.signal import first_order_hold, spline, zero_order_hold
-from rhythmid.simulate import MAX_STEP, simulate
+from rhythmid.simulation.signal import first_order_hold, spline, zero_order_hold
+from rhythmid.simulation.simulate import MAX_STEP, simulate
 
 HOPPER = Model.from_text(
     """
@@ -210,7 +210,7 @@ def test_elements_act_along_the_path_in_their_order():
 
 
 def test_models_that_differ_in_values_share_one_compiled_function():
-    from rhythmid.compiled import compile_model
+    from rhythmid.simulation.compiled import compile_model
 
     assert (
         compile_model(HOPPER).run is compile_model(HOPPER.with_values({"linear_spring.stiffness": 9.0})).run

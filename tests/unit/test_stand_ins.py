@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper
-from rhythmid.diagnose.screen import Trajectories
+from rhythmid.diagnose.search.score_tests import Trajectories
 from rhythmid.diagnose.stand_ins import stand_ins
-from rhythmid.effect import Path
 from rhythmid.elements.element import Scales
+from rhythmid.simulation.effect import Path
 
 SIZES = Scales(
     position=0.02, velocity=0.1, effort=4.0, centre=0.1, low=0.07, high=0.13, mass=1.0, stiffness=200.0,

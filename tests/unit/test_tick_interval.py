@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper, search_of
-from rhythmid.diagnose.tick_interval import ticks_followed
-from rhythmid.diagnose.tick_likelihood import ticks_sought
-from rhythmid.diagnose.tick_scan import DELAY, PERIOD
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate
+from rhythmid.identify.sample_clock.tick_interval import ticks_followed
+from rhythmid.identify.sample_clock.tick_likelihood import ticks_sought
+from rhythmid.identify.sample_clock.tick_scan import DELAY, PERIOD
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
-from rhythmid.signal import zero_order_hold
-from rhythmid.simulate import simulate
+from rhythmid.simulation.signal import zero_order_hold
+from rhythmid.simulation.simulate import simulate
 
 SAMPLE, DURATION, STEP = 1e-3, 12.0, 2e-3
 TRUE = {DELAY: 0.0130457, PERIOD: 0.0812347}

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper
-from rhythmid.diagnose.tick_scan import DELAY, PERIOD, scanned
 from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.sample_clock.tick_scan import DELAY, PERIOD, scanned
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
-from rhythmid.signal import zero_order_hold
-from rhythmid.simulate import simulate
+from rhythmid.simulation.signal import zero_order_hold
+from rhythmid.simulation.simulate import simulate
 
 SAMPLE, DURATION, STEP = 1e-3, 12.0, 2e-3
 TRUE = {DELAY: 0.0130457, PERIOD: 0.0812347}

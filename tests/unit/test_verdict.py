@@ -9,11 +9,11 @@ import pytest
 
 from machines import CATALOGUE, hopper
 from rhythmid.diagnose.heldout import HeldOut
-from rhythmid.diagnose.locate import Dependence
-from rhythmid.diagnose.refit import Trial
-from rhythmid.diagnose.round import Round
-from rhythmid.diagnose.screen import Score
-from rhythmid.diagnose.search import Search
+from rhythmid.diagnose.location import Dependence
+from rhythmid.diagnose.search.forward import Search
+from rhythmid.diagnose.search.refit import Trial
+from rhythmid.diagnose.search.round import Round
+from rhythmid.diagnose.search.score_tests import Score
 from rhythmid.diagnose.twins import twins_of
 from rhythmid.diagnose.verdict import verdict_of
 from rhythmid.identify.noise import NoiseModel

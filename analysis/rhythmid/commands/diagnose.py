@@ -73,7 +73,7 @@ def diagnose(
             console.print(f"[dim]{what}[/]")
 
         if simulation is not None:
-            from rhythmid.diagnose.compare import compare
+            from rhythmid.compare.compare import compare
 
             comparison = compare(simulation, records, nominal, tell)
             result["comparison"] = comparison.to_dict()
@@ -90,7 +90,7 @@ def diagnose(
     if save_model is not None and answer is not None:
         answer.model.save(save_model)
     if report is not None:
-        from rhythmid.diagnose.present import present, present_comparison
+        from rhythmid.diagnose.answer.present import present, present_comparison
         from rhythmid.report.page import write_page
 
         if answer is not None and nominal is not None and model is not None:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.signal import fast_length
+from rhythmid.simulation.signal import fast_length
 
 Array = NDArray[np.float64]
 Lines = NDArray[np.int64]

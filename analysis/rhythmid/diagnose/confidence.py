@@ -6,7 +6,7 @@ stated here is how often a name was right, in a bank of concealed effects, when 
 
 import math
 
-from rhythmid.diagnose.search import Search
+from rhythmid.diagnose.search.forward import Search
 
 # (lead over the nearest rival in the criterion, share of names that were right with at least that lead): of 158 names
 # given in the concealed proof's single cases of seeds 31121, 77121, 50001 and 60602, 131 of 134 were right with a lead of

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from rhythmid.diagnose.search import Search
+from rhythmid.diagnose.search.forward import Search
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.output_error import Fit, minimise

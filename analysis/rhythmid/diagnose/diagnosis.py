@@ -13,20 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from rhythmid.diagnose.calibrate import Calibration, causal
-from rhythmid.diagnose.confidence import probabilities
-from rhythmid.diagnose.delays import delays_of
-from rhythmid.diagnose.elsewhere import elsewhere
-from rhythmid.diagnose.exclusions import unscored
-from rhythmid.diagnose.fine_steps import finely_stepped
-from rhythmid.diagnose.gate import admitted
-from rhythmid.diagnose.given_value import wrong_value
-from rhythmid.diagnose.heldout import HeldOut, tail_error
-from rhythmid.diagnose.limiting_case import limiting_cases
-from rhythmid.diagnose.locate import Dependence, dependences
-from rhythmid.diagnose.next_experiment import next_experiment
-from rhythmid.diagnose.profile import profiled
-from rhythmid.diagnose.result import (
+from rhythmid.diagnose.admission import check_driven, tempered, without_clipped
+from rhythmid.diagnose.answer.next_experiment import next_experiment
+from rhythmid.diagnose.answer.result import (
     Alternative,
     Detection,
     Diagnosis,
@@ -35,16 +24,26 @@ from rhythmid.diagnose.result import (
     MissingEffect,
     Remainder,
 )
+from rhythmid.diagnose.answer.wording import location_of, recalibrated, summary_of
+from rhythmid.diagnose.baseline import Calibration, causal
+from rhythmid.diagnose.confidence import probabilities
+from rhythmid.diagnose.delays import delays_of
+from rhythmid.diagnose.elsewhere import elsewhere
+from rhythmid.diagnose.exclusions import unscored
+from rhythmid.diagnose.fine_steps import finely_stepped
+from rhythmid.diagnose.gate import admitted
+from rhythmid.diagnose.given_value import wrong_value
+from rhythmid.diagnose.heldout import HeldOut, tail_error
+from rhythmid.diagnose.intervals import profiled
+from rhythmid.diagnose.limiting_case import limiting_cases
+from rhythmid.diagnose.location import Dependence, dependences
 from rhythmid.diagnose.scoring import Scoring, settle
-from rhythmid.diagnose.screen import trajectories
-from rhythmid.diagnose.search import WORTH, Search, search
+from rhythmid.diagnose.search.forward import WORTH, Search, search
+from rhythmid.diagnose.search.score_tests import trajectories
 from rhythmid.diagnose.stand_ins import stand_ins
-from rhythmid.diagnose.sufficiency import check_driven, tempered, without_clipped
-from rhythmid.diagnose.tick_interval import ticks_followed
 from rhythmid.diagnose.twins import twins_of
-from rhythmid.diagnose.units import check_units
+from rhythmid.diagnose.unit_check import check_units
 from rhythmid.diagnose.verdict import significant, verdict_of
-from rhythmid.diagnose.wording import location_of, recalibrated, summary_of
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import drive_of, driven
@@ -52,12 +51,13 @@ from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.repeats import noise_from_repeats
+from rhythmid.identify.sample_clock.tick_interval import ticks_followed
 from rhythmid.identify.series import Series, prepare, scales
 from rhythmid.model import Model
 from rhythmid.parallel import cores
 from rhythmid.progress import Tell
+from rhythmid.record.outlier import without_stray
 from rhythmid.record.record import Record
-from rhythmid.record.stray import without_stray
 
 Array = NDArray[np.float64]
 SHOWN = 8  # alternatives listed

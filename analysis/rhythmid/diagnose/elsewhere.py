@@ -8,13 +8,13 @@ in another stands in for it, down to the noise nearly.
 from collections.abc import Iterator
 from dataclasses import replace
 
-from rhythmid.compiled import compile_model
-from rhythmid.diagnose.refit import Proposal, propose, run_trials
-from rhythmid.diagnose.search import WORTH, Search
+from rhythmid.diagnose.search.forward import WORTH, Search
+from rhythmid.diagnose.search.refit import Proposal, propose, run_trials
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Slot
-from rhythmid.generated_source import DRIVES
 from rhythmid.model import Term
+from rhythmid.simulation.compiled import compile_model
+from rhythmid.simulation.generated_source import DRIVES
 
 PLACES: dict[Slot, str] = {
     "command": "in the command path",

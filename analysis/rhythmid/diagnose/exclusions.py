@@ -4,8 +4,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from rhythmid.diagnose.screen import change_of_output, guesses, sizes_along, trajectories
-from rhythmid.diagnose.search import Search
+from rhythmid.diagnose.search.forward import Search
+from rhythmid.diagnose.search.score_tests import change_of_output, guesses, sizes_along, trajectories
 from rhythmid.elements.catalogue import Catalogue
 
 

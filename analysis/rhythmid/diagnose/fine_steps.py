@@ -7,7 +7,7 @@ error is the same in every period of the motion, and over ten thousand samples a
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
-from rhythmid.diagnose.search import Search
+from rhythmid.diagnose.search.forward import Search
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import accurate
 from rhythmid.identify.output_error import INTEGRATION, minimise

@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
-from rhythmid.compiled import compile_model
 from rhythmid.diagnose.heldout import HeldOut
-from rhythmid.diagnose.refit import Proposal, Trial, run_trials, whole_fit
-from rhythmid.diagnose.search import WORTH, Search
+from rhythmid.diagnose.search.forward import WORTH, Search
+from rhythmid.diagnose.search.refit import Proposal, Trial, run_trials, whole_fit
 from rhythmid.errors import InputError
 from rhythmid.identify.series import Series
+from rhythmid.simulation.compiled import compile_model
 
 FAINT = 3.0  # standard deviations from its absence, nearer than which an effect's size is no size
 # chi2 that an effect is worth, from which its size is only badly parted from its other parameters

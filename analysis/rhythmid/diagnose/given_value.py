@@ -6,10 +6,10 @@ A second mode, a mass on the mass, is like it altogether where it is fast, so th
 
 from dataclasses import replace
 
-from rhythmid.compiled import compile_model
-from rhythmid.diagnose.refit import Proposal, run_trials
-from rhythmid.diagnose.search import WORTH, Search
+from rhythmid.diagnose.search.forward import WORTH, Search
+from rhythmid.diagnose.search.refit import Proposal, run_trials
 from rhythmid.model import INERTIA, Model
+from rhythmid.simulation.compiled import compile_model
 
 BESIDE = 2  # effects at most
 

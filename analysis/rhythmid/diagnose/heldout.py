@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.diagnose.refit import Trial, fine_enough
-from rhythmid.diagnose.search import Search
+from rhythmid.diagnose.search.forward import Search
+from rhythmid.diagnose.search.refit import Trial, fine_enough
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.noise import runs

@@ -7,10 +7,10 @@ hundredth. Beside other effects the limit may also be what these take over: of t
 
 from dataclasses import replace
 
-from rhythmid.compiled import compile_model
 from rhythmid.diagnose.gate import faint, needed
-from rhythmid.diagnose.refit import Proposal, fainter, run_trials
-from rhythmid.diagnose.search import WORTH, Search
+from rhythmid.diagnose.search.forward import WORTH, Search
+from rhythmid.diagnose.search.refit import Proposal, fainter, run_trials
+from rhythmid.simulation.compiled import compile_model
 
 SMALLER = 0.1, 0.01  # shares of its size, with both of which a limit does as well
 # standard deviations from its absence from which a size is determined; in the bent valley towards a limit they are too small

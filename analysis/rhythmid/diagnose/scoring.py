@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from rhythmid.diagnose.calibrate import FOLLOWS, Calibration, calibrate, reconstructed
+from rhythmid.diagnose.baseline import FOLLOWS, Calibration, calibrate, reconstructed
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.force_scoring import observed

@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.diagnose.screen import Trajectories
+from rhythmid.diagnose.search.score_tests import Trajectories
 from rhythmid.diagnose.static_law import SAME, curved
-from rhythmid.effect import Path, effect_along
 from rhythmid.elements.element import Element, Scales
 from rhythmid.model import Term
+from rhythmid.simulation.effect import Path, effect_along
 
 Array = NDArray[np.float64]
 POINTS = 400  # instants at which an effect is tried

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.diagnose.refit import Trial
-from rhythmid.effect import Path, effect_along
+from rhythmid.diagnose.search.refit import Trial
 from rhythmid.elements.element import Element, Scales
 from rhythmid.model import Model
+from rhythmid.simulation.effect import Path, effect_along
 
 Array = NDArray[np.float64]
 POINTS = 400  # instants at which an effect is tried

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from rhythmid.diagnose.refit import Trial
+from rhythmid.diagnose.search.refit import Trial
 from rhythmid.model import Model
 
 

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rhythmid.diagnose.answer.result import Verdict
 from rhythmid.diagnose.line_test import strongest_line
-from rhythmid.diagnose.locate import Dependence
-from rhythmid.diagnose.result import Verdict
-from rhythmid.diagnose.search import LEVEL, MOST, WORTH, Search
+from rhythmid.diagnose.location import Dependence
+from rhythmid.diagnose.search.forward import LEVEL, MOST, WORTH, Search
 from rhythmid.diagnose.static_law import sum_of_laws
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series, dominant_frequency, scales

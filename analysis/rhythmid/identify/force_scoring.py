@@ -18,7 +18,7 @@ from scipy.interpolate import PPoly
 from rhythmid.identify.observer import Observer
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
-from rhythmid.signal import spline
+from rhythmid.simulation.signal import spline
 
 Array = NDArray[np.float64]
 FINER = 4  # times as many averages a second in the motion that pulls as in those that are compared

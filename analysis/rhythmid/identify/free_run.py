@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
-from rhythmid.compiled import Compiled, compile_model
 from rhythmid.elements.element import STEP
 from rhythmid.errors import InputError
-from rhythmid.generated_source import InputKind, OutputKind
 from rhythmid.identify.observer import tied, with_observer
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
-from rhythmid.signal import impulse_preserving, pieces
-from rhythmid.simulate import physical_times, start_states
+from rhythmid.simulation.compiled import Compiled, compile_model
+from rhythmid.simulation.generated_source import InputKind, OutputKind
+from rhythmid.simulation.signal import impulse_preserving, pieces
+from rhythmid.simulation.simulate import physical_times, start_states
 
 Array = NDArray[np.float64]
 DIVERGED = 1e100  # of any unit; squares of what is larger would overflow

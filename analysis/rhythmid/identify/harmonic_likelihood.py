@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rhythmid.errors import InputError
-from rhythmid.generated_source import InputKind
 from rhythmid.ltp.htf import LinearisedModel, linearised
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.ltp.spectra import Spectra, spectra
 from rhythmid.model import Model
 from rhythmid.record.record import Record
+from rhythmid.simulation.generated_source import InputKind
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -25,7 +25,7 @@ from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.series import dominant_frequency
 from rhythmid.ltp.limit_cycle import limit_cycle
 from rhythmid.ltp.pumping import pumping_of
-from rhythmid.simulate import physical_times
+from rhythmid.simulation.simulate import physical_times
 
 Array = NDArray[np.float64]
 Forcing = Literal["on_robot", "delayed", "clock_unknown"]

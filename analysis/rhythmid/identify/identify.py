@@ -22,10 +22,10 @@ from rhythmid.ltp.harmonic_estimate import HarmonicEstimates
 from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, smoothed
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
+from rhythmid.record.outlier import without_stray
 from rhythmid.record.record import Record
-from rhythmid.record.stray import without_stray
-from rhythmid.signal import continuous, spline
-from rhythmid.simulate import simulate
+from rhythmid.simulation.signal import continuous, spline
+from rhythmid.simulation.simulate import simulate
 
 Array = NDArray[np.float64]
 Method = Literal["joint", "paper"]

@@ -15,7 +15,7 @@ from rhythmid.identify.descent import first_guess
 from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.series import Array, Series, dominant_frequency
 from rhythmid.model import Model
-from rhythmid.signal import first_order_hold
+from rhythmid.simulation.signal import first_order_hold
 
 MARGIN = 1.0  # [s] of a command kept before a window, for delays
 # of the response to a constant force, from the middle to the end of a record, that calls for windows

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
-from rhythmid.compiled import Compiled
 from rhythmid.elements.element import Element, Parameter
 from rhythmid.model import Model
-from rhythmid.signal import shifted
+from rhythmid.simulation.compiled import Compiled
+from rhythmid.simulation.signal import shifted
 
 Array = NDArray[np.float64]
 

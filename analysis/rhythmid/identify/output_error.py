@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.identify.covariance import covariance_of, on_the_edge
 from rhythmid.identify.descent import WHITE, Descent, descend, first_guess
-from rhythmid.identify.faint_directions import faint, with_faint_directions
 from rhythmid.identify.free_run import FreeRun, accurate, prepare_run
+from rhythmid.identify.ill_conditioned import faint, with_faint_directions
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.sensitivity import Linearisation, Problem
 from rhythmid.identify.series import Series

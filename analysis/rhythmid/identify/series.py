@@ -15,11 +15,11 @@ from scipy.interpolate import PPoly
 
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
-from rhythmid.generated_source import InputKind, OutputKind
 from rhythmid.identify.observer import Observer
 from rhythmid.model import Model
 from rhythmid.record.record import Record
-from rhythmid.signal import continuous, fast_length, spline
+from rhythmid.simulation.generated_source import InputKind, OutputKind
+from rhythmid.simulation.signal import continuous, fast_length, spline
 
 REACH = 2  # blocks on either side from which `of_block` takes differences
 REST_LENGTH = "linear_spring.rest_length"

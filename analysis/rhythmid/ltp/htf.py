@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
-from rhythmid.generated_source import InputKind
 from rhythmid.ltp.harmonic_state_space import HarmonicStateSpace, harmonic_state_space
 from rhythmid.ltp.limit_cycle import LimitCycle, limit_cycle
 from rhythmid.ltp.linearisation import linearise
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
+from rhythmid.simulation.generated_source import InputKind
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from rhythmid.compiled import Compiled, compile_model, compile_rates
 from rhythmid.elements.element import ELAPSED, STEP
 from rhythmid.errors import InputError
-from rhythmid.generated_source import InputKind
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
-from rhythmid.signal import pieces
-from rhythmid.simulate import MAX_STEP, start_states
+from rhythmid.simulation.compiled import Compiled, compile_model, compile_rates
+from rhythmid.simulation.generated_source import InputKind
+from rhythmid.simulation.signal import pieces
+from rhythmid.simulation.simulate import MAX_STEP, start_states
 
 Array = NDArray[np.float64]
 SAMPLES = 1000  # of the cycle

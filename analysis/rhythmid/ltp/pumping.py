@@ -12,7 +12,7 @@ from scipy.interpolate import PPoly
 
 from rhythmid.errors import InputError
 from rhythmid.record.record import Channel, Record
-from rhythmid.signal import spline
+from rhythmid.simulation.signal import spline
 
 Array = NDArray[np.float64]
 HARMONICS = 9  # of the forcing that are looked for

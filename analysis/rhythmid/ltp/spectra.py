@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from rhythmid.errors import InputError
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.record.record import Channel, Record
-from rhythmid.signal import continuous, fast_length
+from rhythmid.simulation.signal import continuous, fast_length
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -18,7 +18,7 @@ from rhythmid.record.record import SHORTEST, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
 from rhythmid.record.table import SUFFIXES, Table
 from rhythmid.record.timing import Timing, put_in_order
-from rhythmid.signal import Hold
+from rhythmid.simulation.signal import Hold
 
 AMBIGUOUS = 0.01  # share of samples that may have the time of another one with another value
 # seconds between the ages at receipt of two channels, from which their stamps hardly share a clock

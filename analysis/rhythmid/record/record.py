@@ -12,7 +12,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.quality import Quality
 from rhythmid.record.signals import ROLES, InputKind, OutputKind, Sinusoid
 from rhythmid.record.timing import GAP, SAME, nominal_period
-from rhythmid.signal import Hold, continuous
+from rhythmid.simulation.signal import Hold, continuous
 
 Array = NDArray[np.float64]
 SHORTEST = 8  # samples that a record must have in common

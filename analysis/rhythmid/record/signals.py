@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from rhythmid.document import Node, parse, read
 from rhythmid.errors import InputError
 from rhythmid.record.field import Field
-from rhythmid.signal import Hold
+from rhythmid.simulation.signal import Hold
 
 InputKind = Literal["force", "base_displacement", "base_acceleration", "reference"]
 OutputKind = Literal["position", "velocity", "acceleration"]

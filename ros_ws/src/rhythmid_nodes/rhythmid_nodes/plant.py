@@ -13,7 +13,7 @@ from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.experiment import Forcing, Noise, plant_model
 from rhythmid.model import Model
-from rhythmid.plant import Plant
+from rhythmid.simulation.plant import Plant
 
 from .clock import Clock, Grid
 from .joint_state import JointStateReader, JointStateWriter
@@ -47,7 +47,7 @@ PARAMETERS = (
 
 
 class PlantNode(GraphNode):
-    """A thin shell: messages in and out, clock or lockstep; `rhythmid.plant.Plant` does the rest."""
+    """A thin shell: messages in and out, clock or lockstep; `rhythmid.simulation.plant.Plant` does the rest."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("plant", PARAMETERS, **options)

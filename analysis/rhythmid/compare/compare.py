@@ -1,0 +1,371 @@
+"""Compare a simulation's record with a real one directly: where do they part?
+
+The two are aligned by what was commanded, brought to common times and subtracted. Where the difference sits (in time, in the cycle,
+in the states, at which frequency and harmonic) is read off it; in which slot of the signal path it arises is found by `explain`.
+Nothing is refitted. Where the excitations differ, a given model takes the simulation's place: it is fitted to the simulation and run
+with the recording's inputs.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.compare.align import Alignment, align
+from rhythmid.compare.explain import Explanation, explain
+from rhythmid.compare.pair import Pair, harmonic_columns, pair_of
+from rhythmid.diagnose.answer.wording import SENTENCES
+from rhythmid.errors import InputError
+from rhythmid.identify.output_error import estimate, start_only
+from rhythmid.identify.series import prepare
+from rhythmid.model import Model
+from rhythmid.progress import Tell
+from rhythmid.record.outlier import without_stray
+from rhythmid.record.record import Channel, Record
+from rhythmid.report.comparison import LABELS
+from rhythmid.report.run import Run
+
+Array = NDArray[np.float64]
+HARMONICS = 6  # that are listed
+LOUD = 4.0  # times the noise's variance: from there the motions have parted
+SMOOTHED = 4  # bins on either side over which a coherence is averaged
+PHASES, CELLS = 24, 6  # parts of a cycle; cells along position and along velocity
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the difference is greatest. Shares are of its power; None where unknown.
+
+    `first` and `strongest` [s] on the recording's clock, `growth` the power relative to the motion's in the last quarter over that in the first; `phase` [cycles after the
+    forcing's peak] with its share in the quarter cycle around; `position`, `velocity` of the worst cell; `frequency` [Hz] with
+    its share; `harmonic` of the forcing there; `coherence` with the command there.
+    """
+
+    first: float | None
+    strongest: float
+    growth: float
+    phase: float | None
+    phase_share: float | None
+    position: float
+    velocity: float
+    frequency: float
+    frequency_share: float
+    harmonic: int | None
+    coherence: float | None
+
+
+@dataclass(frozen=True)
+class HarmonicRatio:
+    """The recording's harmonic of the forcing over the simulation's: `gain`, and `late` [s] by its phase."""
+
+    number: int
+    gain: float
+    late: float
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A simulation beside a recording. `left` (n,) is what the explanations leave of the difference."""
+
+    simulation: str
+    recording: str
+    alignment: Alignment
+    through_model: bool
+    rates: tuple[float, float]
+    pair: Pair
+    nrmse: float
+    explanations: tuple[Explanation, ...]
+    left: Array
+    place: Place
+    harmonics: tuple[HarmonicRatio, ...]
+    unit: str
+    notes: tuple[str, ...]
+
+    @property
+    def parted(self) -> bool:
+        """Whether they differ by more than noise."""
+        return any(one.slot is not None for one in self.explanations)
+
+    @property
+    def slot(self) -> str | None:
+        """Slot of the signal path in which most of the difference arises; None where they agree."""
+        return next((one.slot for one in self.explanations if one.slot is not None), None)
+
+    @property
+    def comparable(self) -> bool:
+        """Whether both ran the same excitation, or a model has made up for it."""
+        return self.through_model or not self.alignment.mismatch
+
+    def to_dict(self) -> dict[str, Any]:
+        """The comparison as plain JSON data."""
+        place = self.place
+        return {
+            "simulation": self.simulation,
+            "recording": self.recording,
+            "summary": self.summary,
+            "comparable": self.comparable,
+            "through_model": self.through_model,
+            "parted": self.parted,
+            "alignment": {
+                "by": self.alignment.by,
+                "offset": {"value": self.alignment.offset, "std": self.alignment.std, "unit": "s"},
+                "forcing_turned": {"value": self.alignment.turn, "unit": "s"},
+                "command_difference": self.alignment.difference,
+                "mismatch": self.alignment.mismatch,
+            },
+            "rates": {"simulation": self.rates[0], "recording": self.rates[1], "unit": "Hz"},
+            "overlap": {"value": float(self.pair.time[-1] - self.pair.time[0]), "unit": "s"},
+            "nrmse": self.nrmse,
+            "noise_nrmse": self.pair.noise / max(float(np.std(self.pair.recording)), 1e-300),
+            "slot": self.slot,
+            "explanations": [
+                {
+                    "name": one.name, "slot": one.slot, "explained": one.explained, "also": list(one.also),
+                    "parameters": {name: {"value": v, "unit": unit} for name, (v, unit) in one.values.items()},
+                }
+                for one in self.explanations
+            ],
+            "time": {"first": place.first, "strongest": place.strongest, "growth": place.growth, "unit": "s"},
+            "phase": None if place.phase is None else {"value": place.phase, "share": place.phase_share, "unit": "cycle"},
+            "state": {"position": place.position, "velocity": place.velocity, "unit": self.unit},
+            "frequency": {
+                "value": place.frequency, "share": place.frequency_share, "harmonic": place.harmonic,
+                "coherence_with_command": place.coherence, "unit": "Hz",
+            },
+            "harmonics": [{"number": h.number, "gain": h.gain, "late": h.late} for h in self.harmonics],
+            "notes": list(self.notes),
+        }  # fmt: skip
+
+    @property
+    def summary(self) -> str:
+        """The answer in a few sentences."""
+        if not self.comparable:
+            return f"Not comparable: different excitation ({self.alignment.mismatch}); with --model the model is run in the simulation's place."
+        size = f"{100 * self.nrmse:.3g} % of the motion"
+        started = any(one.slot is None for one in self.explanations)
+        if not self.parted:
+            return (
+                f"Simulation and recording agree within the noise: the difference of {size} follows nothing."
+                if not started
+                else f"Simulation and recording agree but for another start, which dies out; the difference was {size}."
+            )
+        causes = [one for one in self.explanations if one.slot is not None]
+        said = "; then ".join(_cause(one) for one in causes)
+        return f"They part by {size}, {SENTENCES[causes[0].slot or 'force']}: {said}. {self._where()}"
+
+    def _where(self) -> str:
+        place = self.place
+        at = (
+            "from the start"
+            if place.first is None or place.first - self.pair.time[0] < 2.0 / self.pair.frequency
+            else f"from {place.first:.4g} s on"
+        )
+        said = [f"The difference shows {at}"]
+        if place.growth > 3.0:
+            said.append("grows with time")
+        if place.phase is not None and place.phase_share is not None and place.phase_share > 0.3:
+            said.append(f"is greatest {place.phase:.2f} of a cycle after the forcing's peak")
+        said.append(f"at x = {place.position:.4g} {self.unit}, v = {place.velocity:.3g} {self.unit}/s")
+        line = f"harmonic {place.harmonic} of the forcing" if place.harmonic else "no harmonic of the forcing"
+        if place.coherence is not None and not place.harmonic:
+            line += ", " + (
+                "it follows the command" if place.coherence > 0.6 else "it does not follow the command"
+            )
+        said.append(f"and is strongest at {place.frequency:.3g} Hz ({line})")
+        return ", ".join(said) + "."
+
+
+def _cause(one: Explanation) -> str:
+    """An explanation in words."""
+    share = f"{100 * one.explained:.0f} %"
+    sizes = ", ".join(_size(v, unit) for v, unit in one.values.values())
+    if one.name.replace("_", "").isalpha() and "_" in one.name:
+        words = f"{one.name.replace('_', ' ')} {sizes}".strip()
+    else:
+        words = f"{'a force' if one.slot == 'force' else 'something'} that goes with {one.name}"
+    if one.also:
+        words += f" (or, seen from outside the same, {' or '.join(a.replace('_', ' ') for a in one.also)})"
+    return f"{words} explains {share}"
+
+
+def _size(value: float, unit: str) -> str:
+    return f"{1e3 * value:.4g} ms" if unit == "s" else f"{value:.4g} {unit}".strip()
+
+
+def run_of(found: Comparison) -> Run:
+    """Recording and simulation as figures show them."""
+    pair = found.pair
+    return Run(
+        name=found.recording,
+        time=pair.time,
+        measured=pair.recording,
+        before=pair.simulation,
+        after=pair.recording - found.left if found.explanations else None,
+        position=pair.recording,
+        velocity=pair.velocity,
+        phase=pair.phase,
+        used=pair.used,
+        hidden=np.zeros_like(pair.used),
+        labels=LABELS,
+    )
+
+
+def compare(
+    simulation: Record, recordings: Sequence[Record], model: Model | None = None, tell: Tell = lambda _: None
+) -> Comparison:
+    """Compare a simulation with the recording of the same excitation, the best match of several.
+
+    Raises InputError when there is too little in common.
+    """
+    for one in recordings:
+        if one.output_kind != simulation.output_kind:
+            raise InputError(
+                f"{simulation.name} holds a {simulation.output_kind}, {one.name} a {one.output_kind}; name the same quantity under 'output:'"
+            )
+    tell("aligning simulation and recording")
+    tidy = [without_stray(one) for one in recordings]
+    aligned = [(align(simulation, one), one, said) for one, said in tidy]
+    alignment, recording, left_out = min(
+        aligned, key=lambda case: (bool(case[0].mismatch), case[0].difference or 0.0)
+    )
+    known, through = simulation, False
+    if model is not None and (alignment.mismatch or alignment.turn != 0.0):
+        tell("fitting the model to the simulation and running it with the recording's inputs")
+        known, through = in_its_place(simulation, recording, model), True
+    pair, notes = pair_of(
+        known, recording, replace(alignment, offset=0.0, turn=0.0) if through else alignment
+    )
+    notes = [*left_out, *notes, *_unit_notes(simulation, recording)]
+    difference = pair.recording - pair.simulation
+    tell("explaining the difference")
+    if alignment.mismatch and not through:
+        explanations, left = [], difference
+    else:
+        explanations, left = explain(
+            pair,
+            recording.output.unit,
+            alignment.by == "output" and not through,
+            alignment.turn != 0.0 and not through,
+        )
+    spread = float(np.std(pair.recording[pair.used]))
+    return Comparison(
+        simulation.name, recording.name, alignment, through,
+        (1.0 / simulation.output.period, 1.0 / recording.output.period), pair,
+        float(np.sqrt(np.mean(difference[pair.used] ** 2))) / max(spread, 1e-300),
+        tuple(explanations), left, place_of(pair, difference), _ratios(pair), recording.output.unit, tuple(notes),
+    )  # fmt: skip
+
+
+def _unit_notes(simulation: Record, recording: Record) -> list[str]:
+    a, b = simulation.output, recording.output
+    if a.unit != b.unit:
+        return [f"the simulation's output is in {a.unit}, the recording's in {b.unit}"]
+    ratio = float(np.std(b.value)) / max(float(np.std(a.value)), 1e-300)
+    if not 0.01 < ratio < 100.0:
+        return [f"the recorded motion is {ratio:.3g} times the simulated one: check the units"]
+    return []
+
+
+def in_its_place(simulation: Record, recording: Record, model: Model) -> Record:
+    """What the simulation would have done with the recording's inputs: the model, fitted to it, run with those."""
+    fit = estimate(model, prepare([simulation]))
+    series = prepare([recording])
+    run = start_only(fit.model, series, fit.noise, fit.run.max_step)
+    one = series[0]
+    output = Channel(one.centres, one.averaged + run.residuals[0], simulation.output.unit, "model")
+    return replace(recording, name=simulation.name, output=output)
+
+
+def place_of(pair: Pair, difference: Array) -> Place:
+    """Where a difference (n,) is greatest."""
+    square = np.where(pair.used, difference**2, 0.0)
+    width = max(1, round(1.0 / (pair.frequency * pair.step)))
+    local = np.convolve(square, np.ones(width) / width, mode="same")
+    level = max(LOUD * pair.noise**2, 0.1 * float(np.mean(square)))
+    loud = np.flatnonzero(local > level)
+    quarter = max(1, len(square) // 4)
+    share = [
+        float(np.mean(square[part]) / max(np.var(pair.recording[part]), 1e-300))
+        for part in (slice(quarter), slice(-quarter, None))
+    ]
+    growth = share[1] / max(share[0], 1e-300)
+    phase, phase_share = None, None
+    if pair.phase is not None:
+        sums = np.bincount((pair.phase * PHASES).astype(int) % PHASES, square, PHASES)
+        around = np.array(
+            [
+                np.take(sums, range(i - PHASES // 8, i + PHASES // 8 + 1), mode="wrap").sum()
+                for i in range(PHASES)
+            ]
+        )
+        phase = (int(np.argmax(around)) + 0.5) / PHASES
+        phase_share = float(around.max() / max(sums.sum(), 1e-300))
+    x, v = pair.recording, pair.velocity
+    edges = [np.linspace(float(np.quantile(q, 0.01)), float(np.quantile(q, 0.99)), CELLS + 1) for q in (x, v)]
+    weight = np.histogram2d(x, v, edges, weights=square)[0]
+    count = np.histogram2d(x, v, edges)[0]
+    mean = np.where(count > 0.005 * len(x), weight / np.maximum(count, 1), 0.0)
+    i, j = np.unravel_index(int(np.argmax(mean)), mean.shape)
+    middle = [0.5 * (e[:-1] + e[1:]) for e in edges]
+    frequency, share, harmonic, coherence = _strongest(pair, difference)
+    return Place(
+        float(pair.time[loud[0]]) if len(loud) else None, float(pair.time[int(np.argmax(local))]), growth, phase, phase_share,
+        float(middle[0][i]), float(middle[1][j]), frequency, share, harmonic, coherence,
+    )  # fmt: skip
+
+
+def _strongest(pair: Pair, difference: Array) -> tuple[float, float, int | None, float | None]:
+    """Strongest frequency of the difference [Hz], its share, the forcing's harmonic there, coherence with the command there."""
+    n = len(difference)
+    window = np.hanning(n)
+    power = np.abs(np.fft.rfft((difference - difference.mean()) * window)) ** 2
+    power[0] = 0.0
+    peak = int(np.argmax(power))
+    frequency = peak / (n * pair.step)
+    share = float(power[max(0, peak - 2) : peak + 3].sum() / max(power.sum(), 1e-300))
+    harmonic = None
+    if pair.pumping is not None:
+        number = round(frequency / pair.pumping)
+        if number >= 1 and abs(frequency - number * pair.pumping) < 1.5 / (n * pair.step):
+            harmonic = number
+    return frequency, share, harmonic, _follows_command(pair, difference, peak)
+
+
+def _follows_command(pair: Pair, difference: Array, peak: int) -> float | None:
+    """Coherence of the difference, the forcing's harmonics taken out, with the oscillator's response to the command, around bin
+    `peak`: 1 where the difference is that response, filtered."""
+    if pair.command is None or np.ptp(pair.command) == 0.0:
+        return None
+    rest = difference
+    if pair.pumping is not None:
+        columns = harmonic_columns(pair.time, pair.pumping, HARMONICS)
+        rest = difference - columns @ np.linalg.lstsq(columns, difference, rcond=1e-10)[0]
+    window = np.hanning(len(rest))
+    one = np.fft.rfft(rest * window)
+    other = np.fft.rfft(pair.oscillator.response(pair.command, pair.step) * window)
+    near = slice(max(1, peak - SMOOTHED), peak + SMOOTHED + 1)
+    energy = float(np.sum(np.abs(one[near]) ** 2) * np.sum(np.abs(other[near]) ** 2))
+    return float(np.abs(np.sum(one[near] * np.conj(other[near]))) ** 2 / energy) if energy > 0.0 else None
+
+
+def _ratios(pair: Pair) -> tuple[HarmonicRatio, ...]:
+    if pair.pumping is None:
+        return ()
+    count = int(np.clip(0.4 / (pair.step * pair.pumping), 1, HARMONICS))
+    columns = harmonic_columns(pair.time, pair.pumping, count)[pair.used]
+
+    def harmonics(signal: Array) -> NDArray[np.complex128]:
+        solution = np.linalg.lstsq(columns, signal[pair.used], rcond=1e-10)[0]
+        return solution[1 : count + 1] - 1j * solution[count + 1 :]
+
+    one, other = harmonics(pair.simulation), harmonics(pair.recording)
+    found = []
+    for index in range(count):
+        if abs(one[index]) > max(10.0 * pair.noise / math.sqrt(len(columns)), 1e-3 * abs(one[0])):
+            ratio = other[index] / one[index]
+            late = -float(np.angle(ratio)) / (2.0 * np.pi * (index + 1) * pair.pumping)
+            found.append(HarmonicRatio(index + 1, float(abs(ratio)), late))
+    return tuple(found)

@@ -1,0 +1,287 @@
+"""Explain the difference of two aligned motions without a model: what has to be done to one to become the other?
+
+Effects on the way in and out are applied to the simulated motion itself, whatever their size (`ways`). Forces are unknown smooth
+functions of position, velocity, phase or time, whose effect on the motion is found by an oscillator fitted to the simulation (`forces`);
+they are judged by stretches that were left out of their fit. Of explanations that do almost equally well the simplest is taken,
+and the search goes on with what it leaves.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from rhythmid.compare.channel_corrections import ALIKE, WAYS, Way, predicted
+from rhythmid.compare.forces import force_functions, foreign_line
+from rhythmid.compare.pair import Pair
+
+Array = NDArray[np.float64]
+FOLDS, DEALT = 5, 20  # folds of a cross-validation, stretches in each
+LEAST = 0.02  # share of what is left that an explanation has to take away to be one
+FAINT = 0.004  # share of the whole difference that it has to take away where the oscillator limits what can be explained
+SLIGHT = 0.001  # the same among ways in and out, which are applied exactly
+ROUGH = 0.05  # the same where limit cycle and response had to be shifted each for itself
+SIMPLER = 0.03  # share by which a simpler explanation may fall behind
+MOST = 4  # explanations
+TWINS = {
+    "command_lag": "input_delay", "input_delay": "command_lag", "sensor_lag": "measurement_delay", "measurement_delay": "sensor_lag",
+}  # fmt: skip
+UNITS = {"time": "s", "lag": "s", "gain": "", "skew": ""}
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What takes away the share `explained` of the difference that was left before it.
+
+    `name` is an element of the catalogue, or what a free function goes with; `slot` where it sits; `also` what looks the same
+    from outside; `values` name -> (value, unit).
+    """
+
+    name: str
+    slot: str | None
+    explained: float
+    values: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    also: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """An explanation tried: sum of squares it leaves, how simple it is (0 the simplest), and the values of all ways or the columns
+    of the function that it needs."""
+
+    square: float
+    rank: int
+    what: Explanation
+    values: dict[str, float] | None = None
+    columns: Array | None = None
+
+
+class Difference:
+    """What is left of the difference of a pair, with a free start and forces already named projected out."""
+
+    def __init__(self, pair: Pair) -> None:
+        self.pair = pair
+        self.values: dict[str, float] = {}
+        self.force: Array | None = None
+        self._settle()
+
+    def take(self, trial: Trial) -> None:
+        """Accept an explanation."""
+        if trial.values is not None:
+            self.values = trial.values
+        else:
+            self.force = trial.columns
+        self._settle()
+
+    def without_force(self) -> None:
+        """Forget the force, so that it can be found anew beside the ways."""
+        self.force = None
+        self._settle()
+
+    def _settle(self) -> None:
+        free = self.pair.oscillator.free(self.pair.time)
+        self.columns = free if self.force is None else np.hstack([free, self.force])
+        used = self.columns[self.pair.used]
+        norms = np.linalg.norm(used, axis=0)
+        left, size, _ = np.linalg.svd(used / np.where(norms > 0.0, norms, 1.0), full_matrices=False)
+        self.basis = left[:, size > 1e-8 * size[0]]
+        self.residual = self._left(self.values)
+        self.square = float(self.residual @ self.residual)
+
+    def _left(self, values: Mapping[str, float]) -> Array:
+        raw = (self.pair.recording - predicted(self.pair, values))[self.pair.used]
+        return raw - self.basis @ (self.basis.T @ raw)
+
+    def whole(self) -> Array:
+        """What is left at all times (n,)."""
+        raw = self.pair.recording - predicted(self.pair, self.values)
+        return (
+            raw
+            - self.columns
+            @ np.linalg.lstsq(self.columns[self.pair.used], raw[self.pair.used], rcond=1e-10)[0]
+        )
+
+    def share(self, square: float) -> float:
+        """Share of what is left beyond noise that a remaining sum of squares takes away."""
+        floor = len(self.residual) * self.pair.noise**2
+        beyond = self.square - floor if self.square > 1.5 * floor else self.square
+        return (self.square - square) / max(beyond, 1e-300)
+
+    def fitted(self, names: list[str], way: Way | None = None) -> tuple[float, dict[str, float]]:
+        """Sum of squares and values of these ways fitted together; of the last one, `way`, several starts are tried."""
+        pair = self.pair
+        span, size, length = (
+            1.0 / pair.frequency,
+            float(np.std(pair.recording)),
+            float(pair.time[-1] - pair.time[0]),
+        )
+        scale = {
+            "time": 0.05 * span,
+            "lag": 0.05 * span,
+            "gain": 0.1,
+            "length": size,
+            "rate": size / length,
+            "skew": 0.1 * span / length,
+        }
+        kinds = {one.name: one for one in WAYS}
+        sizes = np.array([scale[kinds[name].kind] for name in names])
+        begin = np.array([self.values.get(name, kinds[name].neutral) for name in names])
+
+        def left(scaled: Array) -> Array:
+            return self._left(dict(zip(names, scaled * sizes)))
+
+        if way is not None:
+            first = {
+                "time": np.linspace(-0.5, 0.5, 25) * span, "lag": np.geomspace(2e-3, 0.5, 7) * span,
+                "gain": np.array([0.7, 1.0, 1.4]), "skew": np.linspace(-0.4, 0.4, 9) * span / length,
+            }.get(way.kind, np.array([way.neutral]))  # fmt: skip
+            tried = [float(np.sum(left(np.array([*begin[:-1], start]) / sizes) ** 2)) for start in first]
+            begin[-1] = first[int(np.argmin(tried))]
+        low = np.array([0.0 if kinds[name].kind == "lag" else -np.inf for name in names])
+        found = least_squares(left, np.maximum(begin / sizes, low + 1e-9), bounds=(low, np.inf), max_nfev=40)
+        return 2.0 * float(found.cost), {name: float(v) for name, v in zip(names, found.x * sizes)}
+
+    def left_out(self, columns: Array) -> float:
+        """Sum of squares of stretches that were left out of the fit of these columns."""
+        part = columns[self.pair.used]
+        part = part - self.basis @ (self.basis.T @ part)
+        norms = np.linalg.norm(part, axis=0)
+        kept = norms > 1e-9 * max(float(norms.max()), 1e-300)
+        part = part[:, kept] / norms[kept]
+        ridge = 1e-6 * np.eye(part.shape[1])
+        edges = np.linspace(0, len(part), FOLDS * DEALT + 1).astype(int)
+        total = 0.0
+        for fold in range(FOLDS):
+            test = np.zeros(len(part), bool)
+            for index in range(fold, FOLDS * DEALT, FOLDS):
+                test[edges[index] : edges[index + 1]] = True
+            seen = part[~test]
+            solution = np.linalg.solve(seen.T @ seen + ridge, seen.T @ self.residual[~test])
+            total += float(np.sum((self.residual[test] - part[test] @ solution) ** 2))
+        return total
+
+    def ways(self, blind: bool) -> list[Trial]:
+        """Every way in or out, joined to those already found; `blind` where the motions themselves were aligned."""
+        found = []
+        for way in WAYS:
+            if way.name in self.values or (blind and way.name == "measurement_delay"):
+                continue
+            if (self.pair.cycle is None and way.slot == "command") or (
+                self.pair.effort is None and way.slot == "actuator"
+            ):
+                continue
+            square, values = self.fitted([*self.values, way.name], way)
+            extra = ("input_delay",) if way.name == "measurement_delay" and self.pair.cycle is None else ()
+            what = Explanation(way.name, way.slot, 0.0, also=(*extra, *ALIKE.get(way.name, ())))
+            found.append(Trial(square, 0, what, values=values))
+        return found
+
+    def forces(self) -> list[Trial]:
+        """Every force that might be missing: a foreign line, and free functions."""
+        found = []
+        line = foreign_line(self.pair, self.whole())
+        if line is not None:
+            what = Explanation("periodic_disturbance", "force", 0.0, {"frequency": (line[0], "Hz")})
+            found.append(Trial(self.left_out(line[1]), 3, what, columns=line[1]))
+        late = self.values.get("measurement_delay", 0.0)
+        for name, slot, rank, functions in force_functions(self.pair, late):
+            columns = self.pair.oscillator.response(functions, self.pair.step)
+            found.append(Trial(self.left_out(columns), rank, Explanation(name, slot, 0.0), columns=columns))
+        return found
+
+    def simplest(self, trials: list[Trial]) -> Trial:
+        """The best of the simplest trials that hardly fall behind the best of all."""
+        top = self.share(min(trial.square for trial in trials))
+        near = [trial for trial in trials if self.share(trial.square) >= (1.0 - SIMPLER) * top]
+        return min(near, key=lambda trial: (trial.rank, trial.square))
+
+    def told(self, trial: Trial) -> Explanation:
+        """The trial's explanation with its share of what is left."""
+        return replace(trial.what, explained=float(np.clip(self.share(trial.square), 0.0, 1.0)))
+
+
+def explain(
+    pair: Pair, unit: str, blind: bool = False, rough: bool = False
+) -> tuple[list[Explanation], Array]:
+    """What explains the difference of a pair whose motions are in `unit`, step by step, and what is left of it (n,).
+
+    `blind` says that the motions themselves were aligned, which hides a constant delay; `rough` that the pair is not exact.
+    """
+    known = Difference(pair)
+    raw = (pair.recording - pair.simulation)[pair.used]
+    whole = float(raw @ raw)
+    found: list[Explanation] = []
+    if known.square < 0.5 * whole:
+        found.append(Explanation("another start", None, 1.0 - known.square / whole))
+        rough = True
+    floor = max(1.05 * len(known.residual) * pair.noise**2, 1e-12 * float(np.sum(pair.recording**2)))
+    for _ in range(MOST):
+        if known.square <= floor:
+            break
+        if known.force is not None and pair.effort is None:
+            break
+        trials = known.ways(blind) + (known.forces() if known.force is None else [])
+        chosen = known.simplest(trials)
+        gain = known.square - chosen.square
+        faint = ROUGH if rough else SLIGHT if known.force is None and chosen.values is not None else FAINT
+        if gain < LEAST * known.square or gain < faint * whole:
+            break
+        found.append(known.told(chosen))
+        known.take(chosen)
+    found = _pruned(known, found, whole)
+    if known.force is not None and known.values:
+        found = _force_anew(known, found)
+    found = _swapped(known, found)
+    return [_valued(one, known.values, unit) for one in found], known.whole()
+
+
+def _pruned(known: Difference, found: list[Explanation], whole: float) -> list[Explanation]:
+    """The explanations without those that later ones have made needless."""
+    for one in found[:-1]:
+        rest = [name for name in known.values if name != one.name]
+        if one.name not in known.values or not rest:
+            continue
+        square, values = known.fitted(rest)
+        if square - known.square < (SLIGHT if known.force is None else FAINT) * whole:
+            known.take(Trial(square, 0, one, values=values))
+            found = [other for other in found if other is not one]
+    return found
+
+
+def _force_anew(known: Difference, found: list[Explanation]) -> list[Explanation]:
+    """The force found again now that the ways are known: it may be simpler than it looked through them."""
+    before = next(one for one in found if one.slot is not None and one.name not in known.values)
+    known.without_force()
+    chosen = known.simplest(known.forces())
+    again = known.told(chosen)
+    known.take(chosen)
+    if known.values:
+        square, values = known.fitted(list(known.values))
+        known.take(Trial(square, 0, again, values=values))
+    return [replace(again, explained=max(again.explained, 0.0)) if one is before else one for one in found]
+
+
+def _swapped(known: Difference, found: list[Explanation]) -> list[Explanation]:
+    """The explanations with a lag in the place of a delay, or the reverse, where that does better beside all the others."""
+    for one in list(found):
+        other = TWINS.get(one.name)
+        if other is None or one.name not in known.values or other in known.values:
+            continue
+        way = next(w for w in WAYS if w.name == other)
+        square, values = known.fitted([*(name for name in known.values if name != one.name), other], way)
+        if square < known.square:
+            known.take(Trial(square, 0, one, values=values))
+            named = replace(one, name=other, slot=way.slot, also=ALIKE.get(other, ()))
+            found = [named if old is one else old for old in found]
+    return found
+
+
+def _valued(one: Explanation, values: Mapping[str, float], unit: str) -> Explanation:
+    """The explanation with the number that all of them together settled on."""
+    way = next((w for w in WAYS if w.name == one.name), None)
+    if way is None or one.name not in values:
+        return one
+    named = {"length": unit, "rate": f"{unit}/s"}.get(way.kind) or UNITS.get(way.kind, "")
+    return replace(one, values={way.parameter: (values[one.name], named)})

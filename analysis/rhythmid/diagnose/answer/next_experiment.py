@@ -1,0 +1,141 @@
+"""The next experiment: of a menu that the machine can play, the one that tells the rivals apart best.
+
+T-optimality (A. C. Atkinson, V. V. Fedorov, Biometrika 62 (1975) 57): the expected chi-squared between the outputs that
+two fitted rival models predict. Computed with the models at hand, at sizes scaled to what the records already hold.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PPoly
+
+from rhythmid.diagnose.search.forward import Search
+from rhythmid.diagnose.search.refit import Trial, fine_enough
+from rhythmid.excitation.excitation import Excitation
+from rhythmid.excitation.sequence import build
+from rhythmid.identify.descent import first_guess
+from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.series import Series, dominant_frequency, scales
+from rhythmid.simulation.signal import spline, zero_order_hold
+
+Array = NDArray[np.float64]
+HIGHEST = 0.4  # of the sample rate
+LENGTH = 30.0  # periods of the dominant motion
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """An experiment of the menu with the chi-squared by which it is expected to separate the two best rivals."""
+
+    words: str
+    chi2: float
+    duration: float
+
+
+def _menu(effort: float, frequency: float, length: float, highest: float) -> list[tuple[str, dict, float]]:
+    """(words, excitation, factor on the forcing) for a machine of this size; nothing beyond the `highest` frequency."""
+    top, above = min(7.0 * frequency, highest), min(21.0 * frequency, highest)
+    found: list[tuple[str, dict, float]] = []
+    for factor in (0.3, 1.0, 3.0):
+        amplitude = factor * effort
+        found.append((f"a chirp of {amplitude:.3g} from 0 to {top:.3g} Hz over {length:.3g} s",
+                      {"type": "chirp", "amplitude": amplitude, "band": [0.0, top], "sweep": length}, 1.0))  # fmt: skip
+        found.append((f"a step of bias force of {amplitude:.3g}, held for {length / 2:.3g} s and released",
+                      {"type": "profile", "points": [[0.0, amplitude], [length / 2, 0.0]], "length": length}, 1.0))  # fmt: skip
+    found.append((f"an odd multisine of {effort:.3g} rms up to {above:.3g} Hz",
+                  {"type": "multisine", "rms": effort, "period": length / 3, "periods": 3, "band": [frequency / 5, above]},
+                  1.0))  # fmt: skip
+    for scale in (0.3, 3.0):
+        found.append(
+            (
+                f"the cycle alone with the forcing scaled by {scale:g}",
+                {"type": "silence", "length": length},
+                scale,
+            )
+        )
+    return found
+
+
+def _predicted(trial: Trial, series: Series, step: float) -> Array | None:
+    run = prepare_run(trial.model, [series], fine_enough(trial.model, step))
+    outputs = run.outputs(trial.model, first_guess(trial.model, run))
+    return None if outputs is None else outputs[0]
+
+
+def _imagined(series: Series, excitation: Excitation, forcing: PPoly | None, factor: float) -> Series:
+    n = int(excitation.duration / series.period)
+    time = np.arange(n, dtype=float) * series.period
+    value = np.resize(series.value, n)
+    scaled = None
+    if forcing is not None:
+        span = forcing.x[-1] - forcing.x[0]
+        if span < time[-1]:
+            return _imagined_shorter(series, excitation, forcing, factor, span)
+        scaled = spline(time, factor * np.asarray(forcing(forcing.x[0] + time)))
+    return _played(series, excitation, time, value, scaled)
+
+
+def _imagined_shorter(
+    series: Series, excitation: Excitation, forcing: PPoly, factor: float, span: float
+) -> Series:
+    time = np.arange(0.0, span, series.period, dtype=np.float64)
+    scaled = spline(time, factor * np.asarray(forcing(forcing.x[0] + time)))
+    return _played(series, excitation, time, np.resize(series.value, len(time)), scaled)
+
+
+def _played(
+    series: Series, excitation: Excitation, time: Array, value: Array, forcing: PPoly | None
+) -> Series:
+    """The series as it would be with another command, in free run."""
+    command = zero_order_hold(time, excitation(time))
+    used = np.ones(len(time) // series.block, bool)
+    return replace(
+        series, name="imagined", time=time, value=value, command=command, forcing=forcing, used=used,
+        ignored=None, observer=None,
+    )  # fmt: skip
+
+
+def separation(a: Trial, b: Trial, series: Sequence[Series], variance: float, step: float) -> list[Proposal]:
+    """The menu's experiments with what they would tell between two models, the best first."""
+    sizes = scales(series, a.model)
+    longest = max(series, key=lambda s: s.time[-1] - s.time[0])
+    frequency = dominant_frequency(longest)
+    length = min(LENGTH / frequency, longest.time[-1] - longest.time[0])
+    found: list[Proposal] = []
+    for words, spec, factor in _menu(sizes.effort, frequency, length, HIGHEST / longest.period):
+        if factor != 1.0 and longest.forcing is None:
+            continue
+        excitation = build(spec)
+        imagined = _imagined(longest, excitation, longest.forcing, factor)
+        first, second = _predicted(a, imagined, step), _predicted(b, imagined, step)
+        if first is None or second is None:
+            continue
+        half = len(first) // 5  # what the unknown start leaves in both has died out by then
+        difference = first[half:] - second[half:]
+        difference = difference - difference.mean()
+        chi2 = float(difference @ difference) / max(variance, 1e-300)
+        if math.isfinite(chi2):
+            found.append(Proposal(words, chi2, excitation.duration))
+    return sorted(found, key=lambda p: -p.chi2)
+
+
+def next_experiment(found: Search, rivals: Sequence[Trial], series: Sequence[Series], verdict: str) -> str:
+    """One sentence: what to record next, and what it would settle."""
+    best = found.best
+    others = [t for t in rivals if set(t.added) != set(best.added)]
+    if not others:
+        others = [t for t in found.trials if set(t.added) != set(best.added)]
+    if not others or (verdict == "consistent" and len(found.trials) < 2):
+        return (
+            "none needed for these records; a larger and more varied excitation would exclude smaller effects"
+        )
+    menu = separation(best, others[0], series, found.noise.variance, found.fit.run.max_step)
+    if not menu:
+        return "repeat the records with a larger and more varied excitation"
+    top = menu[0]
+    versus = " + ".join(others[0].added) or "the nominal model"
+    mine = " + ".join(best.added) or "the nominal model"
+    return f"{top.words}: expected to separate {mine} from {versus} by chi2 = {top.chi2:.3g}"

@@ -1,0 +1,299 @@
+"""From a diagnosis' answer to the plain data that its report draws."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2 as chi2_distribution
+
+from rhythmid.compare.compare import Comparison, run_of
+from rhythmid.diagnose.delays import delays_of
+from rhythmid.diagnose.diagnosis import Answer
+from rhythmid.diagnose.location import Dependence
+from rhythmid.diagnose.search.forward import LEVEL, WORTH, Search
+from rhythmid.elements.element import SLOTS
+from rhythmid.errors import InputError
+from rhythmid.identify.multiple_shooting import record_of
+from rhythmid.identify.output_error import Fit, noise_of
+from rhythmid.identify.repeats import noise_from_repeats
+from rhythmid.identify.series import Series, bandwidth
+from rhythmid.ltp.htf import theoretical_htf
+from rhythmid.ltp.pumping import Pumping, active_pumping
+from rhythmid.model import Model
+from rhythmid.record.record import Record
+from rhythmid.report.comparison import comparison_page, comparison_section
+from rhythmid.report.diagnosis import diagnosis_page
+from rhythmid.report.findings import ElementScore, ElementWords, Findings, FreeFunction, TransferChange
+from rhythmid.report.page import Page
+from rhythmid.report.record_quality import quality_of
+from rhythmid.report.run import Run
+from rhythmid.simulation.simulate import physical_times
+
+Array = NDArray[np.float64]
+INDICES = (0, -1, 1, -2, 2)  # transfer functions that are compared
+RARE = 0.02  # share of the motion at either end where a free function is poorly known
+POINTS = 240  # of a transfer function
+
+
+def present(
+    answer: Answer,
+    nominal: Model,
+    records: Sequence[Record],
+    holdout: Sequence[Record] = (),
+    command: str = "",
+    name: str = "the nominal model",
+    comparison: Comparison | None = None,
+) -> Page:
+    """The report of an answer.
+
+    `nominal`, `records` and `holdout` are what `diagnose` was given, `command` the command line, `name` the nominal model's;
+    a `comparison` with a simulation is put first.
+    """
+    page = diagnosis_page(findings(answer, nominal, records, holdout, command, name))
+    if comparison is None:
+        return page
+    section = comparison_section(comparison.to_dict(), run_of(comparison), comparison.unit)
+    return replace(page, sections=(section, *page.sections))
+
+
+def present_comparison(
+    found: Comparison, simulation: Record, records: Sequence[Record], command: str = ""
+) -> Page:
+    """The report of a comparison without a model; `simulation` and `records` are what `compare` was given."""
+    quality = [quality_of(simulation, "simulation"), *(quality_of(one, "recording") for one in records)]
+    return comparison_page(found.to_dict(), run_of(found), found.unit, quality, command)
+
+
+def findings(
+    answer: Answer,
+    nominal: Model,
+    records: Sequence[Record],
+    holdout: Sequence[Record] = (),
+    command: str = "",
+    name: str = "the nominal model",
+) -> Findings:
+    """What the report shows, as plain data; arguments as for `present`."""
+    evidence, found = answer.evidence, answer.evidence.search
+    pumpings = {id(record): active_pumping(record) for record in (*records, *holdout)}
+    runs = _runs(found.nominal, found.fit, {r.name: pumpings[id(r)] for r in records}, bool(found.best.added))
+    if evidence.unseen_nominal is not None:
+        after = evidence.unseen_augmented or evidence.unseen_nominal
+        repaired = bool(found.best.added) and evidence.unseen_augmented is not None
+        runs += _runs(
+            evidence.unseen_nominal, after, {r.name: pumpings[id(r)] for r in holdout}, repaired, heldout=True
+        )
+    models = {"Nominal model": nominal.to_yaml(), "Nominal model, refitted": found.nominal.model.to_yaml()}
+    if found.best.added:
+        models["Augmented model"] = answer.model.to_yaml()
+    count = max(len(found.rounds[0].scores), 1)
+    repeats = noise_from_repeats(list(found.fit.run.series))
+    return Findings(
+        result=answer.diagnosis.to_dict(),
+        source=f"{name} against {_listed([r.name for r in records])}",
+        slots={
+            slot: tuple(t.element.name for t in nominal.terms if t.element.slot == slot) for slot in SLOTS
+        },
+        forced=any(one.forcing is not None for one in evidence.series),
+        runs=tuple(runs),
+        output_unit=nominal.units.position,
+        noise=repeats.variance**0.5 if repeats else None,
+        slow_noise=(repeats or noise_of(found.fit.residuals, found.fit.run.series)).long_run_variance ** 0.5,
+        scores=_scores(found),
+        threshold=float(chi2_distribution.isf(LEVEL / count, 1)),
+        functions=_functions(evidence.before, evidence.after if found.best.added else (), runs, nominal),
+        transfer=_transfer(
+            found, [p for r in records if (p := pumpings[id(r)]) is not None], evidence.series, nominal
+        ),
+        nominal={n: {"value": v.value, "std": None, "unit": v.unit} for n, v in nominal.parameters.items()},
+        refitted=_estimates(found.nominal),
+        refitted_delays=delays_of(found.nominal),
+        records=tuple(
+            quality_of(r, role) for group, role in ((records, "fit"), (holdout, "held out")) for r in group
+        ),
+        words=_words(answer, nominal),
+        command=command,
+        models=models,
+        worth=WORTH,
+        at_bound=found.fit.at_bound,
+        unconverged=tuple(_names(trial.model, trial.added) for trial in found.trials if not trial.converged),
+        hints=_hints(answer),
+    )
+
+
+def _listed(names: Sequence[str], most: int = 4) -> str:
+    if len(names) > most:
+        return f"{', '.join(names[: most - 1])} and {len(names) - most + 1} more records"
+    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
+
+
+def _runs(
+    before: Fit, after: Fit, pumpings: Mapping[str, Pumping | None], repaired: bool, heldout: bool = False
+) -> list[Run]:
+    """Every series of the fits beside its simulations; they were fitted to the same series.
+
+    `pumpings` are those of the records, by name, whole or cut into windows.
+    """
+    found: list[Run] = []
+    for index, one in enumerate(before.run.series):
+        pumping = pumpings.get(one.name, pumpings.get(record_of(one)))
+        rows = after.run.rows(after.model, index, after.starts[index])
+        if rows is None:
+            continue
+        phase = None
+        if pumping is not None:
+            physical = physical_times(after.model, one.centres)
+            phase = ((physical - pumping.origin) * pumping.frequency) % 1.0
+        found.append(
+            Run(
+                name=one.name,
+                time=one.centres,
+                measured=one.averaged,
+                before=one.averaged + before.residuals[index],
+                after=one.averaged + after.residuals[index] if repaired else None,
+                position=rows[:, 0],
+                velocity=rows[:, 1],
+                phase=phase,
+                used=one.used,
+                hidden=np.zeros_like(one.used) if heldout else _hidden(one),
+                heldout=heldout,
+                quiet=_quiet(one),
+                size=None if one.observer is None else one.observer.size,
+                whole=one.whole,
+            )
+        )
+    return found
+
+
+def _hidden(one: Series) -> NDArray[np.bool_]:
+    """The end of a series that was kept from the fit; single blocks that a gap runs through are not meant."""
+    last = np.flatnonzero(one.used)
+    hidden = np.zeros_like(one.used)
+    if len(last):
+        hidden[last[-1] + 1 :] = True
+    return hidden if hidden.sum() > 3 else np.zeros_like(one.used)
+
+
+def _quiet(one: Series) -> bool:
+    return one.command is None or not np.any(one.command.c)
+
+
+def _scores(found: Search) -> tuple[ElementScore, ...]:
+    """The best score of each element in the first round, best first."""
+    best: dict[str, ElementScore] = {}
+    for score in found.rounds[0].scores:
+        best.setdefault(
+            score.element.name, ElementScore(score.element.name, score.element.slot, score.statistic)
+        )
+    return tuple(best.values())
+
+
+def _functions(
+    before: Sequence[Dependence], after: Sequence[Dependence], runs: Sequence[Run], model: Model
+) -> tuple[FreeFunction, ...]:
+    later = {one.quantity: one for one in after}
+    paths = {"position": [run.position for run in runs], "velocity": [run.velocity for run in runs]}
+
+    def shape(one: Dependence) -> tuple[Array, Array]:
+        """The curve where it is well known, less what the model's own parameters can take up: an offset, and a slope over
+        position or speed."""
+        if not len(one.force):
+            return one.grid, one.force
+        known = np.arange(len(one.grid)) < len(one.grid) - 1  # the splines end before the last point
+        moved = one.quantity in paths
+        if moved:
+            low, high = np.quantile(np.concatenate(paths[one.quantity]), [RARE, 1.0 - RARE])
+            known &= (one.grid >= low) & (one.grid <= high)
+        if known.sum() < 8:
+            return one.grid[:0], one.force[:0]
+        grid, force = one.grid[known], one.force[known]
+        return grid, force - np.polyval(np.polyfit(grid, force, 1 if moved else 0), grid)
+
+    units = {"velocity": f"{model.units.position}/s", "time": "s", "actuator force": model.units.force}
+    made = []
+    for one in before:
+        other = later.get(one.quantity)
+        grid, force = shape(one)
+        grid_after, force_after = shape(other) if other else (None, None)
+        made.append(
+            FreeFunction(
+                one.quantity, one.explained, grid, force,
+                grid_unit=units.get(one.quantity, model.units.position),
+                force_unit=model.units.position if "sensor" in one.quantity else model.units.force,
+                explained_after=other.explained if other else None,
+                grid_after=grid_after,
+                force_after=force_after,
+            )
+        )  # fmt: skip
+    return tuple(made)
+
+
+def _transfer(
+    found: Search, pumpings: Sequence[Pumping], series: Sequence[Series], nominal: Model
+) -> TransferChange | str:
+    """Transfer functions of the refitted nominal and the final model around the cycle of the first forced record, or, where
+    no forcing was recorded, around rest; the reason where there are none."""
+    if any(one.kind != "force" for one in series):
+        return "transfer functions are stated for a force as input, and these records have another"
+    if not pumpings and all(one.command is None for one in series):
+        return (
+            "these records have neither an input nor a forcing, so there are no transfer functions to compare"
+        )
+    highest = max(bandwidth(one.value, one.period) for one in series)
+    if pumpings:
+        pumping, indices = pumpings[0], np.array(INDICES)
+        highest = min(highest, 20.0 * pumping.frequency)
+    else:
+        pumping, indices = Pumping(1.0, np.zeros(2, dtype=complex)), np.array([0])
+    frequency = np.linspace(0.02, 1.0, POINTS) * highest
+    try:
+        before = theoretical_htf(found.nominal.model, pumping, indices, frequency)
+        after = theoretical_htf(found.fit.model, pumping, indices, frequency)
+    except (InputError, np.linalg.LinAlgError) as error:
+        return f"no transfer functions: {error}"
+    unit = f"{nominal.units.position}/{nominal.units.force}"
+    pumped = pumping.frequency if pumpings else None
+    return TransferChange(frequency, tuple(map(int, indices)), before.value, after.value, unit, pumped)
+
+
+def _estimates(fit: Fit) -> dict[str, dict[str, float | str | None]]:
+    """Every parameter of a fit; standard deviation 0 where it is fixed, None where the records do not determine it."""
+    std: Mapping[str, float] = fit.std
+    made: dict[str, dict[str, float | str | None]] = {}
+    for name, value in fit.model.parameters.items():
+        known = std.get(name, 0.0)
+        limit = 1e9 * max(abs(value.value), 1e-12)
+        made[name] = {"value": value.value, "std": known if known <= limit else None, "unit": value.unit}
+    return made
+
+
+def _names(model: Model, labels: Sequence[str]) -> tuple[str, ...]:
+    return tuple(term.element.name for label in labels if (term := model.term(label)) is not None)
+
+
+def _words(answer: Answer, nominal: Model) -> dict[str, ElementWords]:
+    elements = [term.element for term in nominal.terms]
+    elements += [score.element for score in answer.evidence.search.rounds[0].scores]
+    elements += [term.element for trial in answer.evidence.search.trials for term in trial.model.terms]
+    return {
+        e.name: ElementWords(
+            e.title,
+            {p.name: p.description for p in e.parameters},
+            e.special_case_of,
+            e.also_known_as,
+            e.reference,
+        )
+        for e in elements
+    }
+
+
+def _hints(answer: Answer) -> tuple[tuple[str, str, str], ...]:
+    """What tells the members of the families apart, by the elements' own account."""
+    known = {t.element.name: t.element for trial in answer.evidence.search.trials for t in trial.model.terms}
+    made = []
+    for group in answer.diagnosis.indistinguishable:
+        for name in group:
+            for other, words in known[name].confusable.items() if name in known else ():
+                if other in group:
+                    made.append((name, other, words))
+    return tuple(made)

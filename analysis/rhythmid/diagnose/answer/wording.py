@@ -1,0 +1,88 @@
+"""A diagnosis in sentences: where, what, how much better, and which nominal values the records contradict."""
+
+import math
+from collections.abc import Sequence
+
+from rhythmid.diagnose.answer.result import FitQuality, Location, MissingEffect, Verdict
+from rhythmid.diagnose.location import Dependence
+from rhythmid.diagnose.search.forward import Search
+from rhythmid.identify.output_error import Fit
+from rhythmid.model import Model
+
+SENTENCES = {
+    "command": "between the command u and the point where the forcing joins it",
+    "actuator": "in the actuator, which turns forcing plus command into force",
+    "force": "in the balance of forces on the mass",
+    "sensor": "between the mass and the measurement",
+    "timing": "in the clocks: stamps and delays that change",
+}
+
+
+def location_of(
+    found: Search, missing: Sequence[MissingEffect], before: Sequence[Dependence], verdict: Verdict
+) -> Location:
+    by_slot: dict[str, float] = {}
+    for one in found.rounds[0].scores:
+        by_slot[one.element.slot] = max(by_slot.get(one.element.slot, 0.0), one.statistic)
+    evidence = [
+        f"best score in slot {slot}: chi2 = {value:.0f}"
+        for slot, value in sorted(by_slot.items(), key=lambda x: -x[1])
+    ]
+    evidence += [
+        f"a free function of {d.quantity} explains {100 * max(d.explained, 0.0):.0f} % of the mismatch in blocks left out"
+        for d in before
+    ]
+    if verdict == "consistent":
+        return Location(None, "nowhere: the refitted nominal model explains the records", tuple(evidence))
+    if missing:
+        slots = list(dict.fromkeys(effect.slot for effect in missing))
+        where = "; and ".join(SENTENCES[slot] for slot in slots)
+        return Location(slots[0], where, tuple(evidence))
+    best = max(by_slot, key=lambda slot: by_slot[slot], default=None)
+    top = before[0] if before else None
+    where = SENTENCES.get(best or "", "not located")
+    if top is not None and top.explained > 0.2:
+        where += f"; it varies with {top.quantity}"
+    return Location(best, where, tuple(evidence))
+
+
+def summary_of(
+    verdict: Verdict,
+    reason: str,
+    missing: Sequence[MissingEffect],
+    plain: FitQuality,
+    augmented: FitQuality,
+    twins: Sequence[tuple[str, ...]],
+    whole: str,
+) -> str:
+    """The verdict in a sentence or two; `whole` is what errors are a share of."""
+    if verdict == "consistent":
+        return "Nothing is missing: with its parameters refitted, the nominal model explains the records down to the noise."
+    names = " and ".join(effect.element.replace("_", " ") for effect in missing)
+    if verdict == "missing_physics":
+        said = f"The model lacks {names}."
+        if twins:
+            said = f"The model lacks {names} (or, indistinguishable here, {', '.join(' / '.join(g[1:]) for g in twins)})."
+        before, after = plain.heldout_nrmse, augmented.heldout_nrmse
+        if before is not None and after is not None:
+            said += f" With it, the error on held-out data falls from {100 * before:.2f} % to {100 * after:.2f} % of the {whole}."
+        return said
+    if verdict == "undecided":
+        return f"Undecided: {reason}." + (f" Best so far: {names}." if names else "")
+    return f"Something is missing that the catalogue does not know: {reason}." + (
+        f" The nearest, not the name: {names}." if names else ""
+    )
+
+
+def recalibrated(nominal: Model, fit: Fit) -> list[str]:
+    """Nominal parameters that the records contradict, as sentences."""
+    said = []
+    for name, value in nominal.parameters.items():
+        if name not in fit.names:
+            continue
+        new, std = fit.model.value(name), fit.std[name]
+        if math.isfinite(std) and abs(new - value.value) > max(4.0 * std, 0.02 * abs(value.value)):
+            said.append(
+                f"{name}: {value.value:.6g} in the nominal model, {new:.6g} ± {std:.2g} {value.unit} in the records"
+            )
+    return said

@@ -1,0 +1,192 @@
+"""Calibration: refit everything that the nominal model already has before asking what it lacks.
+
+Parameters that are wrong are not missing physics. Neither is a delay, nor an input that the recording reconstructs
+otherwise than by holding it: those are found here and told apart from effects.
+"""
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.errors import InputError
+from rhythmid.identify.multiple_shooting import split
+from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
+from rhythmid.identify.series import REST_LENGTH, Series, dominant_frequency
+from rhythmid.model import INERTIA, Model
+from rhythmid.progress import Tell
+from rhythmid.simulation.signal import band_limited, first_order_hold
+
+INPUT_DELAY = "input_delay.delay"
+NO_ORIGIN = "No position was measured, so that its origin is arbitrary: the spring's rest length is kept as it was given."
+EVEN = 1e-3  # of the period; spread of the times between samples that still counts as even
+FOLLOWS = 0.3  # error, as a share of the motion, below which a model follows the machine
+GAIN = 0.7  # share to which a delay far from its start has to lower the error, or it but stands in for what is missing
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The refitted nominal model, its series, and what was noticed.
+
+    The input of the series is as it turned out to be: held, or `reconstructed` between its samples.
+    """
+
+    fit: Fit
+    series: tuple[Series, ...]
+    notes: tuple[str, ...]
+    late_by: float | None  # [samples] how late a held input acts, where that shows it is not held
+    reconstructed: bool = False
+
+
+def with_delays(model: Model, series: Sequence[Series], catalogue: Catalogue) -> Model:
+    """The model with the delay of every path that the records can show.
+
+    The input's delay may come out negative by up to a sample and a half: that is how an input that is not held, but
+    simulated as held, shows.
+    """
+    if any(one.command is not None for one in series):
+        if model.term("input_delay") is None:
+            model = model.with_element(catalogue["input_delay"], {"delay": 0.0})
+        period = max(one.period for one in series)
+        current = model.parameters[INPUT_DELAY]
+        if not current.fixed:
+            model = with_bounds(
+                model, {INPUT_DELAY: (min(current.bounds[0], -1.5 * period), current.bounds[1])}
+            )
+    return model
+
+
+def causal(model: Model) -> Model:
+    """The model with a delay that came out a little negative set to zero: no machine answers before it is asked."""
+    current = model.parameters.get(INPUT_DELAY)
+    if current is None or current.bounds[0] >= 0.0:
+        return model
+    return model.with_parameters(
+        {INPUT_DELAY: replace(current, value=max(current.value, 0.0), bounds=(0.0, current.bounds[1]))}
+    )
+
+
+def _shooting_start(model: Model, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Model:
+    """Parameters from short windows with starts of their own: wrong values cannot drift far in a window."""
+    length = 2.0 / max(dominant_frequency(one) for one in series)
+    windows = [part for one in series for part in split(one, length)]
+    chosen = windows[:: max(1, len(windows) // 60)]
+    return estimate(model, chosen, iterations=12, pool=pool).model
+
+
+def calibrate(
+    model: Model,
+    series: Sequence[Series],
+    catalogue: Catalogue,
+    pool: ThreadPoolExecutor | None = None,
+    tell: Tell = lambda _: None,
+) -> Calibration:
+    """Refit the nominal model. Raises InputError when it has nothing to fit, or diverges whatever is tried."""
+    if not model.free:
+        raise InputError(
+            "every parameter of the nominal model is fixed, so a wrong value could not be told from missing physics; "
+            "free those that are not known exactly (drop 'fixed: true')"
+        )
+    model = with_delays(model, series, catalogue)
+    notes: tuple[str, ...] = ()
+    if REST_LENGTH in model.free and any(one.measured != "position" for one in series):
+        model, notes = _as_given(model, REST_LENGTH), (NO_ORIGIN,)
+    tell("refitting the nominal model")
+    best: Fit | None = None
+    failure: InputError | None = None
+    try:
+        best = estimate(model, series, pool=pool)
+    except InputError as error:
+        failure = error
+    if best is None or best.nrmse() > 0.1 or not best.converged:
+        try:
+            again = estimate(_shooting_start(model, series, pool), series, pool=pool)
+            if best is None or sum(float(r @ r) for r in again.residuals) < sum(
+                float(r @ r) for r in best.residuals
+            ):
+                best = again
+        except InputError as error:
+            failure = failure or error
+    if best is None:
+        assert failure is not None
+        raise failure
+    if INERTIA in best.names and best.std[INERTIA] > best.model.value(INERTIA):
+        found = calibrate(_as_given(model, INERTIA), series, catalogue, pool, tell)
+        return replace(found, notes=(*notes, _no_mass(model), *found.notes))
+    if best.nrmse() > FOLLOWS:
+        best = _scan_delays(best, series, pool)
+    found = _hold(best, series, pool, tell)
+    return replace(found, notes=(*notes, *found.notes))
+
+
+def _as_given(model: Model, name: str) -> Model:
+    """The model with a parameter held at its value."""
+    return model.with_parameters({name: replace(model.parameters[name], fixed=True)})
+
+
+def _no_mass(model: Model) -> str:
+    mass = model.mass
+    return (
+        f"The records do not determine the mass: it is kept at {mass.value:g} {mass.unit} as given, and stiffnesses, dampings and "
+        "forces are in proportion to it."
+    )
+
+
+def _scan_delays(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Fit:
+    """Try delays that are far from the start: a delay beyond half a period of the motion is another local minimum."""
+    names = [name for name in (INPUT_DELAY, "measurement_delay.delay") if name in fit.names]
+    best = fit
+    for name in names:
+        for delay in (0.03, 0.08, 0.15, 0.25):
+            model = fit.model.with_values({name: delay})
+            try:
+                trial = minimise(model, fit.run, fit.names, fit.noise, fit.starts, 12, pool)
+            except InputError:
+                continue
+            if trial.chi2 < best.chi2:
+                best = trial
+    if best is fit:
+        return fit
+    found = estimate(best.model, series, pool=pool)
+    return found if found.nrmse() < GAIN * fit.nrmse() else fit
+
+
+def reconstructed(series: Series) -> Series:
+    """The series with a held input reconstructed from its samples: band-limited where they are evenly spaced, else by
+    straight lines. One that is not held stays as it is."""
+    command = series.command
+    if command is None or command.c.shape[0] > 1 or len(command.x) < 10:
+        return series
+    time, value = command.x[:-1], command.c[-1]
+    even = np.ptp(np.diff(time)) < EVEN * float(np.median(np.diff(time)))
+    return replace(series, command=band_limited(time, value) if even else first_order_hold(time, value))
+
+
+def _hold(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None, tell: Tell) -> Calibration:
+    """Notice an input that acts earlier than its samples: it was not held, and is reconstructed.
+
+    No machine answers before it is asked, so a delay that comes out negative speaks against holding; which of the two
+    predicts the next sample better decides, as far as a model can that may lack something.
+    """
+    kept = Calibration(fit, tuple(series), (), None)
+    held = [one for one in series if one.command is not None and one.command.c.shape[0] == 1]
+    if INPUT_DELAY not in fit.names or not held or fit.nrmse() > FOLLOWS:
+        return kept
+    delay, std, period = fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY], held[0].period
+    if not math.isfinite(std) or delay > -max(4.0 * std, 0.05 * period):
+        return kept
+    late = -delay / period
+    tell(f"the held input is late by {late:.2f} sample; reconstructing it between its samples")
+    note = (
+        f"Input about {'half a' if 0.35 < late < 0.65 else f'{late:.2f}'} sample late when held: a free delay comes out "
+        f"at {delay * 1e3:.3f} ± {std * 1e3:.3f} ms ({-late:.2f} sample)."
+    )
+    smooth = [reconstructed(one) for one in series]
+    again = estimate(fit.model.with_values({INPUT_DELAY: 0.0}), smooth, pool=pool)
+    if again.noise.std > fit.noise.std:
+        return replace(kept, notes=(note + " Holding it fits better all the same.",), late_by=late)
+    note += " The input is not held but band-limited; it is reconstructed so in all that follows."
+    return Calibration(again, tuple(smooth), (note,), late, reconstructed=True)

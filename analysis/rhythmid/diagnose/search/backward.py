@@ -1,0 +1,145 @@
+"""The chosen effects defend their places: against being left out, and against others in their place."""
+
+from collections.abc import Callable, Sequence
+
+from rhythmid.diagnose.search.refit import Proposal, Trial, propose, run_trials, under_noise
+from rhythmid.diagnose.search.round import Round, distinct
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.elements.element import Element
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.series import Series, scales
+from rhythmid.model import Model
+from rhythmid.progress import Tell
+from rhythmid.simulation.compiled import compile_model
+
+RIVALS = 4  # elements that scored best at first, tried again in the place of each of several effects
+
+
+def defend(
+    best: Trial,
+    series: Sequence[Series],
+    catalogue: Catalogue,
+    trials: dict[tuple[str, ...], Trial],
+    noise: NoiseModel,
+    step: float,
+    rounds: Sequence[Round],
+    margin: float,
+    most: int,
+    tell: Tell,
+) -> tuple[Trial, dict[tuple[str, ...], Trial]]:
+    """Let every added element defend its place; returns the survivor and the models that were tried on the way.
+
+    First whether it can be left out, then whether another one does better in its place: a simpler member of its family,
+    or, where there are several effects, an element that scored well before the others were known. A model that says less
+    may be worse by the `margin` in the criterion. As many effects as are tried at once, `most`, get no names, whichever
+    they are, so of these none is exchanged.
+    """
+    tried: dict[tuple[str, ...], Trial] = {}
+
+    def run(known: Trial, proposals: list[Proposal]) -> list[Trial]:
+        fresh = [p for p in proposals if tuple(sorted(p.added)) not in tried]
+        if not fresh:
+            return []
+        tell(f"testing {', '.join(' + '.join(p.added) for p in fresh)}")
+        found, _ = run_trials(fresh, series, known.starts, _states(known), noise, step)
+        tried.update({tuple(sorted(t.added)): t for t in found})
+        return found
+
+    best = _without_idle(best, run, margin)
+    found = run(best, _swaps(best, series, catalogue, trials, rounds)) if len(best.added) < most else []
+    earlier = [t for t in trials.values() if t.added and _stands_for(t, best)]
+    plainer = [t for t in [*found, *under_noise(earlier, series, noise, step)] if _stands_for(t, best)]
+    simpler = [t for t in plainer if t.bic() < best.bic() + margin]
+    better = [t for t in found if t.bic() < best.bic()]
+    if better:
+        best = min(better, key=lambda t: t.bic())
+    elif simpler:
+        best = min(simpler, key=lambda t: (t.free, t.bic()))
+    return best, tried
+
+
+def _without_idle(best: Trial, run: Callable[[Trial, list[Proposal]], list[Trial]], margin: float) -> Trial:
+    """The model without the effects that can be left out."""
+    while len(best.added) > 1:
+        slim = [Proposal(_rest(best, label), best.model.without(label), ({},)) for label in best.added]
+        dropped = run(best, slim)
+        kept = [t for t in dropped if t.bic() < best.bic() + margin]
+        if not kept:
+            break
+        best = min(kept, key=lambda t: t.bic())
+    return best
+
+
+def _swaps(
+    best: Trial,
+    series: Sequence[Series],
+    catalogue: Catalogue,
+    trials: dict[tuple[str, ...], Trial],
+    rounds: Sequence[Round],
+) -> list[Proposal]:
+    """Models with another element in the place of one of the effects."""
+    swaps: list[Proposal] = []
+    for label in best.added:
+        element = best.element(label)
+        family = {e.name for e in catalogue.values() if element.name in e.special_case_of and e.candidate}
+        names = set(family)
+        if len(best.added) > 1:
+            names |= {score.element.name for score, _ in distinct(rounds[0].scores, RIVALS)}
+        rest = _rest(best, label)
+        slim = best.model.without(label)
+        for name in sorted(names - {best.element(other).name for other in best.added}):
+            starts = _starts_for(catalogue, name, series, slim, rounds, 8 if name in family else 1)
+            if starts and name in family:  # a special case of the best is at its best close to it
+                starts.insert(0, starts[0] | _shared(best, label, catalogue[name]))
+            elif not starts or tuple(sorted((*rest, name))) in trials:
+                continue
+            swaps.append(propose(slim, catalogue[name], starts, rest))
+    return swaps
+
+
+def _shared(trial: Trial, label: str, element: Element) -> dict[str, float]:
+    """Values of the parameters that another element has by the same names as the one under the label."""
+    own = {parameter.name for parameter in element.parameters}
+    return {
+        p.name: trial.model.value(f"{label}.{p.name}")
+        for p in trial.element(label).parameters
+        if p.name in own
+    }
+
+
+def _rest(trial: Trial, label: str) -> tuple[str, ...]:
+    return tuple(name for name in trial.added if name != label)
+
+
+def _stands_for(trial: Trial, best: Trial) -> bool:
+    """Whether a model says less than the best: some of its effects, or a special case in the place of one of them."""
+    if trial.free >= best.free:
+        return False
+    if set(trial.added) < set(best.added):
+        return True
+    extra = [trial.element(label) for label in trial.added if label not in best.added]
+    gone = [best.element(label) for label in best.added if label not in trial.added]
+    return len(extra) == len(gone) == 1 and gone[0].name in extra[0].special_case_of
+
+
+def _states(trial: Trial) -> tuple[str, ...]:
+    return compile_model(trial.model).layout.states
+
+
+def _starts_for(
+    catalogue: Catalogue,
+    name: str,
+    series: Sequence[Series],
+    model: Model,
+    rounds: Sequence[Round],
+    count: int,
+) -> list[dict[str, float]]:
+    """First guesses of an element for a refit: those that scored best in any round, or its own."""
+    scored = sorted(
+        (s for r in rounds for s in r.scores if s.element.name == name and s.statistic > 0.0),
+        key=lambda s: -s.statistic,
+    )
+    if scored:
+        return [one.start for one in scored[:count]]
+    element = catalogue[name]
+    return [dict(s) for s in element.starts(scales(series, model))][:count] if element.starts else []

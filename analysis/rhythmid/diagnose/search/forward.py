@@ -1,0 +1,328 @@
+"""Forward search for missing elements, then pruning: the model that explains the records with the fewest effects.
+
+Each round scores the whole catalogue (cheap), refits the most promising elements with everything free (dear), and keeps
+the best if it is worth its parameters. Afterwards every element must defend its place: against being left out, against
+a simpler member of its family, and, where there are several, against the other candidates.
+"""
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.diagnose.baseline import FOLLOWS
+from rhythmid.diagnose.search.backward import defend
+from rhythmid.diagnose.search.order import in_best_order
+from rhythmid.diagnose.search.refit import (
+    Proposal,
+    Trial,
+    fine_enough,
+    near_under_noise,
+    propose,
+    run_trials,
+    under_noise,
+    whole_fit,
+)
+from rhythmid.diagnose.search.round import Round, distinct
+from rhythmid.diagnose.search.score_tests import (
+    Change,
+    Score,
+    changes_of,
+    guesses,
+    p_value,
+    score,
+    sizes_along,
+    trajectories,
+    under,
+)
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.errors import InputError
+from rhythmid.identify.free_run import accurate
+from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
+from rhythmid.identify.output_error import Fit, minimise, noise_of
+from rhythmid.identify.sample_clock.tick_likelihood import ticks_sought
+from rhythmid.identify.sample_clock.tick_scan import HOLD
+from rhythmid.identify.series import Series
+from rhythmid.identify.start_cost import start_cost
+from rhythmid.model import Model
+from rhythmid.parallel import fork_map
+from rhythmid.progress import Tell
+
+Array = NDArray[np.float64]
+
+# difference of the information criterion below which two models are told apart by nothing but hope
+WORTH = 10.0
+SHARE = 5e-4  # of what is explained already, below which a further effect is an imperfection of the others
+LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
+# elements of a round that are refitted; the right one was among the first five in all of 234 trials
+REFITTED = 6
+# difference of the criterion within which models are compared again under the noise that they leave
+NEAR = 60.0
+# gain in the criterion from which a model is worth a second look where a better one does not hold under the noise that it
+# leaves; and how many of them get it
+PLAIN, SECOND = 100.0, 2
+MOST = 4  # effects at once
+OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
+MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
+MISFIT = 0.1  # error, as a share of the motion, and
+# power of the residual over what its own past leaves of it, beyond both of which it is no noise
+PREDICTED = 25.0
+# of the noise: integration error of an element with corners beyond which all steps are made finer
+ROUGH = 0.1
+
+
+@dataclass(frozen=True)
+class Search:
+    """What the search found.
+
+    `nominal` is the refitted nominal model, `best` the chosen one (the nominal one when nothing is missing) and `fit` its
+    full fit, all under the same `noise`. `trials` are all models that were refitted, by information criterion;
+    `excluded` those that could not be simulated, with the reason.
+    """
+
+    nominal: Fit
+    best: Trial
+    fit: Fit
+    noise: NoiseModel
+    trials: tuple[Trial, ...]
+    rounds: tuple[Round, ...]
+    excluded: tuple[tuple[tuple[str, ...], str], ...]
+
+
+def noise_without(fit: Fit, changes: Sequence[Change], most: int = 60) -> NoiseModel:
+    """Noise model of the residual less what the catalogue's best guesses together explain of it.
+
+    The residual of a model that lacks something is not noise: a regular motion that is missed can be predicted from its
+    own past, so it would pass for colour and be whitened away. Where nothing is missing the guesses take out no more
+    than their number of degrees of freedom, which is given back.
+    """
+    samples = sum(int(one.used.sum()) for one in fit.run.series)
+    ranked = score(fit, changes)[: min(most, samples // 50)]
+    residuals = [r.copy() for r in fit.residuals]
+    share = 1.0
+    if ranked:
+        by_key = {change.key: change for change in changes}
+        picked = [by_key[one.key] for one in ranked]
+        used = [one.used for one in fit.run.series]
+        design = np.concatenate(
+            [np.column_stack([c.outputs[i][u] for c in picked]) for i, u in enumerate(used)]
+        )
+        norms = np.linalg.norm(design, axis=0)
+        norms[norms == 0.0] = 1.0
+        target = np.concatenate([r[u] for r, u in zip(residuals, used)])
+        solution, _, rank, _ = np.linalg.lstsq(design / norms, -target, rcond=1e-6)
+        solution = solution / norms
+        share = samples / max(samples - int(rank), 1)
+        for i, r in enumerate(residuals):
+            r += np.column_stack([c.outputs[i] for c in picked]) @ solution
+    stretches = [r[s] * math.sqrt(share) for r, one in zip(residuals, fit.run.series) for s in runs(one.used)]
+    return estimate_noise(stretches, floor=fit.noise.std * 1e-6)
+
+
+def _one_round(
+    fit: Fit, added: tuple[str, ...], catalogue: Catalogue, pool: ThreadPoolExecutor | None
+) -> tuple[Round, Fit]:
+    """Score the catalogue at a fit, under the noise that its best guesses leave; returns the fit under that noise, too.
+
+    What is missing, such as a slow drift, would otherwise pass for the colour of the noise, in later rounds as in the first.
+    """
+    known = trajectories(fit)
+    changes = changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
+    noise = noise_without(fit, changes)
+    if fit.nrmse() > MISFIT and noise.variance > PREDICTED * noise.std**2:
+        # motion that is missed, not noise: do not whiten it away
+        noise = NoiseModel(np.empty(0), noise.variance**0.5)
+    fit = under(fit, noise, pool)
+    scores = score(fit, changes)
+    return Round(tuple(scores), p_value(scores), added), fit
+
+
+def _proposals(
+    base: Model, added: tuple[str, ...], scores: Sequence[Score], count: int, chi2: float
+) -> tuple[list[Proposal], list[float]]:
+    """Structures worth a refit, with chi2 below which one start of each is enough."""
+    chosen = distinct(scores, count)
+    made, enough = [], []
+    for best, group in chosen:
+        starts = [one.start for one in group[: 3 if len(group) > MANY else 2]]
+        if not 0.2 < abs(best.size) < 5.0:  # far from the guess that was scored, the size is an extrapolation
+            starts.insert(1, dict(best.values))
+        made.append(propose(base, best.element, starts[:3], added, chi2))
+        enough.append(chi2 - 0.8 * best.statistic)
+    return made, enough
+
+
+def _from_given(
+    nominal: Fit, given: Model, catalogue: Catalogue, chi2: float, pool: ThreadPoolExecutor | None
+) -> list[Proposal]:
+    """Structures worth a refit from the values that the nominal model was given with.
+
+    Where it loses the machine all the same, its refit has bent them to stand in for what is missing: the spring of a hopper
+    that leaves the ground comes out far too soft and too long.
+    """
+    values = {name: given.value(name) for name in nominal.names if name in given.parameters}
+    model = nominal.model.with_values(values)
+    try:
+        fit = minimise(model, nominal.run, nominal.names, nominal.noise, nominal.starts, 0, pool)
+        known = trajectories(fit)
+    except InputError:
+        return []
+    scores = score(fit, changes_of(known, guesses(catalogue, model, sizes_along(known)), pool))
+    return _proposals(model, (), scores, REFITTED, chi2)[0]
+
+
+def _better_of(trials: Sequence[Trial]) -> list[Trial]:
+    """The better one of each two trials of the same structure, best first."""
+    kept: dict[tuple[str, ...], Trial] = {}
+    for trial in sorted(trials, key=lambda t: t.bic()):
+        kept.setdefault(trial.added, trial)
+    return list(kept.values())
+
+
+def search(
+    series: Sequence[Series],
+    nominal: Fit,
+    given: Model,
+    catalogue: Catalogue,
+    pool: ThreadPoolExecutor | None,
+    tell: Tell = lambda _: None,
+) -> Search:
+    """Search the catalogue for what the nominal model lacks; `nominal` is the fit to the same series of the one `given`."""
+    step = nominal.run.max_step
+    floor = 1e-9 * max(float(np.std(one.averaged)) for one in series)
+    tell("scoring the catalogue")
+    first, nominal = _one_round(nominal, (), catalogue, pool)
+    current, noise = nominal, nominal.noise
+    base = Trial(
+        (),
+        nominal.model,
+        nominal.starts,
+        nominal.chi2,
+        nominal.samples,
+        len(nominal.names),
+        nominal.converged,
+        noise,
+        nominal.differences,
+        start_cost(
+            nominal.model, nominal.run, noise, nominal.starts, nominal.residuals, nominal.differences[1]
+        ),
+    )
+    trials: dict[tuple[str, ...], Trial] = {(): base}
+    # the same model under the noise that it leaves, and under a round's, out of which the catalogue's guesses are taken
+    best = here = base
+    rounds, excluded = [first], []
+    now = first
+    gained = 0.0
+    while (
+        now.p_value < LEVEL and _could_pay(now, best, max(WORTH, SHARE * gained)) and len(best.added) < MOST
+    ):
+        count = REFITTED if not best.added else REFITTED - 2
+        proposals, enough = _proposals(here.model, here.added, now.scores, count, here.chi2)
+        tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
+        found, failed = run_trials(
+            proposals, series, here.starts, current.run.compiled.layout.states, here.noise, step, enough
+        )
+        if not best.added and nominal.nrmse() > FOLLOWS:
+            proposals = _from_given(nominal, given, catalogue, here.chi2, pool)
+            others, failed_too = run_trials(
+                proposals, series, here.starts, current.run.compiled.layout.states, here.noise, step
+            )
+            found, failed = _better_of([*found, *others]), failed + failed_too
+        excluded += failed
+        found = [t for t in found if t.chi2 < here.chi2]  # a richer model that does worse got lost
+        if not found:
+            break
+        trials |= {tuple(sorted(t.added)): t for t in found}
+        near = [t for t in found if t.bic() - found[0].bic() < NEAR]
+        margin = max(WORTH, SHARE * gained)
+        hopeful = [[t] for t in found[len(near) :] if here.bic() - t.bic() > PLAIN][:SECOND]
+        for candidates in (near, *hopeful):
+            top = _most_likely(candidates, series, here.noise, step, floor)
+            fit = whole_fit(top, series, here.noise, step, pool=pool)
+            finer = accurate(fit.run, fit.model, fit.starts, ROUGH * fit.noise.variance**0.5, 2)
+            if finer.max_step < 0.45 * fine_enough(top.model, step):
+                step = finer.max_step
+                fit = whole_fit(replace(top, converged=False), series, here.noise, step, pool=pool)
+            sought = top
+            if HOLD in top.added[-2:]:  # and once more beside what came after it
+                fit = ticks_sought(fit, floor, pool)
+                sought = replace(top, model=fit.model, starts=fit.starts, converged=False)
+            others = [trial for trial in candidates if trial.added != top.added]
+            settled = noise_of(fit.residuals, series, floor)
+            compared = under_noise([sought, *others, best], series, settled, step)
+            trials |= {tuple(sorted(t.added)): t for t in compared}
+            winner = compared[0]
+            before = next((t for t in compared if t.added == best.added), best)
+            gain = before.bic() - winner.bic()
+            if winner.added != best.added and gain >= margin:
+                break
+        else:  # what the noise model of the round saw in them, the noise that they leave does not bear out
+            break
+        noise = settled
+        best = in_best_order(winner, series, noise, step)
+        gained += gain + winner.chi2 - best.chi2
+        trials[tuple(sorted(best.added))] = best
+        tell(f"{best.added[-1]} explains it better by {gain:.0f}; looking for more")
+        current = whole_fit(best, series, noise, step, pool=pool)
+        if len(best.added) >= MOST:
+            break
+        now, current = _one_round(current, best.added, catalogue, pool)
+        here = under_noise([best], series, current.noise, step, 0)[0]
+        rounds.append(now)
+    if best.added:
+        margin = max(WORTH, SHARE * gained)
+        defended, more = defend(best, series, catalogue, trials, noise, step, rounds, margin, MOST, tell)
+        trials |= more
+        if defended is not best:
+            best = in_best_order(defended, series, noise, step)
+            trials[tuple(sorted(best.added))] = best
+            noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
+    ranked = _contenders(trials, best)
+    for _ in range(OVERTAKEN):
+        ranked = near_under_noise(ranked, series, noise, step, NEAR)
+        best = next(t for t in ranked if set(t.added) == set(best.added))
+        ahead = max(WORTH, SHARE * gained) if ranked[0].free > best.free else WORTH
+        if ranked[0].bic() >= best.bic() - ahead or not ranked[0].added:
+            break
+        best = ranked[0]  # a model set aside under an earlier noise model has overtaken the chosen one
+        noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
+    else:
+        ranked = near_under_noise(ranked, series, noise, step, NEAR)
+        best = next(t for t in ranked if set(t.added) == set(best.added))
+    fit = whole_fit(best, series, noise, step, pool=pool)
+    return Search(
+        under(nominal, noise, pool), best, fit, noise, tuple(ranked), tuple(rounds), tuple(excluded)
+    )
+
+
+def _most_likely(
+    near: Sequence[Trial], series: Sequence[Series], noise: NoiseModel, step: float, floor: float
+) -> Trial:
+    """The one of several close models whose remainder predicts itself best: each under the noise that it leaves.
+
+    The first noise model is coloured by the effect that is missing and can put an imitation ahead by a little.
+    """
+    if len(near) == 1:
+        return near[0]
+
+    def left(trial: Trial) -> float:
+        return noise_of(whole_fit(trial, series, noise, step).residuals, series, floor).std
+
+    found = {index: std for index, std in fork_map(left, near) if not isinstance(std, Exception)}
+    return near[min(found, key=lambda index: (found[index], index), default=0)]
+
+
+def _could_pay(now: Round, best: Trial, margin: float) -> bool:
+    """Whether the best score, which can understate what a refit gains, is of the order that an element has to earn."""
+    return now.scores[0].statistic > 0.5 * (margin + math.log(max(best.samples, 2)))
+
+
+def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial, count: int = 10) -> list[Trial]:
+    """The models worth comparing at the end: the nominal one, the chosen one and its nearest rivals."""
+    rivals = sorted(trials.values(), key=lambda t: t.bic())[:count]
+    kept = {tuple(sorted(t.added)): t for t in [trials[()], *rivals]}
+    kept[tuple(sorted(best.added))] = best
+    return list(kept.values())

@@ -1,0 +1,53 @@
+"""The order of effects in a chain: a limit before a lag is another machine than a limit behind it.
+
+Command path, actuator and sensor pass a signal from one effect to the next; forces just add. An effect that joins others
+stands behind them at first, for its score needs no place.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from rhythmid.diagnose.search.refit import Proposal, Trial, run_trials
+from rhythmid.elements.element import Element
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.series import Series
+from rhythmid.model import Model, Term
+from rhythmid.simulation.compiled import compile_model
+
+CHAINS = ("command", "actuator", "sensor")
+
+
+def in_best_order(trial: Trial, series: Sequence[Series], noise: NoiseModel, step: float) -> Trial:
+    """The trial, or the same effects with the newest one at another place of its chain, where that fits better."""
+    others = [Proposal(trial.added, model, ({},)) for model in other_orders(trial.model, trial.added[-1])]
+    if not others:
+        return trial
+    states = compile_model(trial.model).layout.states
+    moved, _ = run_trials(others, series, trial.starts, states, noise, step)
+    return min([trial, *moved], key=lambda one: one.chi2)
+
+
+def other_orders(model: Model, label: str) -> Iterator[Model]:
+    """The model with the term called `label` at each other place of its chain; none where it stands alone or in no chain."""
+    moving = model.term(label)
+    if moving is None or not _passes_on(moving, moving.element.slot):
+        return
+    rest = [term for term in model.terms if term is not moving]
+    chain = [term for term in rest if _passes_on(term, moving.element.slot)]
+    now = sum(model.terms.index(term) < model.terms.index(moving) for term in chain)
+    for place in range(len(chain) + 1):
+        if place == now:
+            continue
+        at = rest.index(chain[place]) if place < len(chain) else len(rest)
+        yield replace(model, terms=(*rest[:at], moving, *rest[at:]))
+
+
+def _passes_on(term: Term, slot: str) -> bool:
+    """Whether a term is a link of the slot's chain: delays commute with what others do, controllers take what is left."""
+    element = term.element
+    return (
+        slot in CHAINS
+        and element.slot == slot
+        and element.kernel is not None
+        and element.acts == Element.acts
+    )

@@ -1,0 +1,390 @@
+"""Refit the model with candidate elements, everything free, and compare what they reach.
+
+A comparison needs one noise model for all: it is estimated from what the best candidate leaves, because the effect
+that is missing from the others must not be taken for coloured noise.
+"""
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.elements.element import ELAPSED, STEP, Element
+from rhythmid.errors import InputError
+from rhythmid.identify.descent import Descent, descend
+from rhythmid.identify.free_run import FreeRun, prepare_run, start_of
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.output_error import Fit, minimise
+from rhythmid.identify.sample_clock.tick_scan import HOLD, scanned
+from rhythmid.identify.series import Series, scales
+from rhythmid.identify.start_cost import start_cost
+from rhythmid.model import Model
+from rhythmid.parallel import fork_map
+
+Array = NDArray[np.float64]
+SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
+STEEP = 0.8  # of chi2, below which as many iterations as in a sketch have to bring a descent that goes on
+PROMISING = 0.3  # share of the spread of chi2 within which a model is carried to convergence
+HOPS = 12  # at most, from one minimum to the next
+WAYS = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minima, that one hop goes
+FAINTER = (0.1, 0.01)  # shares of a guess that led nowhere, tried in its place
+TOLERANCE = 0.05  # of chi2, at which a trial has converged: far below what an element has to earn
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate model, fitted: its structure, what was added to the nominal model, and how well it does."""
+
+    added: tuple[str, ...]
+    model: Model
+    starts: tuple[Array, ...]
+    chi2: float
+    samples: int
+    free: int
+    converged: bool
+    noise: NoiseModel  # under which chi2 was reached
+    differences: tuple[Array, Array] | None = None  # steps by which its sensitivities were taken
+    start_cost: float = 0.0  # of the starts of its elements' own states
+
+    def bic(self) -> float:
+        """Bayesian information criterion (G. Schwarz, Ann. Stat. 6 (1978) 461), with what free starts cost."""
+        return self.chi2 + self.free * math.log(max(self.samples, 2)) + self.start_cost
+
+    def element(self, label: str) -> Element:
+        """The element that the model has under a label; KeyError if there is none."""
+        term = self.model.term(label)
+        if term is None:
+            raise KeyError(label)
+        return term.element
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What a worker sends back of a fit: plain numbers. `values` are of all parameters, for guesses differ in fixed ones, too."""
+
+    values: dict[str, float]
+    free: int
+    starts: tuple[Array, ...]
+    chi2: float
+    samples: int
+    converged: bool
+    differences: tuple[Array, Array]
+    start_cost: float
+
+
+def _outcome(end: Descent, run: FreeRun, noise: NoiseModel) -> _Outcome:
+    values = {name: value.value for name, value in end.model.parameters.items()}
+    cost = start_cost(end.model, run, noise, end.starts, end.residuals, end.differences[1])
+    return _Outcome(
+        values, len(end.model.free), end.starts, end.chi2, end.samples, end.converged, end.differences, cost
+    )
+
+
+def _trial(added: tuple[str, ...], model: Model, done: _Outcome, noise: NoiseModel) -> Trial:
+    fitted = model.with_values(done.values)
+    return Trial(
+        added,
+        fitted,
+        done.starts,
+        done.chi2,
+        done.samples,
+        done.free,
+        done.converged,
+        noise,
+        done.differences,
+        done.start_cost,
+    )
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A structure to try: the model with the elements in it, and several first guesses (values by parameter name).
+
+    `ceiling` is the chi2 of a model that it contains, as far as that is known; `faint` are guesses close to that one.
+    """
+
+    added: tuple[str, ...]
+    model: Model
+    guesses: tuple[dict[str, float], ...]
+    ceiling: float = math.inf
+    faint: tuple[dict[str, float], ...] = ()
+
+
+def propose(
+    base: Model,
+    element: Element,
+    guesses: Sequence[dict[str, float]],
+    added: tuple[str, ...],
+    ceiling: float = math.inf,
+) -> Proposal:
+    """The base model, whose chi2 is `ceiling`, with one more element; `guesses` are values of the element's parameters."""
+    extended = base.with_element(element, guesses[0])
+    label = extended.terms[-1].label
+
+    def named(guess: dict[str, float]) -> dict[str, float]:
+        return {f"{label}.{name}": value for name, value in guess.items()}
+
+    faint = [fainter(element, guesses[0], share) for share in FAINTER] if element.size else []
+    return Proposal((*added, label), extended, tuple(map(named, guesses)), ceiling, tuple(map(named, faint)))
+
+
+def fainter(element: Element, guess: dict[str, float], share: float) -> dict[str, float]:
+    """Values of an element's parameters with its effect reduced to a share."""
+    value = guess[element.size]
+    if math.isinf(element.absent):
+        return guess | {element.size: value / share}
+    return guess | {element.size: element.absent + share * (value - element.absent)}
+
+
+def fine_enough(model: Model, step: float) -> float:
+    """Integration step [s] for a model: shorter where an element asks for the step because it may be stiff, or for the time
+    since it began because its force then bends within it."""
+    asked = {source for term in model.terms for source, _ in term.element.borrows.values()}
+    return min(step, 5e-4 if ELAPSED in asked else 1e-3 if STEP in asked else step)
+
+
+def _fit_proposal(
+    proposal: Proposal,
+    series: Sequence[Series],
+    starts: Sequence[Array],
+    known: Sequence[str],
+    noise: NoiseModel,
+    max_step: float,
+    enough: float,
+) -> _Outcome:
+    """A few iterations from each guess, more from the best, starting in `starts` (whose states are `known` by name); no
+    further guess is tried once chi2 falls below `enough`.
+
+    Raises InputError when the model diverges from every guess.
+    """
+    run = prepare_run(proposal.model, series, fine_enough(proposal.model, max_step))
+    names = tuple(proposal.model.free)
+    best: Descent | None = None
+    failure: InputError | None = None
+    ticks: list[dict[str, float]] = []
+    if proposal.added[-1:] == (HOLD,):
+        begin = [_extended(proposal.model, run, i, start, known) for i, start in enumerate(starts)]
+        ticks = scanned(proposal.model, series, begin, noise)
+    for guess in (*ticks, *proposal.guesses, *proposal.faint):
+        if guess in proposal.faint and best is not None and best.chi2 < proposal.ceiling:
+            break
+        model = proposal.model.with_values(guess)
+        try:
+            begin = [_extended(model, run, i, start, known) for i, start in enumerate(starts)]
+            end = descend(model, run, names, noise, begin, SKETCH, tolerance=TOLERANCE)
+        except InputError as error:
+            failure = error
+            continue
+        if best is None or end.chi2 < best.chi2:
+            best = end
+        if best.chi2 < enough:
+            break
+    if best is None:
+        assert failure is not None
+        raise failure
+    best = _carried_on(best, run, names, noise)
+    guessed = proposal.guesses[0] if proposal.guesses else {}
+    flat = _flat(best.model, best.differences[0], list(guessed))
+    if flat:
+        back = best.model.with_values({name: proposal.guesses[0][name] for name in flat})
+        again = descend(back, run, names, noise, best.starts, BRIEF, None, TOLERANCE)
+        best = min(best, again, key=lambda end: end.chi2)
+    hops = _hops(proposal, series) if best.chi2 < proposal.ceiling else {}
+    for name, distance in hops.items():
+        best = _hopped(best, run, names, noise, name, distance)
+    return _outcome(best, run, noise)
+
+
+def _carried_on(end: Descent, run: FreeRun, names: tuple[str, ...], noise: NoiseModel) -> Descent:
+    """The descent carried on to `BRIEF` iterations, and beyond as long as it still falls steeply: in a narrow, bent valley it
+    comes from far away and can be the deepest in the end."""
+    done, steep = SKETCH, True
+    while not end.converged and (done < BRIEF or (steep and done < THOROUGH)):
+        before = end.chi2
+        end = descend(end.model, run, names, noise, end.starts, SKETCH, None, TOLERANCE, end.differences)
+        done, steep = done + SKETCH, end.chi2 < STEEP * before
+    return end
+
+
+def _hops(proposal: Proposal, series: Sequence[Series]) -> dict[str, float]:
+    """Parameters of the newest effect that have many minima, and how far these lie apart."""
+    newest = proposal.model.term(proposal.added[-1]) if proposal.added else None
+    if newest is None or newest.element.hops is None:
+        return {}
+    apart = newest.element.hops(scales(series, proposal.model))
+    return {f"{newest.label}.{name}": distance for name, distance in apart.items()}
+
+
+def _hopped(
+    best: Descent, run: FreeRun, names: tuple[str, ...], noise: NoiseModel, name: str, distance: float
+) -> Descent:
+    """The deepest of the minima that a parameter has at about this distance, as far as every next one is deeper."""
+    low, high = best.model.parameters[name].bounds
+    for _ in range(HOPS):
+        before = best
+        for value in (before.model.value(name) + way * distance for way in WAYS):
+            if not low < value < high:
+                continue
+            moved = before.model.with_values({name: value})
+            again = descend(moved, run, names, noise, before.starts, BRIEF, None, TOLERANCE)
+            best = min(best, again, key=lambda end: end.chi2)
+        if best.chi2 > before.chi2 - 1.0:
+            break
+    return best
+
+
+def _flat(model: Model, steps: Array, names: Sequence[str]) -> list[str]:
+    """Those of the named parameters that have wandered to where they change nothing: a step large enough to be felt is
+    larger than their value. What they did before, when the others were still wrong, says nothing against them now."""
+    felt = dict(zip(model.free, steps))
+    return [name for name in names if name in felt and abs(felt[name]) > abs(model.value(name))]
+
+
+def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
+    """The trial with flat parameters of its effects tried again from the elements' own guesses, where that is better: a
+    few iterations from each, more from the best."""
+    best = trial
+    if trial.differences is None:
+        return best
+    for label in trial.added:
+        element = trial.element(label)
+        names = [f"{label}.{parameter.name}" for parameter in element.parameters]
+        flat = _flat(trial.model, trial.differences[0], names)
+        if not flat or element.starts is None:
+            continue
+        guesses = element.starts(scales(series, trial.model))
+        known = {tuple(guess[name.rpartition(".")[2]] for name in flat) for guess in guesses}
+        run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
+        free = tuple(trial.model.free)
+        found: list[Descent] = []
+        for share in (1.0, *FAINTER):
+            for values in sorted(known):
+                moved = trial.model.with_values(dict(zip(flat, (share * value for value in values))))
+                try:
+                    found.append(
+                        descend(moved, run, free, trial.noise, trial.starts, SKETCH, tolerance=TOLERANCE)
+                    )
+                except InputError:
+                    continue
+        if not found:
+            continue
+        lead = min(found, key=lambda end: end.chi2)
+        end = descend(
+            lead.model, run, free, trial.noise, lead.starts, THOROUGH, None, TOLERANCE, lead.differences
+        )
+        if end.chi2 < best.chi2:
+            best = _trial(trial.added, trial.model, _outcome(end, run, trial.noise), trial.noise)
+    return best
+
+
+def _extended(model: Model, run: FreeRun, index: int, start: Array, known: Sequence[str]) -> Array:
+    """A start of series `index` for a structure with other states: those it shares are kept, new ones begin at rest."""
+    fresh = start_of(model, run, index, float(start[0]), float(start[1]))
+    for place, name in enumerate(run.compiled.layout.states):
+        if name in known:
+            fresh[place] = start[list(known).index(name)]
+    return fresh
+
+
+def run_trials(
+    proposals: Sequence[Proposal],
+    series: Sequence[Series],
+    starts: Sequence[Array],
+    known: Sequence[str],
+    noise: NoiseModel,
+    max_step: float,
+    enough: Sequence[float] | None = None,
+) -> tuple[list[Trial], list[tuple[tuple[str, ...], str]]]:
+    """Fit all proposals in parallel. Returns the trials, best first, and those excluded with the reason.
+
+    A few iterations from each guess first, until chi2 is `enough`; then the promising ones are carried to convergence.
+    """
+    goals = list(enough) if enough is not None else [-math.inf] * len(proposals)
+
+    def one(case: tuple[Proposal, float]) -> _Outcome:
+        return _fit_proposal(case[0], series, starts, known, noise, max_step, case[1])
+
+    trials: list[Trial] = []
+    excluded: list[tuple[tuple[str, ...], str]] = []
+    for index, result in fork_map(one, list(zip(proposals, goals))):
+        if isinstance(result, Exception):
+            excluded.append((proposals[index].added, str(result)))
+        else:
+            trials.append(_trial(proposals[index].added, proposals[index].model, result, noise))
+    if not trials:
+        return [], excluded
+    best = min(trial.chi2 for trial in trials)
+    worst = max(trial.chi2 for trial in trials)
+    open_ones = [
+        t for t in trials if not t.converged and t.chi2 - best <= PROMISING * max(worst - best, t.samples)
+    ]
+    finished = under_noise(open_ones, series, noise, max_step, THOROUGH)
+    done = {t.added for t in finished}
+    return sorted([*finished, *(t for t in trials if t.added not in done)], key=lambda t: t.bic()), excluded
+
+
+def whole_fit(
+    trial: Trial,
+    series: Sequence[Series],
+    noise: NoiseModel,
+    max_step: float,
+    iterations: int = 15,
+    pool: ThreadPoolExecutor | None = None,
+) -> Fit:
+    """The full fit of a trial under a noise model; one that has converged under it is only evaluated."""
+    if trial.noise is noise and trial.converged:
+        iterations = 1
+    run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
+    names = tuple(trial.model.free)
+    return minimise(
+        trial.model, run, names, noise, trial.starts, iterations, pool, differences=trial.differences
+    )
+
+
+def _again(
+    trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int
+) -> _Outcome:
+    """Where a trial's descent under a noise model ends; without `iterations`, the trial as it is."""
+    run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
+    names = tuple(trial.model.free)
+    end = descend(
+        trial.model, run, names, noise, trial.starts, iterations, None, TOLERANCE, trial.differences
+    )
+    return _outcome(end, run, noise)
+
+
+def under_noise(
+    trials: Sequence[Trial],
+    series: Sequence[Series],
+    noise: NoiseModel,
+    max_step: float,
+    iterations: int = 15,
+) -> list[Trial]:
+    """The trials, best first, all under one noise model: those that were fitted under another are fitted again."""
+    done = [trial for trial in trials if trial.noise is noise and trial.converged]
+    others = [trial for trial in trials if not (trial.noise is noise and trial.converged)]
+
+    def one(trial: Trial) -> _Outcome:
+        return _again(trial, series, noise, max_step, iterations)
+
+    again = [
+        _trial(others[index].added, others[index].model, result, noise)
+        for index, result in fork_map(one, others)
+        if not isinstance(result, Exception)
+    ]
+    return sorted([*done, *again], key=lambda trial: trial.bic())
+
+
+def near_under_noise(
+    trials: Sequence[Trial], series: Sequence[Series], noise: NoiseModel, max_step: float, near: float
+) -> list[Trial]:
+    """The trials, best first, under one noise model: as they are, but those `near` the best are fitted again, also from
+    guesses of parameters that have wandered to where they change nothing."""
+    level = under_noise(trials, series, noise, max_step, 0)
+    close = [trial for trial in level if trial.bic() - level[0].bic() < near]
+    fitted = [_unstuck(trial, series, max_step) for trial in under_noise(close, series, noise, max_step)]
+    known = {trial.added for trial in fitted}
+    return sorted([*fitted, *(t for t in level if t.added not in known)], key=lambda trial: trial.bic())

@@ -1,0 +1,348 @@
+"""Score tests: which elements of the catalogue would explain the residual of the nominal fit?
+
+For each first guess of each element the change of the free run is found by adding the element's force along the fitted
+trajectory as a disturbance (its change of the output, for sensors; the changed stamps, for timing). Projected off what
+the nominal parameters and initial states can do, its correlation with the residual is Rao's score statistic,
+asymptotically chi-squared with one degree of freedom when the element is absent
+(C. R. Rao, Math. Proc. Camb. Phil. Soc. 44 (1948) 50). One simulation a guess, and nothing is compiled for a model.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2 as chi2_distribution
+
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.elements.element import Element, Scales
+from rhythmid.errors import InputError
+from rhythmid.identify.drive import controlled
+from rhythmid.identify.free_run import FreeRun, prepare_run, with_series
+from rhythmid.identify.noise import NoiseModel, runs
+from rhythmid.identify.output_error import Fit, minimise
+from rhythmid.identify.series import scales
+from rhythmid.model import Model
+from rhythmid.simulation.effect import Path, effect_along
+from rhythmid.simulation.generated_source import DRIVES
+from rhythmid.simulation.signal import first_order_hold
+from rhythmid.simulation.simulate import delay_of_command, delayed_command, physical_times
+
+Array = NDArray[np.float64]
+SMALL = 1e-3  # of the force that shakes the machine: a force that is tried is no larger, so that the answer is in proportion
+
+
+@dataclass(frozen=True)
+class Change:
+    """What one first guess of one element does to the free run: `outputs`, block averages of each series."""
+
+    key: int
+    element: Element
+    values: Mapping[str, float]
+    outputs: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
+class Score:
+    """How well one first guess of one element explains the residual.
+
+    `statistic` is the score test's chi-squared; `size` the factor on the guess that fits best (an element whose sign is
+    physics scores 0 when that is negative).
+    """
+
+    key: int
+    element: Element
+    values: Mapping[str, float]
+    statistic: float
+    size: float
+
+    @property
+    def start(self) -> dict[str, float]:
+        """First guess for a refit: the size scaled to what the score suggests."""
+        if not self.element.size or math.isinf(self.element.absent):
+            return dict(self.values)  # a limit: its effect is not in proportion to it
+        scaled = dict(self.values)
+        name = self.element.size
+        low, high = self.element.parameter(name).bounds
+        factor = float(np.clip(self.size, -30.0, 30.0))
+        if abs(factor) < 0.05:
+            factor = math.copysign(0.05, factor)
+        value = self.element.absent + factor * (scaled[name] - self.element.absent)
+        margin = 1e-3 * abs(scaled[name])
+        scaled[name] = float(np.clip(value, low + margin if low > -math.inf else low, high))
+        return scaled
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """The fitted free run: paths of all series and the structure that takes disturbances.
+
+    `legs` are the paths as the leg sees them: relative to its base where that moves.
+    """
+
+    fit: Fit
+    disturbed: FreeRun
+    paths: tuple[Path, ...]
+    legs: tuple[Path, ...]
+    outputs: tuple[Array, ...]  # of each series at its block centres, as the sensor says
+    commands: tuple[Array, ...]
+    shaken: float  # typical acceleration (rms) of the strongest motion
+
+
+def trajectories(fit: Fit) -> Trajectories:
+    """Run the fitted model once and keep all that elements may depend on."""
+    run = fit.run
+    disturbed = replace(
+        prepare_run(fit.model, run.series, run.max_step, disturbed=True), max_step=run.max_step
+    )
+    paths, legs, outputs, commands = [], [], [], []
+    q = run.states
+    for index, (one, start) in enumerate(zip(run.series, fit.starts)):
+        rows = disturbed.rows(fit.model, index, start)
+        if rows is None:
+            raise InputError(f"{one.name}: the fitted model diverges")
+        # the machine was there when the measurement was taken, not when it was stamped
+        time = one.centres - float(np.mean(one.centres - physical_times(fit.model, one.centres)))
+        acceleration = np.gradient(rows[:, 1], time)
+        body = _body_force(fit.model, time, rows[:, 0], rows[:, 1], rows[:, q + 1])
+        command = delayed_command(fit.model, one.command)
+        signal = np.zeros(one.blocks) if command is None else _evaluate(command, time)
+        if one.kind == "base_acceleration":
+            acceleration = acceleration + signal
+        leg = fit.model.mass.value * acceleration - rows[:, q + 1] - body
+        paths.append(Path(time, rows[:, 0], rows[:, 1], rows[:, q + 1], leg, rows[:, q]))
+        legs.append(paths[-1])
+        if one.kind == "base_displacement" and command is not None:
+            rate = _evaluate(command.derivative(), time)
+            legs[-1] = replace(paths[-1], position=rows[:, 0] - signal, velocity=rows[:, 1] - rate)
+        outputs.append(rows[:, q].copy())
+        commands.append(signal)
+    shaken = max(float(np.std(np.gradient(path.velocity, path.time))) for path in paths)
+    return Trajectories(fit, disturbed, tuple(paths), tuple(legs), tuple(outputs), tuple(commands), shaken)
+
+
+def _evaluate(signal, time: Array) -> Array:
+    value = np.asarray(signal(np.maximum(time, signal.x[0])))
+    return np.where(time < signal.x[0], 0.0 if signal.c.shape[0] == 1 else value, value)
+
+
+def _body_force(model: Model, time: Array, x: Array, v: Array, f: Array) -> Array:
+    total = np.zeros(len(time))
+    for term in model.terms:
+        element = term.element
+        if (
+            element.slot == "force"
+            and element.acts == "body"
+            and element.kernel is not None
+            and not element.own
+        ):
+            values = {name: value.value for name, value in term.values.items()}
+            total += effect_along(element, values, model, Path(time, x, v, f, total, x))
+    return total
+
+
+def change_of_output(
+    known: Trajectories, element: Element, values: Mapping[str, float]
+) -> list[Array] | None:
+    """Change of each series' block-averaged output when the element with these values joins the fitted model.
+
+    None when the model diverges with it.
+    """
+    fit, run = known.fit, known.disturbed
+    changes: list[Array] = []
+    if element.delay is not None:
+        model = fit.model.with_element(element, values, fixed=True)
+        outputs = fit.run.outputs(model, fit.starts)
+        if outputs is None:
+            return None
+        return [new - one.of_block(old) for new, one, old in zip(outputs, run.series, known.outputs)]
+    for index, (one, path) in enumerate(zip(run.series, known.paths)):
+        if element.slot == "sensor":
+            path = replace(path, signal=known.outputs[index])
+            changes.append(one.of_block(effect_along(element, values, fit.model, path)))
+            continue
+        if element.slot == "actuator":
+            path = replace(path, signal=path.effort)
+        elif element.slot == "command":
+            if one.kind not in DRIVES:
+                changes.append(np.zeros(one.blocks))
+                continue
+            path = replace(path, signal=known.commands[index])
+            if controlled(fit.model):
+                change = _change_of_reference(known, index, effect_along(element, values, fit.model, path))
+                if change is None:
+                    return None
+                changes.append(change)
+                continue
+        elif element.acts != "body":
+            path = known.legs[index]
+        force = effect_along(element, values, fit.model, path)
+        if not np.isfinite(force).all():
+            return None
+        if not np.any(force):
+            changes.append(np.zeros(one.blocks))
+            continue
+        share = min(1.0, SMALL * fit.model.mass.value * known.shaken / float(np.sqrt(np.mean(force**2))))
+        rows = run.rows(fit.model, index, fit.starts[index], first_order_hold(path.time, share * force))
+        if rows is None:
+            return None
+        changes.append(one.of_block(rows[:, run.states] - known.outputs[index]) / share)
+    return changes
+
+
+def _change_of_reference(known: Trajectories, index: int, change: Array) -> Array | None:
+    """Change of the block-averaged output when a controller's reference changes; None when the model diverges."""
+    fit, run, one = known.fit, known.disturbed, known.disturbed.series[index]
+    if not np.isfinite(change).all():
+        return None
+    stamped = known.paths[index].time - float(np.mean(delay_of_command(fit.model, known.paths[index].time)))
+    both = []
+    for reference in (known.commands[index], known.commands[index] + change):
+        moved = replace(one, command=first_order_hold(stamped, reference))
+        rows = with_series(run, index, moved).rows(fit.model, index, fit.starts[index])
+        if rows is None:
+            return None
+        both.append(rows[:, run.states])
+    return one.of_block(both[1] - both[0])
+
+
+def whitened(fit: Fit, samples: Sequence[Array], noise: NoiseModel) -> list[Array]:
+    """Used stretches of each series, whitened and joined."""
+    found = []
+    for one, given in zip(fit.run.series, samples):
+        parts = [noise.whiten(given[s]) for s in runs(one.used) if s.stop - s.start > noise.order + 1]
+        found.append(np.concatenate(parts) if parts else given[:0])
+    return found
+
+
+def parameter_basis(fit: Fit) -> Array:
+    """Orthonormal basis (n, r) of what small changes of the free parameters do."""
+    jacobian = fit.linearisation.jacobian
+    norms = np.linalg.norm(jacobian, axis=0)
+    if not (norms > 0).any():
+        return np.zeros((len(fit.linearisation.residual), 0))
+    left, singular, _ = np.linalg.svd(jacobian[:, norms > 0] / norms[norms > 0], full_matrices=False)
+    return left[:, singular > 1e-9 * singular[0]]
+
+
+def sizes_along(known: Trajectories) -> Scales:
+    """Yardstick for first guesses at a fit: the records' scales, and what only the fitted run tells."""
+    fit = known.fit
+    sizes = replace(scales(fit.run.series, fit.model), residual_frequency=residual_line(fit))
+    if not controlled(fit.model):
+        return sizes
+    efforts = [path.effort for path in known.paths]  # the controller's force
+    return replace(
+        sizes,
+        effort=max(float(np.std(effort)) for effort in efforts) or sizes.effort,
+        peak_effort=max(float(np.abs(effort).max()) for effort in efforts),
+    )
+
+
+def guesses(catalogue: Catalogue, model: Model, sizes: Scales) -> list[tuple[Element, dict[str, float]]]:
+    """First guesses of every element that could be missing from the model."""
+    found: list[tuple[Element, dict[str, float]]] = []
+    present = {term.element.name for term in model.terms}
+    for element in catalogue.values():
+        if not element.candidate or element.starts is None or element.name in present:
+            continue
+        if present & set(element.needless_with):
+            continue
+        if element.rotational and model.units.position != "rad":
+            continue
+        if element.controlled and not controlled(model):
+            continue
+        if element.displaced_base and not sizes.displaced_base:
+            continue
+        if any(model.borrowed(source, default) is None for source, default in element.borrows.values()):
+            continue
+        found += [(element, dict(start)) for start in element.starts(sizes)]
+    return found
+
+
+def changes_of(
+    known: Trajectories,
+    candidates: Sequence[tuple[Element, dict[str, float]]],
+    pool: ThreadPoolExecutor | None = None,
+) -> list[Change]:
+    """Changes that all guesses make; those that make the model diverge, or change nothing, are left out."""
+
+    def one(case: tuple[int, tuple[Element, dict[str, float]]]) -> Change | None:
+        key, (element, values) = case
+        outputs = change_of_output(known, element, values)
+        if (
+            outputs is None
+            or not all(np.isfinite(o).all() for o in outputs)
+            or not any(np.any(o) for o in outputs)
+        ):
+            return None
+        return Change(key, element, values, tuple(outputs))
+
+    cases = list(enumerate(candidates))
+    return [change for change in (pool.map(one, cases) if pool else map(one, cases)) if change is not None]
+
+
+def _impossible(element: Element, values: Mapping[str, float], factor: float) -> bool:
+    """Whether `factor` times the guessed effect has a sign that physics forbids."""
+    if not element.size:
+        return False
+    if math.isinf(element.absent):
+        return factor < 0.0
+    low, high = element.parameter(element.size).bounds
+    size = element.absent + factor * (values[element.size] - element.absent)
+    return (size < low and low >= element.absent) or (size > high and high <= element.absent)
+
+
+def score(fit: Fit, changes: Sequence[Change]) -> list[Score]:
+    """Scores of all changes under the fit's noise model, best first."""
+    left = parameter_basis(fit)
+    residual = fit.linearisation.residual
+    residual = residual - left @ (left.T @ residual)
+    found: list[Score] = []
+    for one in changes:
+        white = whitened(fit, one.outputs, fit.noise)
+        raw = math.sqrt(sum(float(w @ w) for w in white))
+        joined = np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])
+        change = joined - left @ (left.T @ joined)
+        strength = float(change @ change)
+        if not math.isfinite(strength) or raw == 0.0 or strength <= (1e-6 * raw) ** 2:
+            continue  # the nominal parameters do the same
+        size = -float(change @ residual) / strength
+        statistic = size**2 * strength
+        if _impossible(one.element, one.values, size):
+            statistic = 0.0
+        found.append(Score(one.key, one.element, one.values, statistic, size))
+    return sorted(found, key=lambda s: -s.statistic)
+
+
+def under(fit: Fit, noise: NoiseModel, pool: ThreadPoolExecutor | None = None) -> Fit:
+    """The fit repeated under another noise model, from where it is."""
+    return minimise(fit.model, fit.run, fit.names, noise, fit.starts, 10, pool, differences=fit.differences)
+
+
+def residual_line(fit: Fit) -> float:
+    """Frequency [Hz] of the strongest line in the residuals: of the sum of all series' spectra, between their bins."""
+    period = fit.run.series[0].period * fit.run.series[0].block
+    length = 8 * max(one.blocks for one in fit.run.series)
+    power = np.zeros(length // 2 + 1)
+    for one, residual in zip(fit.run.series, fit.residuals):
+        part = residual[one.used]
+        if len(part) > 8 and one.period * one.block == period:
+            power += np.abs(np.fft.rfft((part - part.mean()) * np.hanning(len(part)), length)) ** 2
+    power[:16] = 0.0
+    place = int(np.argmax(power))
+    if not 0 < place < len(power) - 1 or power[place] == 0.0:
+        return 0.0
+    below, top, above = np.log(np.maximum(power[place - 1 : place + 2], 1e-300))
+    bend = below - 2.0 * top + above
+    return float((place + (0.5 * (below - above) / bend if bend < 0.0 else 0.0)) / (length * period))
+
+
+def p_value(scores: Sequence[Score], inflation: float = 1.0) -> float:
+    """Probability of a best score as high as this where nothing is missing (Bonferroni over all guesses)."""
+    if not scores:
+        return 1.0
+    best = scores[0].statistic / max(inflation, 1.0)
+    return float(min(1.0, len(scores) * chi2_distribution.sf(best, 1)))

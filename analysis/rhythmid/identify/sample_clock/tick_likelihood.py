@@ -1,0 +1,123 @@
+"""The likelihood of the ticks of a drive's own clock: its period and the delay before it.
+
+A command that is held from stamp to stamp waits for the drive's tick. Wherever a tick passes a stamp another command is held, and
+the likelihood of period and delay jumps: between two jumps, which are nanoseconds of the period apart, its slope says nothing
+about its course over many, and neither do descents. So both are moved together on a grid around the fit that gets finer, all
+else following linearly.
+
+A hold of nearly the right period explains most of what the right one does. The scan for it, which began under a noise that was
+coloured by all of the effect, is made again under the noise that is left.
+"""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.errors import InputError
+from rhythmid.identify.output_error import Fit, minimise, noise_of
+from rhythmid.identify.sample_clock.tick_scan import DELAY, PERIOD, scanned
+from rhythmid.identify.sensitivity import Problem
+from rhythmid.model import Model
+
+Array = NDArray[np.float64]
+STEPS = np.linspace(-1.0, 1.0, 9)
+WIDE, FINE = 0.2, 1e-4  # reach of the grid at first and in the end: periods by which the last tick moves
+SHIFTS = np.linspace(-1.0, 1.0, 7)
+LEAST = 0.25  # of a sample, by which the delay is moved at least while ticks move by more than a sample
+FINER = 0.4  # of a grid's reach is that of the next
+FOLLOWED = 4  # cases whose surroundings are looked at more finely
+SCANS = 3  # at most, each under the noise that the one before has left
+BETTER = 0.98  # of chi2, above which a scan has found nothing new
+
+
+def ticks_sought(fit: Fit, floor: float, pool: ThreadPoolExecutor | None = None) -> Fit:
+    """The fit of a model with a command hold where the ticks are likeliest that are found under the noise that it leaves, of at
+    least `floor` [unit of the measurement]; under that noise, unless it is the fit as it was."""
+    if PERIOD not in fit.names:
+        return fit
+    series, places = fit.run.series, places_of(fit)
+    for _ in range(SCANS):
+        noise = noise_of(fit.residuals, series, floor)
+        try:
+            now = minimise(fit.model, fit.run, fit.names, noise, fit.starts, 0, pool)
+            late = fit.model.value(DELAY) if DELAY in fit.model.parameters else 0.0
+            mean = {DELAY: late + 0.5 * fit.model.value(PERIOD)} if DELAY in fit.names else {}
+            guesses = scanned(now.model.with_values(mean), series, now.starts, noise)
+            cases, costs = tried(now, places, guesses, pool)
+            moved = moved_to(now, places, cases[np.argmin(costs)])
+            found = minimise(
+                moved, now.run, now.names, noise, now.starts, 15, pool, differences=now.differences
+            )
+        except InputError:
+            return fit
+        if found.chi2 > BETTER * now.chi2:
+            return fit
+        fit = found
+    return fit
+
+
+def places_of(fit: Fit) -> list[int]:
+    """Where period and input delay stand among the free parameters."""
+    return [fit.names.index(name) for name in (PERIOD, DELAY) if name in fit.names]
+
+
+def moved_to(fit: Fit, places: Sequence[int], case: Array) -> Model:
+    return fit.model.with_values({fit.names[place]: float(value) for place, value in zip(places, case)})
+
+
+def tried(
+    fit: Fit, places: Sequence[int], guesses: Sequence[dict[str, float]], pool: ThreadPoolExecutor | None
+) -> tuple[Array, Array]:
+    """Cases (n, 1 or 2) of the period and the delay, around the fit's and the guesses, with the chi2 (n,) that they leave."""
+    cases = np.array([fit.values[places], *([one[fit.names[place]] for place in places] for one in guesses)])
+    costs = _costs(fit, places, cases, pool)
+    longest = max(one.time[-1] - one.time[0] for one in fit.run.series)
+    sample = max(one.period for one in fit.run.series)
+    reach, late = WIDE, sample
+    while reach > FINE:
+        grid = _grid(float(cases[0, 0]), longest, sample, reach, late)[:, : len(places)]
+        near = cases[np.argsort(costs)[:FOLLOWED]]
+        around = (near[:, None, :] + grid).reshape(-1, len(places))
+        cases = np.concatenate([cases, np.maximum(around, 0.0)])
+        costs = np.concatenate([costs, _costs(fit, places, cases[len(costs) :], pool)])
+        reach, late = FINER * reach, max(FINER * late, LEAST * sample)
+    return cases, costs
+
+
+def _grid(period: float, longest: float, sample: float, reach: float, late: float) -> Array:
+    """Changes (n, 2) of period and delay [s] that move the last tick by up to `reach` periods.
+
+    While ticks move by more than a sample, the mean delay counts, of which half a period is the hold's. Below that it is which
+    command a tick finds: a delay that moves as much as the ticks in the middle of the record leaves it that.
+    """
+    steps = reach * period**2 / longest * STEPS
+    if reach * period > sample:
+        return np.array([(step, late * shift - 0.5 * step) for step in steps for shift in SHIFTS])
+    middle = 0.5 * longest / period
+    return np.array([(step, reach * period * shift + middle * step) for step in steps for shift in SHIFTS])
+
+
+def _costs(fit: Fit, places: Sequence[int], cases: Array, pool: ThreadPoolExecutor | None) -> Array:
+    """Chi2 of the cases, with all else that was fitted following linearly; infinite where the model diverges."""
+    others, _ = np.linalg.qr(_scaled(np.delete(fit.linearisation.jacobian, places, axis=1)))
+    outputs = fit.run.many([(moved_to(fit, places, case), fit.starts) for case in cases], pool)
+    costs = np.full(len(cases), np.inf)
+    for number, given in enumerate(outputs):
+        if given is not None:
+            rest = white_residual(fit, [o - one.averaged for o, one in zip(given, fit.run.series)])
+            costs[number] = np.sum((rest - others @ (others.T @ rest)) ** 2)
+    return costs
+
+
+def white_residual(fit: Fit, residuals: Sequence[Array]) -> Array:
+    """Residuals as the likelihood sees them, without what initial states can do."""
+    problem = Problem(fit.run, fit.names, fit.noise, None)
+    white = [problem.whitened(index, residual) for index, residual in enumerate(residuals)]
+    return np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])
+
+
+def _scaled(columns: Array) -> Array:
+    norms = np.linalg.norm(columns, axis=0)
+    return columns / np.where(norms > 0.0, norms, 1.0)

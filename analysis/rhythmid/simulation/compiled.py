@@ -1,0 +1,93 @@
+"""Compile a model's structure, once for all models that differ in values only.
+
+`generated_source` writes the module; `machine_code` compiles it, or knows it from before.
+"""
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from functools import lru_cache
+
+from rhythmid.model import Model, Term
+from rhythmid.simulation.generated_source import InputKind, Layout, OutputKind, generate, generate_rates
+from rhythmid.simulation.machine_code import load_run
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A compiled structure.
+
+    `run(times, ku, cu, kw, cw, kd, cd, parameters, start, max_step, out)` integrates from times[0], where the state is
+    `start`, and fills a row of `out` for each time; it returns how many rows are finite. Knots and cubic pieces belong
+    to the command (ku, cu), the forcing (kw, cw) and, where compiled with `disturbed`, to a further force on the mass
+    (kd, cd). The global interpreter lock is released meanwhile.
+    """
+
+    layout: Layout
+    run: Callable[..., int]
+
+
+def _key(terms: tuple[Term, ...]) -> Hashable:
+    """Equal for terms that compile to the same code, whatever their values; a kernel's code compares by content."""
+    return tuple(
+        (
+            term.label, term.element.name, term.element.slot, term.element.acts, term.element.states,
+            term.element.memories, tuple(term.element.borrows.items()),
+            tuple(parameter.name for parameter in term.element.parameters),
+            getattr(term.element.kernel, "__code__", None),
+        )
+        for term in terms
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=512)
+def _structure(
+    key: Hashable, terms: "_Terms", disturbed: bool, excited: InputKind, smooth: bool, measured: OutputKind
+) -> Compiled:
+    module, layout = generate(terms.terms, disturbed, excited, smooth, measured)
+    return Compiled(layout, load_run(module))
+
+
+@dataclass(frozen=True, eq=False)
+class _Terms:
+    """Terms that take no part in the cache's key: models that differ in values share one compiled function."""
+
+    terms: tuple[Term, ...]
+
+    def __hash__(self) -> int:
+        return 0
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Terms)
+
+
+def compile_model(
+    model: Model,
+    disturbed: bool = False,
+    excited: InputKind = "force",
+    smooth: bool = False,
+    measured: OutputKind = "position",
+) -> Compiled:
+    """The compiled structure of a model; parameter values play no part.
+
+    With `disturbed` the structure takes a further, arbitrary force on the mass as a signal; `excited`, `smooth` and
+    `measured` as in `generate`.
+    """
+    terms = tuple(term for term in model.terms if term.element.kernel is not None)
+    return _structure(_key(terms), _Terms(terms), disturbed, excited, smooth, measured)
+
+
+@lru_cache(maxsize=256)
+def _rates(key: Hashable, terms: "_Terms", excited: InputKind) -> Compiled:
+    module, layout = generate_rates(terms.terms, excited)
+    return Compiled(layout, load_run(module))
+
+
+def compile_rates(model: Model, excited: InputKind = "force") -> Compiled:
+    """The model's right-hand side at given points, for its linearisation.
+
+    `run(times (n,), command (n,), forcing (n,), states (n, q), parameters, out (n, q + 2))` fills rows of state rates,
+    sensor output and total actuator force. Signals in the command path are taken as they are, without its delays. A
+    memory's rate is its change over a step of the length that the parameter `ELAPSED` says.
+    """
+    terms = tuple(term for term in model.terms if term.element.kernel is not None)
+    return _rates(_key(terms), _Terms(terms), excited)

@@ -1,0 +1,90 @@
+"""Samples that do not say where the machine was are found, and honest ones are kept."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from machines import CATALOGUE, SHORT, hopper, records
+from rhythmid.record.outlier import repeated_samples, stray_samples, without_stray
+from rhythmid.record.quality import resolution
+
+seeds = st.integers(0, 10_000)
+TIME = 1e-3 * np.arange(5000)
+IMPACT = ("end_stop_contact", {"stiffness": 20000.0, "position": 0.14, "side": -1.0})
+STICTION = ("coulomb_friction", {"force": 0.2, "transition": 1e-4})
+PLAY = ("backlash", {"width": 0.4})
+
+
+def motion(rng: np.random.Generator, noise: float) -> np.ndarray:
+    """A chirp of 10 mm with noise of a given share of it."""
+    phase = 2 * np.pi * (0.5 * TIME + rng.uniform(0.2, 2.0) * TIME**2)
+    return 0.01 * (np.sin(phase) + noise * rng.standard_normal(len(TIME)))
+
+
+@given(seed=seeds, noise=st.sampled_from([0.0, 1e-4, 1e-3, 1e-2]), width=st.integers(1, 3))
+def test_strays_are_found_and_nothing_else(seed, noise, width):
+    rng = np.random.default_rng(seed)
+    value = motion(rng, noise)
+    place = rng.choice(np.arange(10, 4980, 10), 7, replace=False)
+    wrong = (place[:, None] + np.arange(width)).ravel()
+    value[wrong] += np.repeat(rng.choice([-1.0, 1.0], 7) * rng.uniform(0.03, 1.0, 7), width)
+    assert np.array_equal(np.flatnonzero(stray_samples(value)), np.sort(wrong))
+
+
+@pytest.mark.parametrize("std", [0.0, 1e-6, 1e-4])
+@pytest.mark.parametrize(("name", "values"), [IMPACT, STICTION, PLAY])
+def test_impacts_stiction_and_play_leave_no_sample_out(name, values, std):
+    for one in records(hopper().with_element(CATALOGUE[name], values), SHORT, std=std):
+        kept, notes = without_stray(one)
+        assert kept.output is one.output and notes == ()
+
+
+@given(seed=seeds, times=st.integers(2, 10), noise=st.sampled_from([1e-4, 1e-2]))
+def test_a_sensor_that_is_read_more_often_than_it_measures_keeps_its_measurements(seed, times, noise):
+    fresh = motion(np.random.default_rng(seed), noise)[::times]
+    value = np.repeat(fresh, times)[: len(TIME)]
+    kept = ~repeated_samples(value)
+    assert np.array_equal(value[kept][: len(fresh) - 2], fresh[:-2])
+
+
+def test_a_sensor_that_stands_still_for_a_while_is_believed_before_and_after():
+    value = motion(np.random.default_rng(1), 1e-3)
+    value[1000:1060] = value[999]
+    assert np.array_equal(np.flatnonzero(repeated_samples(value)), np.arange(1000, 1060))
+
+
+def test_rest_is_no_repeat():
+    value = np.where(TIME < 2.0, 0.1, 0.1 + 0.05 * (TIME - 2.0) ** 2)
+    assert not repeated_samples(value).any()
+
+
+@given(seed=seeds, step=st.sampled_from([1e-4, 3e-4, 1e-3]))
+def test_rounded_values_are_all_kept_and_their_step_is_known(seed, step):
+    value = step * np.round(motion(np.random.default_rng(seed), 1e-3) / step)
+    assert resolution(value) == pytest.approx(step, rel=1e-6)
+    assert not stray_samples(value).any() and not repeated_samples(value).any()
+
+
+def test_values_that_were_not_rounded_have_no_step():
+    assert resolution(motion(np.random.default_rng(1), 1e-3)) == 0.0
+    assert resolution(np.full(50, 0.3)) == 0.0
+
+
+def test_two_values_are_the_coarsest_rounding_and_lose_no_sample():
+    value = np.where(np.sin(2 * np.pi * TIME) > 0.0, 0.1, 0.3)
+    assert resolution(value) == pytest.approx(0.2)
+    assert not stray_samples(value).any() and not repeated_samples(value).any()
+
+
+def test_what_is_left_out_is_said_and_peaks_of_an_acceleration_are_kept():
+    one = records(hopper(), SHORT[:1])[0]
+    value = one.output.value.copy()
+    value[[500, 900]] += 0.5
+    broken = replace(one, output=replace(one.output, value=value))
+    kept, notes = without_stray(broken)
+    assert len(kept.output) == len(one.output) - 2
+    assert len(notes) == 1 and "2 of" in notes[0] and "t = 0.5151 s" in notes[0]
+    assert without_stray(replace(broken, output_kind="acceleration"))[1] == ()
