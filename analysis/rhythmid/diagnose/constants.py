@@ -1,0 +1,48 @@
+"""The constants of evidence, rejections and verdict: each with its reason and its source.
+
+Nothing else in this folder decides anything by a number of its own.
+"""
+
+# --- how predictions are scored -------------------------------------------------------------------------------------
+# contiguous blocks of all records together: enough for a standard error, each still longer than the noise remembers
+# (J. Shao, J. Am. Stat. Assoc. 88 (1993) 486: cross-validation has to leave out much)
+BLOCKS = 36
+# folds, into which the blocks are dealt in turn, so that every fold sees every amplitude (S. Geisser, Biometrika 62 (1975) 320)
+FOLDS = 6
+# blocks of each record at least, so that none is left out as a whole or decides alone
+BLOCKS_OF_A_RECORD = 3
+# degrees of freedom of Student's t, in the fit and in the predictive density: rare outliers, and what no model explains,
+# weigh little (K. L. Lange, R. J. A. Little, J. M. G. Taylor, J. Am. Stat. Assoc. 84 (1989) 881)
+STUDENT = 4.0
+# passes of reweighted least squares in each fold: from the fit of all folds one moves the weights, two settle them
+REWEIGHTED = 3
+# draws of the Bayesian bootstrap: probabilities to about 0.01 (Y. Yao et al., Bayesian Analysis 13 (2018) 917)
+DRAWS = 2000
+# logarithm of the prior odds that each further effect costs: one in e (as Y. Yao et al. weigh models of unequal size)
+EFFECT_PRIOR = 1.0
+
+# --- what an effect has to bring ------------------------------------------------------------------------------------
+# false-alarm rate of a further effect, over all candidates (C. E. Bonferroni)
+FALSE_ALARM = 0.025
+# share of what can still be explained that a further effect has to remove: less is a part of something else
+# (real recordings: an axis, six arm joints, a frame, pendulums; shares of right effects were 0.3 and more)
+REST = 0.2
+# share of the whole mismatch that a further effect has to remove: a tenth of the motion that the first one changes.
+# It keeps the effects of pairs, of which one may be thirty times the other in size
+MISMATCH = 1e-3
+# size of no practical matter, as a share of the motion (free run) or of the effort: a tenth of what real machines leave,
+# whose models end at 2 to 5 % (measured: axis 2.1, arm joints 1.5 to 4.8, pendulums 0.5 to 0.75 %)
+PRACTICAL = 0.003
+PRACTICAL_EFFORT = 0.01
+# standard errors within which a simpler or related law predicts as well (A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413)
+EQUIVALENT = 2.0
+
+# --- what a verdict needs -------------------------------------------------------------------------------------------
+# joint probability of the names that an answer stands by
+STATED = 0.8
+# share of what free maps and names together explain that the names have to, for an answer to stand by them
+EXPLAINED = 0.8
+# the same, from which the names are the main part of it
+MAINLY = 0.5
+# quantile of the normal distribution that 95 % intervals reach to
+COVERAGE = 1.959963984540054

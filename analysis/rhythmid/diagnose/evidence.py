@@ -1,0 +1,240 @@
+"""Evidence: how well each hypothesis predicts data that its fit has not seen, and the probabilities that follow.
+
+Blocks of the records are left out in turn. The parameters that the other blocks give follow from the one fit of all of them by
+Gauss-Newton steps (approximate cross-validation: K. R. Rad, A. Maleki, J. R. Stat. Soc. B 82 (2020) 965; R. Giordano et al.,
+AISTATS 2019); where a hypothesis is linear in its parameters that is exact. Predictive densities are Student's t, with the
+scale of the blocks that the fit saw, and are divided by the residual's integrated autocorrelation time, so that samples
+which repeat one another do not count twice. Hypotheses are compared by their differences in each block: the standard error of
+the sum says how much of it is the records' mood, and pseudo-BMA weights under the Bayesian bootstrap
+(Y. Yao, A. Vehtari, D. Simpson, A. Gelman, Bayesian Analysis 13 (2018) 917) turn them into probabilities.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from rhythmid.diagnose.constants import (
+    BLOCKS,
+    BLOCKS_OF_A_RECORD,
+    DRAWS,
+    EFFECT_PRIOR,
+    FOLDS,
+    REWEIGHTED,
+    STUDENT,
+)
+from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """A fit as cross-validation needs it.
+
+    Parameters
+    ----------
+    residual : (n,) predicted less measured, in one unit for all hypotheses of a case.
+    jacobian : (n, p) its derivatives with respect to the parameters.
+    precision : (p,) inverse variance of each parameter's prior; 0 where it has none.
+    departure : (p,) each parameter's value less its prior's mean.
+    """
+
+    residual: Array
+    jacobian: Array
+    precision: Array
+    departure: Array
+
+    @classmethod
+    def without_priors(cls, residual: Array, jacobian: Array) -> "Linearised":
+        """A fit whose parameters have no priors."""
+        none = np.zeros(jacobian.shape[1])
+        return cls(residual, jacobian, none, none)
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Contiguous blocks of rows, and the fold of each.
+
+    Parameters
+    ----------
+    block : (n,) block of each row.
+    fold : (b,) fold of each block.
+    gap : rows on either side of a block that is left out which its fit does not see either.
+    """
+
+    block: Whole
+    fold: Whole
+    gap: int = 0
+
+    @classmethod
+    def of(cls, record: Whole, gap: int = 0) -> "Blocks":
+        """Blocks of rows that belong to the records `record` (n,), numbered from 0 in order; each has its share of blocks."""
+        total = max(len(record), 1)
+        block = np.zeros(len(record), dtype=np.int64)
+        first = 0
+        for number in range(int(record.max(initial=-1)) + 1):
+            rows = np.flatnonzero(record == number)
+            if not len(rows):
+                continue
+            count = max(BLOCKS_OF_A_RECORD, round(BLOCKS * len(rows) / total))
+            count = min(count, len(rows))
+            block[rows] = first + (np.arange(len(rows)) * count) // len(rows)
+            first += count
+        return cls(block, np.arange(first, dtype=np.int64) % FOLDS, gap)
+
+    @property
+    def count(self) -> int:
+        """Number of blocks."""
+        return len(self.fold)
+
+    def sums(self, values: Array) -> Array:
+        """Sums (b,) of values (n,) over each block."""
+        return np.bincount(self.block, values, self.count)
+
+    def left_out(self, fold: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Rows (n,) that a fold leaves out, and those that its fit sees: the others but for the gaps."""
+        out = self.fold[self.block] == fold
+        near = out.copy()
+        for shift in range(1, self.gap + 1):
+            near[shift:] |= out[:-shift]
+            near[:-shift] |= out[shift:]
+        seen = ~near
+        return out, seen if seen.any() else ~out
+
+
+def log_density(error: Array, scale: float) -> Array:
+    """Logarithm of Student's t density (n,) of errors (n,), for its scale."""
+    constant = gammaln(0.5 * (STUDENT + 1.0)) - gammaln(0.5 * STUDENT) - 0.5 * math.log(STUDENT * math.pi)
+    return constant - math.log(scale) - 0.5 * (STUDENT + 1.0) * np.log1p((error / scale) ** 2 / STUDENT)
+
+
+def weights(error: Array, scale: float) -> Array:
+    """Weights (n,) of reweighted least squares for Student's t."""
+    return (STUDENT + 1.0) / (STUDENT + (error / scale) ** 2)
+
+
+def scale_of(error: Array) -> float:
+    """Maximum-likelihood scale of Student's t errors (n,); the smallest positive number where there is no error."""
+    square = error**2
+    scale = float(np.median(np.abs(error)) / 0.741) or float(np.sqrt(np.mean(square)))
+    if scale == 0.0:
+        return 1e-300
+    for _ in range(20):
+        new = math.sqrt(float(np.mean((STUDENT + 1.0) * square / (STUDENT + square / scale**2))))
+        if abs(new - scale) < 1e-3 * scale:
+            return new
+        scale = new
+    return scale
+
+
+def autocorrelation_time(error: Array, record: Whole) -> float:
+    """Integrated autocorrelation time of errors (n,) in samples, at least 1, over the records that the rows belong to.
+
+    Sums of neighbouring autocorrelations are added as long as they are positive and fall (C. J. Geyer, Statistical Science 7
+    (1992) 473).
+    """
+    power, correlation = 0.0, np.zeros(0)
+    parts = [error[record == number] for number in range(int(record.max(initial=-1)) + 1)]
+    parts = [part - part.mean() for part in parts if len(part) > 8]
+    if not parts:
+        return 1.0
+    longest = max(len(part) for part in parts)
+    correlation = np.zeros(longest)
+    for part in parts:
+        length = 2 * len(part)
+        spectrum = np.abs(np.fft.rfft(part, length)) ** 2
+        correlation[: len(part)] += np.fft.irfft(spectrum, length)[: len(part)]
+        power += float(part @ part)
+    if power == 0.0:
+        return 1.0
+    rho = correlation / power
+    total, previous = 0.0, math.inf
+    for lag in range(0, longest - 1, 2):
+        pair = float(rho[lag] + rho[lag + 1])
+        if pair <= 0.0:
+            break
+        previous = min(pair, previous)
+        total += previous
+    return max(2.0 * total - 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class CrossValidated:
+    """Errors (n,) of prediction of every row by the fit that did not see it, and the scale (n,) that the fit expected."""
+
+    error: Array
+    scale: Array
+
+
+def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
+    """Predict every block from the others."""
+    error, scale = fit.residual.copy(), np.ones(len(fit.residual))
+    norms = np.linalg.norm(fit.jacobian, axis=0)
+    norms[norms == 0.0] = 1.0
+    jacobian = fit.jacobian / norms
+    precision, pull = fit.precision / norms**2, fit.precision * fit.departure / norms
+    for fold in range(min(FOLDS, blocks.count)):
+        out, seen = blocks.left_out(fold)
+        left, columns = fit.residual[seen], jacobian[seen]
+        step = np.zeros(columns.shape[1])
+        now, spread = left, scale_of(left)
+        for _ in range(REWEIGHTED if columns.shape[1] else 0):
+            weight = weights(now, spread) / spread**2
+            normal = (columns * weight[:, None]).T @ columns + np.diag(precision)
+            step = -np.linalg.lstsq(normal, columns.T @ (weight * left) + pull, rcond=1e-12)[0]
+            now = left + columns @ step
+            spread = scale_of(now)
+        error[out] += jacobian[out] @ step
+        scale[out] = spread
+    return CrossValidated(error, scale)
+
+
+def prediction(found: CrossValidated, blocks: Blocks, time: float) -> Prediction:
+    """The blocks' log densities and squared errors; `time` is the autocorrelation time in samples, the same for all hypotheses."""
+    density = np.empty(len(found.error))
+    for spread in np.unique(found.scale):
+        rows = found.scale == spread
+        density[rows] = log_density(found.error[rows], float(spread))
+    return Prediction(
+        blocks.sums(density) / time, blocks.sums(found.error**2), blocks.sums(np.ones(len(density)))
+    )
+
+
+def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[Prediction]:
+    """Predictions of several hypotheses on the same rows, which belong to the records `record` (n,).
+
+    The autocorrelation time is that of the hypothesis that predicts best: what the others leave is no noise.
+    """
+    found = [cross_validate(fit, blocks) for fit in fits]
+    if not found:
+        return []
+    best = min(found, key=lambda one: float(np.sum(one.error**2)))
+    time = autocorrelation_time(best.error, record)
+    return [prediction(one, blocks, time) for one in found]
+
+
+def difference(first: Prediction, second: Prediction) -> tuple[float, float]:
+    """By how much the first predicts better than the second, and the standard error of that, both in log density."""
+    gain = first.log_density - second.log_density
+    count = len(gain)
+    error = math.sqrt(count) * float(np.std(gain, ddof=1)) if count > 1 else math.inf
+    return float(gain.sum()), error
+
+
+def probabilities(hypotheses: Sequence[Hypothesis], seed: int = 0) -> Array:
+    """Probability (h,) of each hypothesis among these: pseudo-BMA weights under the Bayesian bootstrap of the blocks."""
+    if not hypotheses:
+        return np.zeros(0)
+    densities = np.array([one.prediction.log_density for one in hypotheses])
+    prior = -EFFECT_PRIOR * np.array([len(one.elements) for one in hypotheses], dtype=float)
+    count = densities.shape[1]
+    draws = np.random.default_rng(seed).dirichlet(np.ones(count), DRAWS)  # (draws, b)
+    scores = count * draws @ densities.T + prior
+    scores -= scores.max(axis=1, keepdims=True)
+    each = np.exp(scores)
+    return np.asarray((each / each.sum(axis=1, keepdims=True)).mean(axis=0))

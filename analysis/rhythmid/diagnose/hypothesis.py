@@ -1,0 +1,70 @@
+"""A hypothesis: one explanation of the records, fitted, with what it predicts of data that its fit has not seen."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.model import Model
+
+Array = NDArray[np.float64]
+Kind = Literal["nominal", "effects", "freed_value", "delay", "location", "free_map"]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a hypothesis predicts of each block (b,) of data that its fit has not seen.
+
+    `log_density` is the sum of the block's log predictive densities, divided by the autocorrelation time of the residual;
+    `squared_error` the sum of squared errors, and `samples` their number.
+    """
+
+    log_density: Array
+    squared_error: Array
+    samples: Array
+
+    @property
+    def score(self) -> float:
+        """Log predictive density of all blocks."""
+        return float(self.log_density.sum())
+
+    @property
+    def mean_square(self) -> float:
+        """Mean squared error of prediction."""
+        return float(self.squared_error.sum() / max(self.samples.sum(), 1.0))
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One explanation.
+
+    Parameters
+    ----------
+    elements : labels of the effects that the nominal model is given, in the order in which they were found; of a freed
+        value its parameter's name.
+    kind : what is supposed.
+    model : the fitted model.
+    prediction : of blocks that the fit has not seen; the blocks are those of all hypotheses of a case.
+    heldout_nrmse : error on held-out data, as a share of the motion or the effort; None where there are none.
+    """
+
+    elements: tuple[str, ...]
+    kind: Kind
+    model: Model
+    prediction: Prediction
+    heldout_nrmse: float | None = None
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """The elements in alphabetical order: the same for the same structure."""
+        return tuple(sorted(self.elements))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Catalogue names of the effects; a freed value's own name."""
+        found = []
+        for label in self.elements:
+            term = self.model.term(label)
+            found.append(label if term is None else term.element.name)
+        return tuple(found)
