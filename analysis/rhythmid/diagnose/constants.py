@@ -4,9 +4,12 @@ Nothing else in this folder decides anything by a number of its own.
 """
 
 # --- how predictions are scored -------------------------------------------------------------------------------------
-# contiguous blocks of all records together: enough for a standard error, each still longer than the noise remembers
+# contiguous blocks of all records together: so many that the standard error of a gain is small although an effect acts in a
+# tenth of them only (a stop, a large chirp), and
+BLOCKS = 144
+# rows of a block at least, so that each is longer than the noise remembers
 # (J. Shao, J. Am. Stat. Assoc. 88 (1993) 486: cross-validation has to leave out much)
-BLOCKS = 36
+ROWS_OF_A_BLOCK = 40
 # folds, into which the blocks are dealt in turn, so that every fold sees every amplitude (S. Geisser, Biometrika 62 (1975) 320)
 FOLDS = 6
 # blocks of each record at least, so that none is left out as a whole or decides alone
@@ -46,3 +49,12 @@ EXPLAINED = 0.8
 MAINLY = 0.5
 # quantile of the normal distribution that 95 % intervals reach to
 COVERAGE = 1.959963984540054
+# of a bound, or of an effect, within which a value is taken to be there: rounding of a descent that stopped at it
+EDGE = 1e-3
+# chance that the catalogue holds the truth, as a function of what the names leave of all that anything explains: half at
+# `ADEQUATE`, falling with its power `STEEPNESS` (fitted to sealed cases whose truth was in the catalogue or not: docs/proof.md)
+ADEQUATE = 0.1
+STEEPNESS = 1.5
+# effect that the records would not show, as a share of what was measured, from which they decide nothing: as large as what
+# the refitted model of a machine may leave and still be called identified
+BLIND = 0.2

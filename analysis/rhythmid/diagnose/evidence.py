@@ -24,12 +24,14 @@ from rhythmid.diagnose.constants import (
     EFFECT_PRIOR,
     FOLDS,
     REWEIGHTED,
+    ROWS_OF_A_BLOCK,
     STUDENT,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
+UNSEEN = -1  # fold of blocks that no fit sees
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class Blocks:
     Parameters
     ----------
     block : (n,) block of each row.
-    fold : (b,) fold of each block.
+    fold : (b,) fold of each block; `UNSEEN` for blocks that no fit sees.
     gap : rows on either side of a block that is left out which its fit does not see either.
     """
 
@@ -72,20 +74,29 @@ class Blocks:
     gap: int = 0
 
     @classmethod
-    def of(cls, record: Whole, gap: int = 0) -> "Blocks":
-        """Blocks of rows that belong to the records `record` (n,), numbered from 0 in order; each has its share of blocks."""
+    def of(cls, record: Whole, gap: int = 0, unseen: Whole | None = None) -> "Blocks":
+        """Blocks of rows that belong to the records `record` (n,), numbered from 0 in order; each has its share of blocks.
+
+        Those of the records numbered in `unseen` are in no fold.
+        """
         total = max(len(record), 1)
         block = np.zeros(len(record), dtype=np.int64)
+        hidden: list[bool] = []
         first = 0
         for number in range(int(record.max(initial=-1)) + 1):
             rows = np.flatnonzero(record == number)
             if not len(rows):
                 continue
-            count = max(BLOCKS_OF_A_RECORD, round(BLOCKS * len(rows) / total))
+            most = min(BLOCKS, total // ROWS_OF_A_BLOCK)
+            count = max(BLOCKS_OF_A_RECORD, round(most * len(rows) / total))
             count = min(count, len(rows))
             block[rows] = first + (np.arange(len(rows)) * count) // len(rows)
             first += count
-        return cls(block, np.arange(first, dtype=np.int64) % FOLDS, gap)
+            hidden += [unseen is not None and number in unseen] * count
+        fold = np.full(first, UNSEEN, dtype=np.int64)
+        seen = ~np.array(hidden, dtype=bool)
+        fold[seen] = np.arange(int(seen.sum())) % FOLDS
+        return cls(block, fold, gap)
 
     @property
     def count(self) -> int:
@@ -94,17 +105,18 @@ class Blocks:
 
     def sums(self, values: Array) -> Array:
         """Sums (b,) of values (n,) over each block."""
-        return np.bincount(self.block, values, self.count)
+        return np.asarray(np.bincount(self.block, values, self.count), dtype=np.float64)
 
     def left_out(self, fold: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Rows (n,) that a fold leaves out, and those that its fit sees: the others but for the gaps."""
-        out = self.fold[self.block] == fold
+        """Rows (n,) that a fold leaves out, and those that its fit sees: the others but for the gaps, and for what no fit sees."""
+        of_row = self.fold[self.block]
+        out = of_row == fold
         near = out.copy()
         for shift in range(1, self.gap + 1):
             near[shift:] |= out[:-shift]
             near[:-shift] |= out[shift:]
-        seen = ~near
-        return out, seen if seen.any() else ~out
+        seen = ~near & (of_row != UNSEEN)
+        return out, seen if seen.any() else ~out & (of_row != UNSEEN)
 
 
 def log_density(error: Array, scale: float) -> Array:
@@ -165,10 +177,14 @@ def autocorrelation_time(error: Array, record: Whole) -> float:
 
 @dataclass(frozen=True)
 class CrossValidated:
-    """Errors (n,) of prediction of every row by the fit that did not see it, and the scale (n,) that the fit expected."""
+    """Errors (n,) of prediction of every row by the fit that did not see it, and the scale (n,) that the fit expected.
+
+    `penalty` is taken off the log density of every row that a fit sees: what freedom costs that cross-validation does not see.
+    """
 
     error: Array
     scale: Array
+    penalty: float = 0.0
 
 
 def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
@@ -178,8 +194,8 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
     norms[norms == 0.0] = 1.0
     jacobian = fit.jacobian / norms
     precision, pull = fit.precision / norms**2, fit.precision * fit.departure / norms
-    for fold in range(min(FOLDS, blocks.count)):
-        out, seen = blocks.left_out(fold)
+    for fold in np.unique(blocks.fold):
+        out, seen = blocks.left_out(int(fold))
         left, columns = fit.residual[seen], jacobian[seen]
         step = np.zeros(columns.shape[1])
         now, spread = left, scale_of(left)
@@ -194,15 +210,21 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
     return CrossValidated(error, scale)
 
 
-def prediction(found: CrossValidated, blocks: Blocks, time: float) -> Prediction:
-    """The blocks' log densities and squared errors; `time` is the autocorrelation time in samples, the same for all hypotheses."""
+def prediction(
+    found: CrossValidated, blocks: Blocks, time: float, measured: Array | None = None
+) -> Prediction:
+    """The blocks' log densities and squared errors.
+
+    `time` is the autocorrelation time in samples, the same for all hypotheses; `measured` (n,) are the errors in the unit of
+    the measurement, where those that are scored are whitened.
+    """
     density = np.empty(len(found.error))
     for spread in np.unique(found.scale):
         rows = found.scale == spread
         density[rows] = log_density(found.error[rows], float(spread))
-    return Prediction(
-        blocks.sums(density) / time, blocks.sums(found.error**2), blocks.sums(np.ones(len(density)))
-    )
+    density -= found.penalty * (blocks.fold[blocks.block] != UNSEEN)
+    error = found.error if measured is None else measured
+    return Prediction(blocks.sums(density) / time, blocks.sums(error**2), blocks.sums(np.ones(len(density))))
 
 
 def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[Prediction]:
@@ -237,4 +259,4 @@ def probabilities(hypotheses: Sequence[Hypothesis], seed: int = 0) -> Array:
     scores = count * draws @ densities.T + prior
     scores -= scores.max(axis=1, keepdims=True)
     each = np.exp(scores)
-    return np.asarray((each / each.sum(axis=1, keepdims=True)).mean(axis=0))
+    return np.asarray((each / each.sum(axis=1, keepdims=True)).mean(axis=0), dtype=np.float64)

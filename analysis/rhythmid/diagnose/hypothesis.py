@@ -1,6 +1,7 @@
 """A hypothesis: one explanation of the records, fitted, with what it predicts of data that its fit has not seen."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
+Verdict = Literal["consistent", "missing_physics", "unknown_physics", "undecided"]
+ScoringKind = Literal["free_run", "windows", "effort"]
 Kind = Literal["nominal", "effects", "freed_value", "delay", "location", "free_map"]
 
 
@@ -43,28 +46,29 @@ class Hypothesis:
     ----------
     elements : labels of the effects that the nominal model is given, in the order in which they were found; of a freed
         value its parameter's name.
+    names : catalogue names of the effects, in the same order; a freed value's own name.
     kind : what is supposed.
-    model : the fitted model.
+    free : number of free parameters.
     prediction : of blocks that the fit has not seen; the blocks are those of all hypotheses of a case.
     heldout_nrmse : error on held-out data, as a share of the motion or the effort; None where there are none.
+    shape : statistics of the fitted effects themselves, by the name of the rule that looks at them.
     """
 
     elements: tuple[str, ...]
+    names: tuple[str, ...]
     kind: Kind
-    model: Model
+    free: int
     prediction: Prediction
     heldout_nrmse: float | None = None
+    shape: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def key(self) -> tuple[str, ...]:
         """The elements in alphabetical order: the same for the same structure."""
         return tuple(sorted(self.elements))
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Catalogue names of the effects; a freed value's own name."""
-        found = []
-        for label in self.elements:
-            term = self.model.term(label)
-            found.append(label if term is None else term.element.name)
-        return tuple(found)
+
+def names_of(model: Model, elements: Sequence[str]) -> tuple[str, ...]:
+    """Catalogue names of the effects with these labels; what is no effect keeps its own name."""
+    terms = [(label, model.term(label)) for label in elements]
+    return tuple(label if term is None else term.element.name for label, term in terms)

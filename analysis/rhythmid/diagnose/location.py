@@ -1,9 +1,10 @@
 """Locate a mismatch without naming it: which quantity does the missing force (or sensor error) depend on?
 
-The missing force is written as an unknown smooth function of one quantity (position, velocity, both, actuator force, time,
-phase of the cycle), a sum of B-splines whose effects on the free run are simulated, and fitted to the residual. What it
-explains of records that were left out of that fit tells where the mismatch lives; a function of anything else explains
-nothing. This illustrates, tests the final model for remainders, and stands in where the catalogue knows no name.
+The missing force is written as an unknown smooth function of one quantity (position, velocity, both, actuator force, time), as
+what a few first-order filters remember of the velocity or of the actuator's force, or as a vibration, and the sensor's error as a
+function of its output. Each is a sum of functions whose effects on the free run are simulated; to first order, that is another
+hypothesis: a free map beside the model. What it predicts of blocks that were left out tells where the mismatch lives, and
+whether the names leave something that another explanation would predict. It also draws what the catalogue has no name for.
 """
 
 import math
@@ -14,149 +15,203 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
-from scipy.stats import f as f_distribution
+from scipy.signal import lfilter
 
-from rhythmid.diagnose.search.score_tests import Trajectories, parameter_basis, whitened
+from rhythmid.diagnose.contenders import Rows, linearised
+from rhythmid.diagnose.evidence import CrossValidated, Linearised, cross_validate
+from rhythmid.diagnose.search.score_tests import Trajectories, residual_line
 from rhythmid.identify.output_error import Fit
 from rhythmid.simulation.signal import first_order_hold
 
 Array = NDArray[np.float64]
-FOLDS = 5
-DEALT = 20  # stretches a fold is made of
+SPLINES, SPLINES_OF_TWO = 8, 5  # basis functions of one quantity, and of each of two
+TIME_CONSTANTS = (0.003, 0.01, 0.03, 0.1, 0.3)  # of filters that remember, in periods of the motion
+RIDGE = 1e-4  # prior precision of a coefficient, relative to the information that all rows have of it
+
+
+@dataclass(frozen=True)
+class FreeMap:
+    """A free function: `columns[i][s]` is the change of series s's block averages for a unit of its i-th coefficient.
+
+    `grid` and `basis` (i, g) draw a function of one quantity; both are empty for others.
+    """
+
+    quantity: str
+    columns: tuple[tuple[Array, ...], ...]
+    grid: Array
+    basis: Array
 
 
 @dataclass(frozen=True)
 class Dependence:
-    """How much of the residual a function of `quantity` explains.
+    """How much of the residual a free function of `quantity` explains.
 
     `explained` is the share of the residual's sum of squares above the noise in blocks left out of the fit (at most 1, below 0
-    where it only fits noise); `p_value` tests the function against nothing. `grid` and `force` draw a function of one
-    quantity; the unit is the model's force, or its position for a sensor error.
+    where it only fits noise). `grid` and `force` draw a function of one quantity; the unit is the model's force, or its
+    position for a sensor error. `found` are the errors of prediction.
     """
 
     quantity: str
     explained: float
-    p_value: float
-    gain: float
     grid: Array
     force: Array
+    found: CrossValidated
 
 
-def _splines(values: Sequence[Array], count: int) -> tuple[list[list[Array]], Array, list[BSpline]]:
-    """Cubic B-splines over the middle 99.8 % of the values: basis functions of each series, a grid, the splines."""
+def _splines(values: Sequence[Array], count: int) -> tuple[list[list[Array]], Array, Array]:
+    """Cubic B-splines over the middle 99.8 % of the values: functions of each series, a grid, the functions on it."""
     joined = np.concatenate(values)
     low, high = np.quantile(joined, [0.001, 0.999])
     if high <= low:
-        return [], np.empty(0), []
+        return [], np.empty(0), np.empty((0, 0))
     degree = 3
     inner = np.linspace(low, high, count - degree + 1)
     knots = np.concatenate([[low] * degree, inner, [high] * degree])
     splines = [BSpline.basis_element(knots[i : i + degree + 2], extrapolate=False) for i in range(count)]
-    functions = [
-        [np.nan_to_num(spline(np.clip(v, low, high - 1e-12 * (high - low)))) for v in values]
-        for spline in splines
-    ]
-    return functions, np.linspace(low, high, 60), splines
+    top = high - 1e-12 * (high - low)
+    functions = [[np.nan_to_num(spline(np.clip(v, low, top))) for v in values] for spline in splines]
+    grid = np.linspace(low, top, 60)
+    return functions, grid, np.array([np.nan_to_num(spline(grid)) for spline in splines])
+
+
+def _remembered(values: Sequence[Array], times: Sequence[Array], frequency: float) -> list[list[Array]]:
+    """What first-order filters remember of signals: one function for each time constant."""
+    found = []
+    for share in TIME_CONSTANTS:
+        function = []
+        for value, time in zip(values, times):
+            keep = math.exp(-float(np.median(np.diff(time))) * frequency / share)
+            begin = [keep * value[0]]
+            function.append(np.asarray(lfilter([1.0 - keep], [1.0, -keep], value, zi=begin)[0]))
+        found.append(function)
+    return found
 
 
 def _simulated(
     known: Trajectories, functions: list[list[Array]], pool: ThreadPoolExecutor | None
-) -> list[list[Array]]:
+) -> tuple[tuple[Array, ...], ...]:
     """Outputs' changes when each function acts as a force; its size is chosen small and scaled back."""
     run, fit = known.disturbed, known.fit
     scale = (
         1e-3 * fit.model.mass.value * max(float(np.std(np.gradient(p.velocity, p.time))) for p in known.paths)
     )
 
-    def one(function: list[Array]) -> list[Array]:
+    def one(function: list[Array]) -> tuple[Array, ...]:
+        size = max(float(np.abs(values).max()) for values in function) or 1.0
         changes = []
-        for index, (one_series, path) in enumerate(zip(run.series, known.paths)):
-            rows = run.rows(
-                fit.model, index, fit.starts[index], first_order_hold(path.time, scale * function[index])
-            )
+        for index, (series, path) in enumerate(zip(run.series, known.paths)):
+            push = first_order_hold(path.time, scale / size * function[index])
+            rows = run.rows(fit.model, index, fit.starts[index], push)
             if rows is None:
-                changes.append(np.zeros(one_series.blocks))
+                changes.append(np.zeros(series.blocks))
             else:
-                changes.append(one_series.of_block(rows[:, run.states] - known.outputs[index]) / scale)
-        return changes
+                change = series.of_block(rows[:, run.states] - known.outputs[index])
+                changes.append(change * size / scale)
+        return tuple(changes)
 
-    return list(pool.map(one, functions)) if pool else [one(function) for function in functions]
-
-
-def _regress(
-    fit: Fit, columns: list[list[Array]], penalty: float = 1e-6
-) -> tuple[float, float, float, Array]:
-    """Cross-validated share explained, p-value, chi2 gain, and coefficients of a linear combination of columns."""
-    white_residual = whitened(fit, fit.residuals, fit.noise)
-    per_column = [whitened(fit, column, fit.noise) for column in columns]
-    blocks = [np.column_stack([column[i] for column in per_column]) for i in range(len(white_residual))]
-    residual_parts, design_parts = [], []
-    for residual, block, basis in zip(white_residual, blocks, fit.linearisation.bases):
-        residual_parts.append(residual - basis @ (basis.T @ residual))
-        design_parts.append(block - basis @ (basis.T @ block))
-    residual, design = np.concatenate(residual_parts), np.vstack(design_parts)
-    left = parameter_basis(fit)
-    residual = residual - left @ (left.T @ residual)
-    design = design - left @ (left.T @ design)
-    norms = np.linalg.norm(design, axis=0)
-    norms[norms == 0.0] = 1.0
-    scaled = design / norms
-    gram = scaled.T @ scaled
-    ridge = penalty * np.eye(len(gram))
-    coefficients = -np.linalg.solve(gram + ridge, scaled.T @ residual)
-    total = float(residual @ residual)
-    left_over = float(np.sum((residual + scaled @ coefficients) ** 2))
-    n = len(scaled)
-    rank = int(np.linalg.matrix_rank(gram, tol=1e-6 * len(gram)))
-    gain = max(total - left_over, 0.0)
-    statistic = (gain / max(rank, 1)) / max(left_over / max(n - rank, 1), 1e-300)
-    p_value = float(f_distribution.sf(statistic, max(rank, 1), max(n - rank, 1)))
-    edges = np.linspace(0, n, FOLDS * DEALT + 1).astype(int)
-    predicted_error = 0.0
-    for fold in range(FOLDS):  # stretches are dealt in turn, so that no amplitude is left out altogether
-        test = np.zeros(n, bool)
-        for part in range(fold, FOLDS * DEALT, FOLDS):
-            test[edges[part] : edges[part + 1]] = True
-        inner = scaled[~test].T @ scaled[~test] + ridge
-        beta = -np.linalg.solve(inner, scaled[~test].T @ residual[~test])
-        predicted_error += float(np.sum((residual[test] + scaled[test] @ beta) ** 2))
-    floor = min(float(n), left_over)
-    explained = (total - predicted_error) / max(total - floor, 1e-9 * total, 5.0 * math.sqrt(2.0 * n))
-    return float(np.clip(explained, -1.0, 1.0)), p_value, gain, coefficients / norms
+    return tuple(pool.map(one, functions)) if pool else tuple(one(function) for function in functions)
 
 
-def dependences(
-    known: Trajectories, pool: ThreadPoolExecutor | None = None, count: int = 8
-) -> list[Dependence]:
-    """Dependence of the residual on each quantity, the most explaining first."""
+def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> list[FreeMap]:
+    """The free functions beside a fitted model."""
     fit = known.fit
-    found: list[Dependence] = []
+    none, nowhere = np.empty(0), np.empty((0, 0))
+    found: list[FreeMap] = []
+    moving = any(np.ptp(p.effort) > 0 for p in known.paths)
     quantities: dict[str, list[Array]] = {
         "position": [p.position for p in known.legs],
         "velocity": [p.velocity for p in known.legs],
         "time": [p.time - p.time[0] for p in known.paths],
     }
-    if any(np.ptp(p.effort) > 0 for p in known.paths):
+    if moving:
         quantities["actuator force"] = [p.effort for p in known.paths]
     for name, values in quantities.items():
-        functions, grid, splines = _splines(values, count)
-        if not functions:
-            continue
-        explained, p, gain, coefficients = _regress(fit, _simulated(known, functions, pool))
-        drawn = sum(c * np.nan_to_num(s(grid)) for c, s in zip(coefficients, splines))
-        found.append(Dependence(name, explained, p, gain, grid, np.asarray(drawn)))
-    both_x, grid_x, _ = _splines(quantities["position"], 5)
-    both_v, _, _ = _splines(quantities["velocity"], 5)
-    if both_x and both_v:
-        products = [[a * b for a, b in zip(x, v)] for x in both_x for v in both_v]
-        explained, p, gain, _ = _regress(fit, _simulated(known, products, pool), 1e-4)
-        found.append(Dependence("position and velocity", explained, p, gain, grid_x, np.empty(0)))
-    functions, grid, splines = _splines(list(known.outputs), count)
-    if functions:
-        columns = [[s.of_block(f) for s, f in zip(fit.run.series, function)] for function in functions]
-        explained, p, gain, coefficients = _regress(fit, columns)
-        drawn = sum(c * np.nan_to_num(s(grid)) for c, s in zip(coefficients, splines))
+        functions, grid, basis = _splines(values, SPLINES)
+        if functions:
+            found.append(FreeMap(name, _simulated(known, functions, pool), grid, basis))
+    both = [_splines(quantities[name], SPLINES_OF_TWO)[0] for name in ("position", "velocity")]
+    if all(both):
+        products = [[a * b for a, b in zip(x, v)] for x in both[0] for v in both[1]]
+        found.append(FreeMap("position and velocity", _simulated(known, products, pool), none, nowhere))
+    times = [p.time for p in known.paths]
+    frequency = _frequency(known)
+    past = {"past velocity": [p.velocity for p in known.legs]}
+    if moving:
+        past["past actuator force"] = [p.effort for p in known.paths]
+    for name, values in past.items():
         found.append(
-            Dependence("measured position (sensor error)", explained, p, gain, grid, np.asarray(drawn))
+            FreeMap(name, _simulated(known, _remembered(values, times, frequency), pool), none, nowhere)
         )
+    line = residual_line(fit)
+    if line > 0.0:
+        waves = [[wave(2.0 * np.pi * line * t) for t in times] for wave in (np.cos, np.sin)]
+        found.append(FreeMap(f"a vibration at {line:.3g} Hz", _simulated(known, waves, pool), none, nowhere))
+    functions, grid, basis = _splines(list(known.outputs), SPLINES)
+    if functions:
+        columns = tuple(tuple(s.of_block(f) for s, f in zip(fit.run.series, one)) for one in functions)
+        found.append(FreeMap("measured position (sensor error)", columns, grid, basis))
+    return found
+
+
+def _frequency(known: Trajectories) -> float:
+    """Typical frequency of the motion [Hz]: rms of the velocity over that of the position."""
+    velocity = max(float(np.std(p.velocity)) for p in known.paths)
+    position = max(float(np.std(p.position)) for p in known.paths)
+    return velocity / max(2.0 * math.pi * position, 1e-300)
+
+
+def beside(fit: Fit, base: Linearised, one: FreeMap, rows: Rows) -> Linearised:
+    """The fit with a free map beside it, to first order. Separate held-out records are predicted as without it."""
+    seen = []
+    for index, (parts, basis) in enumerate(zip(rows.seen, fit.linearisation.bases)):
+        columns = np.column_stack([column[index] for column in one.columns])
+        white = np.concatenate([rows.noise.whiten(columns[part]) for part in parts] or [columns[:0]])
+        seen.append(white - basis @ (basis.T @ white))
+    hidden = [
+        rows.noise.whiten(np.column_stack([column[index][part] for column in one.columns]))
+        for index, parts in enumerate(rows.hidden)
+        for part in parts
+    ]
+    added = np.concatenate([*seen, *hidden])
+    wide = np.zeros((len(base.residual), added.shape[1]))
+    wide[: len(added)] = added
+    information = np.sum(added[: rows.fitted] ** 2, axis=0)
+    count = added.shape[1]
+    return Linearised(
+        base.residual,
+        np.hstack([base.jacobian, wide]),
+        np.concatenate([base.precision, RIDGE * np.maximum(information, 1e-300)]),
+        np.concatenate([base.departure, np.zeros(count)]),
+    )
+
+
+def dependences(known: Trajectories, rows: Rows, pool: ThreadPoolExecutor | None = None) -> list[Dependence]:
+    """Dependence of what a fit leaves on each quantity, the one that predicts best first."""
+    fit = known.fit
+    base = linearised(fit, rows)
+    alone = cross_validate(base, rows.blocks)
+    before = float(np.sum(alone.error**2))
+    n = len(alone.error)
+    found: list[Dependence] = []
+    for one in free_maps(known, pool):
+        wide = beside(fit, base, one, rows)
+        predicted = cross_validate(wide, rows.blocks)
+        coefficients = _coefficients(wide, rows.fitted)[-len(one.columns) :]
+        left = float(np.sum(predicted.error**2))
+        floor = min(float(n), left)
+        whole = max(before - floor, 1e-9 * before, 5.0 * math.sqrt(2.0 * n))
+        drawn = coefficients @ one.basis if one.basis.size else np.empty(0)
+        explained = float(np.clip((before - left) / whole, -1.0, 1.0))
+        found.append(Dependence(one.quantity, explained, one.grid, drawn, predicted))
     return sorted(found, key=lambda d: -d.explained)
+
+
+def _coefficients(fit: Linearised, fitted: int) -> Array:
+    """Least-squares change of all parameters on the rows that the fit sees."""
+    jacobian, residual = fit.jacobian[:fitted], fit.residual[:fitted]
+    norms = np.linalg.norm(jacobian, axis=0)
+    norms[norms == 0.0] = 1.0
+    scaled = jacobian / norms
+    normal = scaled.T @ scaled + np.diag(fit.precision / norms**2)
+    pull = fit.precision * fit.departure / norms
+    return -np.linalg.lstsq(normal, scaled.T @ residual + pull, rcond=1e-12)[0] / norms

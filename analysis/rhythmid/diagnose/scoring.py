@@ -1,9 +1,8 @@
-"""How records are scored: in free run where that means something, else tied to the record or in windows.
+"""How motion is scored: in free run where that means something, else in windows.
 
 A free run means nothing where the machine integrates, or where the nominal model loses it altogether: a score along a
-trajectory that the machine never took says nothing of what the model lacks. Where the force is known, and with it the
-position of an integrating machine or the velocity of any, an observer shows the force that the model lacks; else windows
-with starts of their own are made shorter until the model follows the machine through them.
+trajectory that the machine never took says nothing of what the model lacks. Windows with starts of their own are made shorter
+until the model follows the machine through them. (Recorded effort is scored by inverse dynamics, see `effort`.)
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -14,12 +13,12 @@ from functools import partial
 import numpy as np
 
 from rhythmid.diagnose.baseline import FOLLOWS, Calibration, calibrate, reconstructed
+from rhythmid.diagnose.hypothesis import ScoringKind
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
-from rhythmid.identify.force_scoring import observed
 from rhythmid.identify.multiple_shooting import LEAST, forgets, periods_long, windows
 from rhythmid.identify.output_error import Fit
-from rhythmid.identify.series import Series, bandwidth, hold_out_tail
+from rhythmid.identify.series import Series, hold_out_tail
 from rhythmid.model import Model
 from rhythmid.progress import Tell
 
@@ -28,28 +27,22 @@ PATIENCE = 2  # steps without such a gain before no more are tried
 BETTER = 0.6  # share to which all steps together have to: an error that adds up, not one made at once by noise or effect
 HOPELESS = 0.8  # error, as a share of the motion, of a free run along which a score says nothing
 SHORTER = 2.0  # factor from one length of windows to the next
-FINE = 0.08  # of a sample rate that an observer's frequency may be
 INTEGRATES = (
     "the model integrates or is unstable, so that a long free run would add up every small disturbance"
 )
-FREE_RUN = "free run"
-TIED = "the balance of forces, the model tied to the recorded motion by an observer of {0:.2g} Hz: "
+FREE_RUN = "the model follows the machine in free run"
 LOSES = "in free run the nominal model loses the machine"
 
 
 @dataclass(frozen=True)
 class Scoring:
-    """The calibrated nominal model, `unseen` held-out series where they are separate ones, and in `words` how all is scored:
-    "free run", or in windows and why."""
+    """The calibrated nominal model, `unseen` held-out series where they are separate ones, and how all is scored: in free run or
+    in windows, of what length and why."""
 
     calibration: Calibration
     unseen: tuple[Series, ...]
-    words: str
-
-    @property
-    def whole(self) -> bool:
-        """Whether records are run through from one start, not window by window."""
-        return not self.words.startswith("windows")
+    kind: ScoringKind
+    reason: str
 
     @property
     def error(self) -> float:
@@ -65,7 +58,7 @@ def settle(
     pool: ThreadPoolExecutor | None = None,
     tell: Tell = lambda _: None,
 ) -> tuple[Scoring, ...]:
-    """Calibrate the nominal model in the longest runs through which it follows the machine, or tied to the record.
+    """Calibrate the nominal model in the longest runs through which it follows the machine, in free run or in windows.
 
     The first result is the way to score. Where it is not the free run, but a free run is not hopeless, that comes second, for
     what the first leaves without a name: windows hide what is slow, and lines that are narrower than a window resolves.
@@ -75,8 +68,8 @@ def settle(
     idle = 0
     failure: InputError | None = None
     for how in _ladder(model, series):
-        if how.words != FREE_RUN:
-            tell(f"scoring in {how.words}")
+        if how.kind != "free_run":
+            tell(f"scoring in {how.reason}")
         cut, unseen = how.of(series), how.of(separate)
         if not separate:
             cut, unseen = hold_out_tail(cut)
@@ -92,7 +85,7 @@ def settle(
             continue
         if calibration.reconstructed:
             unseen = [reconstructed(one) for one in unseen]
-        tried.append(Scoring(calibration, tuple(unseen), how.words))
+        tried.append(Scoring(calibration, tuple(unseen), how.kind, how.reason))
         if calibration.fit.nrmse() < FOLLOWS:
             break
     if not tried:
@@ -101,15 +94,16 @@ def settle(
     longest, best = tried[0], tried[-1]
     if best.error >= BETTER * longest.error:
         return (longest,)
-    near = longest.words == FREE_RUN and longest.calibration.fit.nrmse() < HOPELESS
+    near = longest.kind == "free_run" and longest.calibration.fit.nrmse() < HOPELESS
     return (best, longest) if near and best is not longest else (best,)
 
 
 @dataclass(frozen=True)
 class _Way:
-    """A way to score, in `words`, and what it makes `of` series."""
+    """A way to score with its reason, and what it makes `of` series."""
 
-    words: str
+    kind: ScoringKind
+    reason: str
     of: Callable[[Sequence[Series]], list[Series]]
 
 
@@ -120,19 +114,11 @@ def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
     except InputError:
         free = False
     if free:
-        yield _Way(FREE_RUN, list)
-    driven = all(one.kind == "force" and one.command is not None for one in series)
-    if driven and all(
-        one.measured == "velocity" or (one.measured == "position" and not free) for one in series
-    ):
-        step = max(one.period * one.block for one in series)
-        frequency = min(max(bandwidth(one.value, one.period) for one in series), FINE / step)
-        reason = LOSES if free else INTEGRATES
-        yield _Way(TIED.format(frequency) + reason, lambda given: observed(given, model, frequency))
+        yield _Way("free_run", FREE_RUN, list)
     length = float(np.median([periods_long(one) for one in series]))
     shortest = LEAST * max(one.period * one.block for one in series)
     while length >= shortest:
-        yield _Way(_words(length, LOSES if free else INTEGRATES), partial(windows, length=length))
+        yield _Way("windows", _words(length, LOSES if free else INTEGRATES), partial(windows, length=length))
         length /= SHORTER
 
 

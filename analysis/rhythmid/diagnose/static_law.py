@@ -1,11 +1,11 @@
 """Static laws: effects whose force, or change of a signal, is a curved function of one quantity of the instant.
 
-Several of them in one quantity are a series: their sum is one law again, and can stand for a law that the catalogue
-does not have, as powers of x do for any smooth spring.
+The sum of several of them in one quantity is one law again, and may be one that the catalogue lacks, as powers of x are any
+smooth spring: then a free map of that quantity is another hypothesis in their place.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,6 @@ from rhythmid.simulation.effect import Path, effect_along
 Array = NDArray[np.float64]
 POINTS = 400  # instants at which an effect is tried
 SPREAD = 3.0  # standard deviations of velocity and force that they cover
-TERMS = 2  # as many laws of one quantity may be causes of their own; more are a series
-# of a sum of laws, up to which another one only corrects the one that it mostly is; and up to which several do, for a
-# series with a leading term that is nearly right takes more than one to mend it
-CORRECTION, CORRECTIONS = 0.3, 0.1
 MOSTLY = 0.3  # change, as a share of the effect, below which other quantities only correct it, as the damping of a stop
 SAME = 1e-9  # share of the effect below which what is left of it is rounding
 
@@ -74,34 +70,3 @@ def laws_of(trial: Trial, sizes: Scales) -> dict[tuple[str, str], dict[str, Arra
         if law is not None:
             found.setdefault((term.element.slot, law[0]), {})[label] = law[1]
     return found
-
-
-@dataclass(frozen=True)
-class SumOfLaws:
-    """Laws of one `quantity`, by their labels, that do together what none of them nearly does alone: a `series` for one law
-    that is not among them; or, where that is not sure, their sum is one model and such a law another."""
-
-    quantity: str
-    labels: tuple[str, ...]
-    series: bool
-
-
-def sum_of_laws(best: Trial, trials: Sequence[Trial], sizes: Scales, worth: float) -> SumOfLaws | None:
-    """The first sum of static laws in which no law is nearly all.
-
-    It is a series where there are more than `TERMS`, or where a richer one of the `trials`, with one more of them, is better
-    by `worth` in the criterion: the series would go on.
-    """
-    for (_, quantity), laws in laws_of(best, sizes).items():
-        total = np.sum(list(laws.values()), axis=0)
-        share = CORRECTION if len(laws) <= TERMS else CORRECTIONS
-        if any(np.std(total - law) < share * np.std(total) for law in laws.values()):
-            continue
-        goes_on = any(
-            set(t.added) > set(best.added)
-            and t.bic() < best.bic() - worth
-            and any(key[1] == quantity and len(more) > len(laws) for key, more in laws_of(t, sizes).items())
-            for t in trials
-        )
-        return SumOfLaws(quantity, tuple(laws), len(laws) > TERMS or goes_on)
-    return None

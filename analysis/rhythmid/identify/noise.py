@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter, lfiltic
 
 Array = NDArray[np.float64]
 TINY = 1e-12  # of a variance that a predictor leaves, at least
@@ -66,6 +67,18 @@ class NoiseModel:
             after -= coefficient * samples[p - lag : n - lag]
         white[p:] = after / self.std
         return white
+
+    def colour(self, white: Array) -> Array:
+        """The samples (n,) whose innovations these are: the inverse of `whiten`."""
+        p, n = self.order, len(white)
+        samples = np.empty(n)
+        for k, (predictor, std) in enumerate(self._beginnings[:n]):
+            samples[k] = std * white[k] + predictor @ samples[:k][::-1]
+        if n > p:
+            denominator = np.concatenate([[1.0], -self.coefficients])
+            state = lfiltic([1.0], denominator, samples[:p][::-1])
+            samples[p:] = lfilter([1.0], denominator, self.std * white[p:], zi=state)[0]
+        return samples
 
 
 def runs(used: NDArray[np.bool_]) -> list[slice]:

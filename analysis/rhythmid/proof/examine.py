@@ -36,7 +36,7 @@ def examine(folder: Path, catalogue: Catalogue) -> dict[str, Any]:
         learn = load_records(sorted((folder / LEARN).iterdir()))
         judge = load_records(sorted((folder / JUDGE).iterdir()))
         found = diagnose(learn, nominal, judge, catalogue, tell)
-        answer = found.diagnosis.to_dict() | {"block": found.evidence.unseen[0].block}
+        answer = found.diagnosis.to_dict() | {"block": found.result.unseen[0].block}
     except InputError as error:
         answer = {"failure": f"refused: {error}"}
     except Exception:  # a fault of ours is an answer, too, and a wrong one

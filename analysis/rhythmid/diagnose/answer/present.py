@@ -74,14 +74,14 @@ def findings(
     name: str = "the nominal model",
 ) -> Findings:
     """What the report shows, as plain data; arguments as for `present`."""
-    evidence, found = answer.evidence, answer.evidence.search
+    result, found = answer.result, answer.result.search
     pumpings = {id(record): active_pumping(record) for record in (*records, *holdout)}
     runs = _runs(found.nominal, found.fit, {r.name: pumpings[id(r)] for r in records}, bool(found.best.added))
-    if evidence.unseen_nominal is not None:
-        after = evidence.unseen_augmented or evidence.unseen_nominal
-        repaired = bool(found.best.added) and evidence.unseen_augmented is not None
+    if result.unseen_nominal is not None:
+        after = result.unseen_augmented or result.unseen_nominal
+        repaired = bool(found.best.added) and result.unseen_augmented is not None
         runs += _runs(
-            evidence.unseen_nominal, after, {r.name: pumpings[id(r)] for r in holdout}, repaired, heldout=True
+            result.unseen_nominal, after, {r.name: pumpings[id(r)] for r in holdout}, repaired, heldout=True
         )
     models = {"Nominal model": nominal.to_yaml(), "Nominal model, refitted": found.nominal.model.to_yaml()}
     if found.best.added:
@@ -94,16 +94,16 @@ def findings(
         slots={
             slot: tuple(t.element.name for t in nominal.terms if t.element.slot == slot) for slot in SLOTS
         },
-        forced=any(one.forcing is not None for one in evidence.series),
+        forced=any(one.forcing is not None for one in result.series),
         runs=tuple(runs),
         output_unit=nominal.units.position,
         noise=repeats.variance**0.5 if repeats else None,
         slow_noise=(repeats or noise_of(found.fit.residuals, found.fit.run.series)).long_run_variance ** 0.5,
         scores=_scores(found),
         threshold=float(chi2_distribution.isf(LEVEL / count, 1)),
-        functions=_functions(evidence.before, evidence.after if found.best.added else (), runs, nominal),
+        functions=_functions(result.before, result.after if found.best.added else (), runs, nominal),
         transfer=_transfer(
-            found, [p for r in records if (p := pumpings[id(r)]) is not None], evidence.series, nominal
+            found, [p for r in records if (p := pumpings[id(r)]) is not None], result.series, nominal
         ),
         nominal={n: {"value": v.value, "std": None, "unit": v.unit} for n, v in nominal.parameters.items()},
         refitted=_estimates(found.nominal),
@@ -273,8 +273,8 @@ def _names(model: Model, labels: Sequence[str]) -> tuple[str, ...]:
 
 def _words(answer: Answer, nominal: Model) -> dict[str, ElementWords]:
     elements = [term.element for term in nominal.terms]
-    elements += [score.element for score in answer.evidence.search.rounds[0].scores]
-    elements += [term.element for trial in answer.evidence.search.trials for term in trial.model.terms]
+    elements += [score.element for score in answer.result.search.rounds[0].scores]
+    elements += [term.element for trial in answer.result.search.trials for term in trial.model.terms]
     return {
         e.name: ElementWords(
             e.title,
@@ -289,7 +289,7 @@ def _words(answer: Answer, nominal: Model) -> dict[str, ElementWords]:
 
 def _hints(answer: Answer) -> tuple[tuple[str, str, str], ...]:
     """What tells the members of the families apart, by the elements' own account."""
-    known = {t.element.name: t.element for trial in answer.evidence.search.trials for t in trial.model.terms}
+    known = {t.element.name: t.element for trial in answer.result.search.trials for t in trial.model.terms}
     made = []
     for group in answer.diagnosis.indistinguishable:
         for name in group:

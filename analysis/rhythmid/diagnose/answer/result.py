@@ -1,9 +1,16 @@
-"""What a diagnosis says, and how it is written as JSON."""
+"""What a diagnosis says, and how it is written as JSON.
 
+The types are the contract: `python -m rhythmid.diagnose.answer.result` prints the JSON schema that follows from them.
+"""
+
+import json
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-Verdict = Literal["consistent", "missing_physics", "unknown_physics", "undecided"]
+from pydantic import TypeAdapter
+
+from rhythmid.diagnose.hypothesis import Kind, ScoringKind, Verdict
+from rhythmid.diagnose.rejections import Rejection
 
 
 @dataclass(frozen=True)
@@ -14,16 +21,14 @@ class Estimate:
     std: float | None
     unit: str
 
-    def to_dict(self) -> dict[str, Any]:
-        return {"value": self.value, "std": self.std, "unit": self.unit}
-
 
 @dataclass(frozen=True)
 class Detection:
-    """Whether anything is missing: p-value of the score tests over the whole catalogue, and free-run errors."""
+    """Whether anything is missing: p-value of the score tests over the whole catalogue (None where none were made), and errors
+    as shares of the motion or of the effort."""
 
-    p_value: float
-    nominal_nrmse: float
+    p_value: float | None
+    nominal_nrmse: float | None
     refitted_nominal_nrmse: float
     noise_floor_nrmse: float
 
@@ -39,18 +44,34 @@ class Location:
 
 @dataclass(frozen=True)
 class MissingEffect:
-    """An effect that the nominal model lacks, with the probability that this is its name."""
+    """An effect that the nominal model lacks: the share of the mismatch on held-out data that it explains, and the probability
+    that this is its name."""
 
     element: str
     slot: str
     equation: str
+    share: float
     probability: float
     parameters: dict[str, Estimate]
 
 
 @dataclass(frozen=True)
+class Explanation:
+    """One hypothesis: the log density with which it predicts data that its fit has not seen, how much less that is than the best
+    one's with the standard error of the difference, its probability, and its error on held-out data."""
+
+    elements: tuple[str, ...]
+    kind: Kind
+    score: float
+    score_difference: float
+    standard_error: float
+    probability: float
+    heldout_nrmse: float | None
+
+
+@dataclass(frozen=True)
 class Alternative:
-    """Another explanation: how much worse its information criterion is, and its error on held-out records."""
+    """Another explanation by effects: how much worse its information criterion is, and its error on held-out data."""
 
     elements: tuple[str, ...]
     delta_bic: float
@@ -59,21 +80,38 @@ class Alternative:
 
 @dataclass(frozen=True)
 class FitQuality:
-    """Free-run error on the records that the fit saw and on those it did not."""
+    """Error on the records that the fit saw and on those it did not, as a share of the motion or of the effort."""
 
     train_nrmse: float
     heldout_nrmse: float | None
 
 
 @dataclass(frozen=True)
-class Remainder:
-    """What no element explains: the quantity that the leftover force depends on best, and the curve."""
+class Curve:
+    """A function of one quantity: what is left as a force, or for a sensor error in the measurement's unit, over the quantity."""
 
-    quantity: str
-    explained: float
-    p_value: float
     grid: tuple[float, ...]
     force: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What the named effects leave and a free map predicts: its share of the mismatch, whether that is more than chance, the
+    quantity that it goes with best and, for a function of one quantity, its curve."""
+
+    share: float
+    significant: bool
+    goes_with: str | None
+    curve: Curve | None
+
+
+@dataclass(frozen=True)
+class Scored:
+    """How records were scored: in free run, in windows or by effort; the bandwidth of effort scoring [Hz]; and why."""
+
+    kind: ScoringKind
+    bandwidth: float | None
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -85,58 +123,45 @@ class Diagnosis:
     detection: Detection
     location: Location
     missing: tuple[MissingEffect, ...]
+    joint_probability: float
     indistinguishable: tuple[tuple[str, ...], ...]
     alternatives: tuple[Alternative, ...]
-    refitted_nominal: FitQuality
-    augmented: FitQuality
+    hypotheses: tuple[Explanation, ...]
+    rejections: tuple[Rejection, ...]
+    remainder: Remainder
+    fit: dict[Literal["refitted_nominal", "augmented"], FitQuality]
     parameters: dict[str, Estimate]
     delays: dict[str, Any]
     next_experiment: str
+    scoring: Scored
+    assumptions: tuple[str, ...] = ()
     calibration: tuple[str, ...] = ()
     excluded: tuple[str, ...] = ()
     heldout: str = ""
-    remainder: Remainder | None = None
-    scoring: str = "free run"
     notes: tuple[str, ...] = field(default=())
 
+    @property
+    def refitted_nominal(self) -> FitQuality:
+        """Error of the refitted nominal model."""
+        return self.fit["refitted_nominal"]
+
+    @property
+    def augmented(self) -> FitQuality:
+        """Error of the model with the named effects."""
+        return self.fit["augmented"]
+
     def to_dict(self) -> dict[str, Any]:
-        """The diagnosis as plain JSON data."""
-        return {
-            "verdict": self.verdict,
-            "summary": self.summary,
-            "detection": vars(self.detection),
-            "location": {
-                "slot": self.location.slot,
-                "where": self.location.where,
-                "evidence": list(self.location.evidence),
-            },
-            "missing": [
-                {
-                    "element": effect.element,
-                    "slot": effect.slot,
-                    "equation": effect.equation,
-                    "probability": effect.probability,
-                    "parameters": {name: value.to_dict() for name, value in effect.parameters.items()},
-                }
-                for effect in self.missing
-            ],
-            "indistinguishable": [list(group) for group in self.indistinguishable],
-            "alternatives": [
-                {
-                    "elements": list(other.elements),
-                    "delta_bic": other.delta_bic,
-                    "heldout_nrmse": other.heldout_nrmse,
-                }
-                for other in self.alternatives
-            ],
-            "fit": {"refitted_nominal": vars(self.refitted_nominal), "augmented": vars(self.augmented)},
-            "parameters": {name: value.to_dict() for name, value in self.parameters.items()},
-            "delays": self.delays,
-            "next_experiment": self.next_experiment,
-            "calibration": list(self.calibration),
-            "excluded": list(self.excluded),
-            "heldout": self.heldout,
-            "remainder": None if self.remainder is None else vars(self.remainder),
-            "scoring": self.scoring,
-            "notes": list(self.notes),
-        }
+        """The diagnosis as plain JSON data; a number that is not finite is null."""
+        return json.loads(ANSWER.dump_json(self))
+
+
+ANSWER = TypeAdapter(Diagnosis)
+
+
+def schema() -> dict[str, Any]:
+    """JSON schema of `to_dict`, with a null where a number may be infinite."""
+    return ANSWER.json_schema(mode="serialization")
+
+
+if __name__ == "__main__":
+    print(json.dumps(schema(), indent=2, ensure_ascii=False))

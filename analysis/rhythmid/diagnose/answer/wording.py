@@ -3,9 +3,11 @@
 import math
 from collections.abc import Sequence
 
-from rhythmid.diagnose.answer.result import FitQuality, Location, MissingEffect, Verdict
+from rhythmid.diagnose.answer.result import FitQuality, Location, MissingEffect
+from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.forward import Search
+from rhythmid.diagnose.verdict import Decision
 from rhythmid.identify.output_error import Fit
 from rhythmid.model import Model
 
@@ -47,29 +49,47 @@ def location_of(
 
 
 def summary_of(
-    verdict: Verdict,
-    reason: str,
+    decision: Decision,
     missing: Sequence[MissingEffect],
     plain: FitQuality,
     augmented: FitQuality,
-    twins: Sequence[tuple[str, ...]],
     whole: str,
+    freed: str | None = None,
 ) -> str:
-    """The verdict in a sentence or two; `whole` is what errors are a share of."""
-    if verdict == "consistent":
-        return "Nothing is missing: with its parameters refitted, the nominal model explains the records down to the noise."
+    """The verdict in a sentence or two.
+
+    `whole` is what errors are a share of; `freed` tells of the fixed value that the chosen hypothesis frees, if it does.
+    """
     names = " and ".join(effect.element.replace("_", " ") for effect in missing)
-    if verdict == "missing_physics":
+    groups = [" or ".join(name.replace("_", " ") for name in group) for group in decision.equivalent]
+    if freed is not None:
+        return f"Undecided: {freed}"
+    if decision.verdict == "consistent":
+        said = "Nothing of practical size is missing: with its parameters refitted, the nominal model explains the records"
+        left = decision.unexplained
+        if left.significant:
+            return f"{said} but for a small remainder that goes with {left.goes_with}."
+        return f"{said} down to the noise."
+    if decision.verdict == "missing_physics":
         said = f"The model lacks {names}."
-        if twins:
-            said = f"The model lacks {names} (or, indistinguishable here, {', '.join(' / '.join(g[1:]) for g in twins)})."
+        if groups:
+            said += f" These records do not separate {'; '.join(groups)}."
         before, after = plain.heldout_nrmse, augmented.heldout_nrmse
         if before is not None and after is not None:
-            said += f" With it, the error on held-out data falls from {100 * before:.2f} % to {100 * after:.2f} % of the {whole}."
+            said += (
+                f" With {'it' if len(missing) == 1 else 'them'}, the error on held-out data falls from {100 * before:.2f} % to "
+                f"{100 * after:.2f} % of the {whole}."
+            )
+        left = decision.unexplained
+        if left.significant and left.share > 0.0:
+            said += f" {100 * left.share:.2g} % of the mismatch is left and goes with {left.goes_with}."
         return said
-    if verdict == "undecided":
-        return f"Undecided: {reason}." + (f" Best so far: {names}." if names else "")
-    return f"Something is missing that the catalogue does not know: {reason}." + (
+    if decision.verdict == "undecided":
+        said = f"Undecided: {decision.reason}."
+        if groups:
+            return f"{said} They are {'; '.join(groups)}."
+        return said + (f" Best so far: {names}." if names else "")
+    return f"Something is missing that the catalogue does not know: {decision.reason}." + (
         f" The nearest, not the name: {names}." if names else ""
     )
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.baseline import FOLLOWS
+from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.search.backward import defend
 from rhythmid.diagnose.search.order import in_best_order
 from rhythmid.diagnose.search.refit import (
@@ -65,6 +66,7 @@ NEAR = 60.0
 # leaves; and how many of them get it
 PLAIN, SECOND = 100.0, 2
 MOST = 4  # effects at once
+RIVALS = 4  # models of each number of effects that are compared at the end
 OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
 MISFIT = 0.1  # error, as a share of the motion, and
@@ -189,8 +191,13 @@ def search(
     catalogue: Catalogue,
     pool: ThreadPoolExecutor | None,
     tell: Tell = lambda _: None,
+    budget: Budget | None = None,
 ) -> Search:
-    """Search the catalogue for what the nominal model lacks; `nominal` is the fit to the same series of the one `given`."""
+    """Search the catalogue for what the nominal model lacks; `nominal` is the fit to the same series of the one `given`.
+
+    Once the `budget` is spent no further round begins; what was not tried is told among the excluded.
+    """
+    budget = budget or Budget()
     step = nominal.run.max_step
     floor = 1e-9 * max(float(np.std(one.averaged)) for one in series)
     tell("scoring the catalogue")
@@ -219,6 +226,10 @@ def search(
     while (
         now.p_value < LEVEL and _could_pay(now, best, max(WORTH, SHARE * gained)) and len(best.added) < MOST
     ):
+        if budget.spent:
+            untried = [score.element.name for score, _ in distinct(now.scores, REFITTED)]
+            excluded.append((tuple(untried), "not tried, for the time given was spent"))
+            break
         count = REFITTED if not best.added else REFITTED - 2
         proposals, enough = _proposals(here.model, here.added, now.scores, count, here.chi2)
         tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
@@ -272,7 +283,7 @@ def search(
         now, current = _one_round(current, best.added, catalogue, pool)
         here = under_noise([best], series, current.noise, step, 0)[0]
         rounds.append(now)
-    if best.added:
+    if best.added and not budget.spent:
         margin = max(WORTH, SHARE * gained)
         defended, more = defend(best, series, catalogue, trials, noise, step, rounds, margin, MOST, tell)
         trials |= more
@@ -320,9 +331,16 @@ def _could_pay(now: Round, best: Trial, margin: float) -> bool:
     return now.scores[0].statistic > 0.5 * (margin + math.log(max(best.samples, 2)))
 
 
-def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial, count: int = 10) -> list[Trial]:
-    """The models worth comparing at the end: the nominal one, the chosen one and its nearest rivals."""
-    rivals = sorted(trials.values(), key=lambda t: t.bic())[:count]
-    kept = {tuple(sorted(t.added)): t for t in [trials[()], *rivals]}
-    kept[tuple(sorted(best.added))] = best
+def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial) -> list[Trial]:
+    """The models worth comparing at the end: the nominal one, the best of each number of effects, and the chosen one with what
+    it is without each of its effects."""
+    ranked = sorted(trials.values(), key=lambda t: t.bic())
+    kept = {tuple(sorted(t.added)): t for t in [trials[()], best]}
+    for count in {len(t.added) for t in ranked if t.added}:
+        same = [t for t in ranked if len(t.added) == count][:RIVALS]
+        kept = {tuple(sorted(t.added)): t for t in same} | kept
+    for label in best.added:
+        rest = tuple(sorted(name for name in best.added if name != label))
+        if rest in trials:
+            kept.setdefault(rest, trials[rest])
     return list(kept.values())

@@ -1,7 +1,7 @@
-"""Stand-ins: effects that, as they are fitted, are not what their name says and imitate something else.
+"""Shape of a fitted effect: whether it still is what its name says.
 
 One that bends only where the motion has never been, such as a gap whose edges it never meets, is but a constant or a
-spring; one at the edge of what it may be is on its way to being another; and a disturbance, or a resonance as
+spring; one at the edge of what its name means is on its way to being another; and a disturbance, or a resonance as
 narrow as one, at a multiple of the forcing's frequency is what any change in the path of the forcing looks like.
 """
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.search.score_tests import Trajectories
 from rhythmid.diagnose.static_law import SAME, curved
 from rhythmid.elements.element import Element, Scales
-from rhythmid.model import Term
+from rhythmid.model import Model, Term
 from rhythmid.simulation.effect import Path, effect_along
 
 Array = NDArray[np.float64]
@@ -23,63 +23,67 @@ POINTS = 400  # instants at which an effect is tried
 REACH = 1.2  # times the ranges of the motion, which no part of it exceeds, nor of what a limit has cut off
 FAR = 1e3  # times these ranges, where every kink shows
 DAMPING = "damping_ratio"  # of a resonance: it is as wide as this share of its frequency
-EDGE = 1e-3  # of a bound, as which a value next to it counts
 
 
-def stand_ins(known: Trajectories, added: Sequence[str], sizes: Scales) -> list[str]:
-    """A sentence about each of the `added` elements, by their labels, that is a stand-in in the fitted model."""
-    said: list[str] = []
+def shape_of(model: Model, added: Sequence[str], known: Trajectories, sizes: Scales) -> dict[str, float]:
+    """The worst statistic of the effects with the labels `added`, by the name of the rule that it is for.
+
+    `known` is a fitted run of the same records, whose motion serves for all models.
+    """
+    found: dict[str, float] = {}
     for label in added:
-        term = known.fit.model.term(label)
-        assert term is not None
-        name = term.element.name.replace("_", " ")
-        if _beyond_reach(known, term):
-            said.append(
-                f"{name} would act beyond the records' range only; within it stands for something else"
-            )
-        elif (edge := _at_edge(term, sizes)) is not None:
-            said.append(f"{name} is at the edge of what it can be ({edge}) and stands for something else")
-        elif _synchronous(term, sizes):
-            said.append(
-                f"{name} at the forcing's own frequency stands for a change in the path of the forcing"
-            )
-    return said
+        term = model.term(label)
+        if term is None:
+            continue
+        each = {
+            "within_bounds": _within_bounds(term, sizes),
+            "acts_within_records": _acts_within(known, model, term),
+            "own_frequency": _own_frequency(term, sizes),
+        }
+        found = {name: min(value, found.get(name, math.inf)) for name, value in each.items()}
+    return found
 
 
-def _beyond_reach(known: Trajectories, term: Term) -> bool:
-    """Whether the effect is curved, but straight wherever the motion has been."""
+def _acts_within(known: Trajectories, model: Model, term: Term) -> float:
+    """Size of the effect's curvature within the motion's range, over that far beyond; infinite for a straight effect."""
     element = term.element
     if element.kernel is None or element.own:
-        return False
+        return math.inf
     values = {name: value.value for name, value in term.values.items()}
-    bent: list[bool] = []
+    bent: list[float] = []
     for times in (REACH, FAR):
         path = _instants(_met(known, element), times)
-        effect = effect_along(element, values, known.fit.model, path)
+        effect = effect_along(element, values, model, path)
         left = curved(effect, path.position, path.velocity, path.effort, path.signal, path.time)
-        bent.append(bool(np.abs(left).max() > SAME * np.abs(effect).max()))
-    return bent == [False, True]
+        size = float(np.abs(effect).max())
+        bent.append(float(np.abs(left).max()) / size if size > 0.0 else 0.0)
+    if bent[1] <= SAME or bent[0] > SAME:
+        return math.inf
+    return 0.0
 
 
-def _at_edge(term: Term, sizes: Scales) -> str | None:
-    """The first parameter that ended at a bound which the search has set for these records."""
+def _within_bounds(term: Term, sizes: Scales) -> float:
+    """Least distance of a free parameter from a bound that the element's `ranges` set, as a share of that bound."""
+    least = math.inf
     for name in term.element.ranges(sizes) if term.element.ranges is not None else ():
-        value, (low, high) = term.values[name].value, term.values[name].bounds
-        near = [end for end in (low, high) if math.isfinite(end) and abs(value - end) < EDGE * abs(end)]
-        if near and not term.values[name].fixed:
-            return name
-    return None
+        if term.values[name].fixed:
+            continue
+        value = term.values[name].value
+        ends = [end for end in term.values[name].bounds if math.isfinite(end) and end != 0.0]
+        least = min([least, *(abs(value - end) / abs(end) for end in ends)])
+    return least
 
 
-def _synchronous(term: Term, sizes: Scales) -> bool:
-    """Whether the effect is a vibration, or a resonance as narrow as one, that these records cannot tell in frequency from
-    the forcing."""
+def _own_frequency(term: Term, sizes: Scales) -> float:
+    """Distance of a vibration, or of a resonance as narrow as one, from the forcing's harmonics, in lines that the records
+    resolve; infinite for other effects."""
     forcing, line = sizes.forcing_frequency, 1.0 / sizes.duration
     if term.element.kernel is None or forcing <= 0.0:
-        return False
+        return math.inf
     found = [term.values[one.name].value for one in term.element.parameters if one.unit == "Hz"]
     damping = term.values[DAMPING].value if DAMPING in term.values else 0.0
-    return any(abs(f - round(f / forcing) * forcing) < line and damping * f < line for f in found)
+    narrow = [abs(f - round(f / forcing) * forcing) / line for f in found if damping * f < line]
+    return min(narrow, default=math.inf)
 
 
 def _met(known: Trajectories, element: Element) -> Path:

@@ -1,0 +1,161 @@
+"""Other kinds of explanation beside the search's effects: a wrong fixed value, a longer delay, an effect in another place.
+
+A mass that is given wrongly is missed like physics, and a lag is one law wherever in the path it sits, though the catalogue may
+have it in one place only. Each is a hypothesis like any other, fitted and scored in the same way.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.diagnose.baseline import INPUT_DELAY
+from rhythmid.diagnose.free_map import FREE_MAPS, first_guess
+from rhythmid.diagnose.hypothesis import Kind
+from rhythmid.diagnose.search.refit import Proposal, Trial, propose, run_trials
+from rhythmid.diagnose.search.score_tests import Trajectories
+from rhythmid.diagnose.static_law import laws_of
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.elements.element import Element, Scales, Slot
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.series import Series, dominant_frequency, scales
+from rhythmid.model import INERTIA, Model, Term
+from rhythmid.simulation.compiled import compile_model
+from rhythmid.simulation.generated_source import DRIVES
+
+Array = NDArray[np.float64]
+SIGNALS: tuple[Slot, ...] = ("command", "actuator", "sensor")  # what a law with times acts on
+CLOCKS: tuple[Slot, ...] = ("command", "timing")  # what has a delay that may drift
+LONGER = (2.0, 5.0, 12.0, 30.0)  # samples, at which a longer delay is sought
+LONGEST = 0.25  # periods of the motion: a longer one is another minimum of the same
+
+
+def alternatives(
+    nominal: Trial,
+    chosen: Trial,
+    series: Sequence[Series],
+    catalogue: Catalogue,
+    noise: NoiseModel,
+    step: float,
+    known: Trajectories,
+) -> list[tuple[Trial, Kind]]:
+    """Fitted trials of other kinds, for the nominal model and in the place of the chosen effects; `known` is the chosen run."""
+    sizes = scales(series, chosen.model)
+    freed: list[Proposal] = list(_freed(nominal))
+    moved: list[Proposal] = []
+    for label in chosen.added:
+        rest = tuple(name for name in chosen.added if name != label)
+        beside = _base(chosen, rest)
+        if rest:
+            freed += _freed(beside)
+        term = chosen.model.term(label)
+        assert term is not None
+        for place in _free_places(term.element, catalogue):
+            tied = place == "sensor" and series[0].observer is not None
+            if not tied and not (place == "command" and series[0].kind not in DRIVES):
+                moved.append(_moved(beside, term, place))
+    made: dict[Kind, list[Proposal]] = {
+        "freed_value": freed,
+        "delay": list(_longer_delay(nominal, series)),
+        "location": moved,
+        "free_map": list(_one_law(chosen, known, sizes)),
+    }
+    kinds: dict[tuple[str, ...], Kind] = {
+        proposal.added: kind for kind, group in made.items() for proposal in group
+    }
+    if not kinds:
+        return []
+    states = compile_model(chosen.model).layout.states
+    every = [proposal for group in made.values() for proposal in group]
+    trials, _ = run_trials(every, series, chosen.starts, states, noise, step)
+    return [(trial, kinds[trial.added]) for trial in trials]
+
+
+def _base(chosen: Trial, rest: tuple[str, ...]) -> Trial:
+    """The chosen trial with only these of its effects, as a place to start from."""
+    model = chosen.model
+    for label in chosen.added:
+        if label not in rest:
+            model = model.without(label)
+    return replace(chosen, added=rest, model=model)
+
+
+def _freed(base: Trial) -> Iterator[Proposal]:
+    for name in fixed_values(base.model, base.added):
+        freed = base.model.with_parameters({name: replace(base.model.parameters[name], fixed=False)})
+        yield Proposal((*base.added, name), freed, ({},))
+
+
+def fixed_values(model: Model, effects: Sequence[str] = ()) -> list[str]:
+    """Parameters of the nominal model that are held fixed because its author says so, not by their nature, and are not zero."""
+    names = [INERTIA] if model.mass.fixed else []
+    for term in model.terms:
+        for key, value in term.values.items():
+            if value.fixed and value.value != 0.0 and not term.element.parameter(key).fixed:
+                names.append(f"{term.label}.{key}")
+    return [name for name in names if name.rpartition(".")[0] not in effects]
+
+
+def _longer_delay(base: Trial, series: Sequence[Series]) -> Iterator[Proposal]:
+    """The model with its input's delay no longer held near the sample that a nuisance may take."""
+    delay = base.model.parameters.get(INPUT_DELAY)
+    if delay is None or delay.prior is None:
+        return
+    period = max(one.period for one in series)
+    most = LONGEST / max(dominant_frequency(one) for one in series)
+    free = base.model.with_parameters(
+        {INPUT_DELAY: replace(delay, value=0.0, prior=None, bounds=(delay.bounds[0], most))}
+    )
+    guesses = tuple({INPUT_DELAY: n * period} for n in LONGER if n * period < most)
+    if guesses:
+        yield Proposal((*base.added, INPUT_DELAY), free, guesses)
+
+
+def _one_law(chosen: Trial, known: Trajectories, sizes: Scales) -> Iterator[Proposal]:
+    """The chosen model with a free map in the place of several effects that are laws of the same quantity."""
+    for (slot, quantity), laws in laws_of(chosen, sizes).items():
+        name = {"actuator": "effort", "sensor": "signal"}.get(slot, quantity)
+        if len(laws) < 2 or name not in FREE_MAPS:
+            continue
+        values: list[Array] = {
+            "position": [path.position for path in known.legs],
+            "velocity": [path.velocity for path in known.legs],
+            "effort": [path.effort for path in known.paths],
+            "signal": list(known.outputs),
+        }[name]
+        base = _base(chosen, tuple(label for label in chosen.added if label not in laws))
+        yield propose(base.model, FREE_MAPS[name], [first_guess(np.concatenate(values))], base.added)
+
+
+def _free_places(element: Element, catalogue: Catalogue) -> Iterator[Slot]:
+    """Other places where the element would make sense, and where the catalogue has none of its family."""
+    for place in _places(element):
+        there = [one for one in catalogue.values() if one.slot == place and one.candidate]
+        if place != element.slot and element.family not in {one.family for one in there if one.family}:
+            yield place
+
+
+def _places(element: Element) -> tuple[Slot, ...]:
+    """Places where the law of the element would make sense, its own among them: only effects that know times or rates of them
+    but no sizes have the same parameters in every place."""
+    units = {parameter.unit for parameter in element.parameters}
+    if element.delay is not None and units == {"1"}:
+        return CLOCKS
+    plain = element.kernel is not None and element.acts == Element.acts and not element.memories
+    if plain and element.slot in SIGNALS and units == {"s"}:
+        return SIGNALS
+    return ()
+
+
+def _moved(base: Trial, term: Term, place: Slot) -> Proposal:
+    """The model with one of its effects in another place."""
+    measured = place == "sensor"
+    element = replace(
+        term.element,
+        name=f"{term.element.name}_of_the_{place}",
+        slot=place,
+        initial=lambda x, v, f, **_: (x if measured else f,) * len(term.element.own),
+    )
+    values = {name: value.value for name, value in term.values.items()}
+    return propose(base.model, element, [values], base.added)

@@ -1,0 +1,195 @@
+"""Contenders: the models that the search has fitted in free run, each made a hypothesis with its predictions.
+
+All are scored on the same rows: the whitened residuals of what the fit saw, predicted by cross-validation, and of what it did
+not see, the hidden ends of the same records or separate ones.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.diagnose.evidence import (
+    Blocks,
+    CrossValidated,
+    Linearised,
+    Whole,
+    autocorrelation_time,
+    cross_validate,
+    prediction,
+)
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind, names_of
+from rhythmid.diagnose.search.refit import Trial, fine_enough, whole_fit
+from rhythmid.identify.multiple_shooting import record_of
+from rhythmid.identify.noise import NoiseModel, runs
+from rhythmid.identify.output_error import Fit, start_only
+from rhythmid.identify.series import Series
+from rhythmid.parallel import fork_map
+
+Array = NDArray[np.float64]
+Shape = Callable[[Trial], Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The rows on which all hypotheses of a case are scored.
+
+    Parameters
+    ----------
+    seen : stretches of each series that the fit sees, in order.
+    hidden : stretches of each series that are hidden from it.
+    unseen : separate series that no fit sees.
+    noise : noise model under which residuals are whitened.
+    record : (n,) record of each row: the seen rows first, then the hidden ones, then those of separate series.
+    blocks : blocks of the rows.
+    size : rms of what errors are a share of, over all rows.
+    """
+
+    seen: tuple[tuple[slice, ...], ...]
+    hidden: tuple[tuple[slice, ...], ...]
+    unseen: tuple[Series, ...]
+    noise: NoiseModel
+    record: Whole
+    blocks: Blocks
+    size: float
+
+    @property
+    def fitted(self) -> int:
+        """Number of rows that a fit sees."""
+        return int(np.sum(self.blocks.fold[self.blocks.block] >= 0))
+
+    @property
+    def heldout(self) -> NDArray[np.bool_]:
+        """Rows (n,) that no fit sees."""
+        return self.blocks.fold[self.blocks.block] < 0
+
+
+def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseModel) -> Rows:
+    """The rows of these series and of separate held-out ones, under a noise model."""
+
+    def stretches(one: Series, hidden: bool) -> tuple[slice, ...]:
+        return tuple(s for s in runs(one.counted(hidden)) if s.stop - s.start > noise.order + 1)
+
+    seen = tuple(stretches(one, False) for one in series)
+    hidden = tuple(stretches(one, True) for one in series)
+    others = tuple(stretches(one, False) for one in unseen)
+    names = list(dict.fromkeys(record_of(one) for one in series))
+    lengths: list[tuple[int, int]] = []
+    power, total = 0.0, 0
+    for parts, group, first in (
+        (seen, series, 0),
+        (hidden, series, len(names)),
+        (others, unseen, 2 * len(names)),
+    ):
+        for index, (slices, one) in enumerate(zip(parts, group)):
+            count = sum(s.stop - s.start for s in slices)
+            number = first + (index if group is unseen else names.index(record_of(one)))
+            lengths.append((number, count))
+            mask = np.zeros(one.blocks, bool)
+            for part in slices:
+                mask[part] = True
+            power, total = power + one.power(mask), total + count
+    record = np.concatenate([np.full(count, number, dtype=np.int64) for number, count in lengths])
+    held = np.arange(len(names), 2 * len(names) + len(unseen))
+    return Rows(
+        seen,
+        hidden,
+        tuple(unseen),
+        noise,
+        record,
+        Blocks.of(record, noise.order, held),
+        float(np.sqrt(power / max(total, 1))),
+    )
+
+
+def _stretched(rows: Rows, values: Sequence[Array], which: tuple[tuple[slice, ...], ...]) -> list[Array]:
+    return [value[part] for value, parts in zip(values, which) for part in parts]
+
+
+def linearised(fit: Fit, rows: Rows) -> Linearised:
+    """A fit on the rows: what it leaves of each, and how what it saw depends on its parameters."""
+    unseen: list[Array] = []
+    if rows.unseen:
+        other = start_only(fit.model, rows.unseen, rows.noise, fine_enough(fit.model, fit.run.max_step))
+        unseen = [other.linearisation.residual]
+    hidden = [rows.noise.whiten(part) for part in _stretched(rows, fit.residuals, rows.hidden)]
+    residual = np.concatenate([fit.linearisation.residual, *hidden, *unseen])
+    jacobian = np.zeros((len(residual), len(fit.names)))
+    jacobian[: len(fit.linearisation.residual)] = fit.linearisation.jacobian
+    priors = [fit.model.parameters[name].prior for name in fit.names]
+    return Linearised(
+        residual,
+        jacobian,
+        np.array([0.0 if one is None else one.std**-2 for one in priors]),
+        np.array([0.0 if one is None else v - one.mean for one, v in zip(priors, fit.values)]),
+    )
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A fitted model with the errors of its predictions, in units of the noise and in the measurement's."""
+
+    trial: Trial
+    kind: Kind
+    found: CrossValidated
+    error: Array
+
+
+def measured_errors(error: Array, rows: Rows) -> Array:
+    """Errors (n,) in the measurement's unit from whitened ones (n,), stretch by stretch."""
+    made, first = [], 0
+    lengths = [s.stop - s.start for parts in (*rows.seen, *rows.hidden) for s in parts]
+    lengths.append(len(error) - sum(lengths))
+    for length in lengths:
+        made.append(rows.noise.colour(error[first : first + length]))
+        first += length
+    return np.concatenate(made)
+
+
+def contend(
+    trials: Sequence[tuple[Trial, Kind]], series: Sequence[Series], rows: Rows, step: float
+) -> list[Contender]:
+    """Contenders of these trials, in their order; those that diverge on held-out records are left out."""
+
+    def one(case: tuple[Trial, Kind]) -> tuple[CrossValidated, Array]:
+        fit = whole_fit(case[0], series, rows.noise, step)
+        found = cross_validate(linearised(fit, rows), rows.blocks)
+        cost = 0.5 * case[0].start_cost / max(rows.fitted, 1)  # of free starts, spread over what the fit saw
+        if cost > 0.0:
+            found = replace(found, penalty=cost)
+        return found, measured_errors(found.error, rows)
+
+    done = {i: r for i, r in fork_map(one, list(trials)) if not isinstance(r, Exception)}
+    return [Contender(*trials[i], *done[i]) for i in sorted(done)]
+
+
+def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> list[Hypothesis]:
+    """The contenders as hypotheses, under the autocorrelation time of the one that predicts best."""
+    time = remembered(contenders, rows)
+    return [
+        Hypothesis(
+            one.trial.added,
+            names_of(one.trial.model, one.trial.added),
+            one.kind,
+            one.trial.free,
+            prediction(one.found, rows.blocks, time, one.error),
+            heldout_error(one.error, rows),
+            shape(one.trial) if one.kind == "effects" else {},
+        )
+        for one in contenders
+    ]
+
+
+def remembered(contenders: Sequence[Contender], rows: Rows) -> float:
+    """Autocorrelation time in rows of the errors of the contender that predicts best."""
+    best = min(contenders, key=lambda one: float(np.sum(one.found.error**2)))
+    return autocorrelation_time(best.found.error, rows.record)
+
+
+def heldout_error(error: Array, rows: Rows) -> float | None:
+    """Rms of the errors (n,) on held-out rows, as a share of what errors are a share of; None where nothing is held out."""
+    held = rows.heldout
+    if not held.any() or rows.size == 0.0:
+        return None
+    return float(np.sqrt(np.mean(error[held] ** 2))) / rows.size

@@ -1,0 +1,79 @@
+"""Free maps: an unknown smooth law of one quantity, as elements that the simulator runs.
+
+F(z) = Σ c_i B_i((z − low) / (high − low)), with uniform cubic B-splines B_i (C. de Boor, A Practical Guide to Splines, 2001);
+beyond the ends it stays as it is there. "Unknown physics" is such a map in the place of names. Several effects that are
+laws of the same quantity are a series for one law: the map says whether one would do.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.elements.element import Element, Parameter, Slot
+
+Array = NDArray[np.float64]
+COEFFICIENTS = 10
+
+
+def _force(x, v, t, f, low, high, share, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9):
+    z = (1.0 - share) * x + share * v
+    s = min(max((z - low) / (high - low) * 7.0, 0.0), 7.0 - 1e-12)
+    i = int(s)
+    u = s - i
+    c = (c0, c1, c2, c3, c4, c5, c6, c7, c8, c9)
+    w = 1.0 - u
+    first = w * w * w * c[i] + (3.0 * u * u * u - 6.0 * u * u + 4.0) * c[i + 1]
+    second = (3.0 * w * w * w - 6.0 * w * w + 4.0) * c[i + 2] + u * u * u * c[i + 3]
+    return (first + second) / 6.0
+
+
+def _signal(z, t, low, high, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9):
+    s = min(max((z - low) / (high - low) * 7.0, 0.0), 7.0 - 1e-12)
+    i = int(s)
+    u = s - i
+    c = (c0, c1, c2, c3, c4, c5, c6, c7, c8, c9)
+    w = 1.0 - u
+    first = w * w * w * c[i] + (3.0 * u * u * u - 6.0 * u * u + 4.0) * c[i + 1]
+    second = (3.0 * w * w * w - 6.0 * w * w + 4.0) * c[i + 2] + u * u * u * c[i + 3]
+    return z + (first + second) / 6.0
+
+
+def _element(name: str, slot: Slot, quantity: str, share: float | None = None) -> Element:
+    """The element of one quantity; of a force, `share` is 0 for the position and 1 for the velocity."""
+    chosen = (
+        ()
+        if share is None
+        else (Parameter("share", "1", "0 position, 1 velocity", default=share, fixed=True),)
+    )
+    return Element(
+        name=name,
+        slot=slot,
+        title=f"Free map of the {quantity}",
+        equation="Σ c_i B_i",
+        parameters=(
+            Parameter("low", "1", "where the map begins", fixed=True),
+            Parameter("high", "1", "where the map ends", fixed=True),
+            *chosen,
+            *(Parameter(f"c{i}", "1", f"coefficient {i}") for i in range(COEFFICIENTS)),
+        ),
+        kernel=_signal if share is None else _force,
+        candidate=False,
+        reference="C. de Boor, A Practical Guide to Splines, 2001, chapter IX",
+    )
+
+
+FREE_MAPS: Mapping[str, Element] = {
+    "position": _element("free_force_of_position", "force", "position", 0.0),
+    "velocity": _element("free_force_of_velocity", "force", "velocity", 1.0),
+    "effort": _element("free_actuator_map", "actuator", "actuator's force"),
+    "signal": _element("free_sensor_map", "sensor", "measurement"),
+}
+
+
+def first_guess(values: Array) -> dict[str, float]:
+    """Values of a map over the range of a quantity (n,), zero everywhere."""
+    low, high = (float(end) for end in np.quantile(values, [0.0, 1.0]))
+    margin = 0.05 * max(high - low, math.ulp(1.0))
+    return {"low": low - margin, "high": high + margin} | {f"c{i}": 0.0 for i in range(COEFFICIENTS)}

@@ -1,0 +1,177 @@
+"""Diagnosis in free run or in windows: the search, its contenders and their evidence, and the fit that an answer is made from."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rhythmid.diagnose.alternatives import alternatives
+from rhythmid.diagnose.baseline import Calibration
+from rhythmid.diagnose.case import Case
+from rhythmid.diagnose.constants import PRACTICAL
+from rhythmid.diagnose.contenders import (
+    Contender,
+    Rows,
+    contend,
+    hypotheses_of,
+    measured_errors,
+    remembered,
+    rows_of,
+)
+from rhythmid.diagnose.evidence import autocorrelation_time, prediction
+from rhythmid.diagnose.fine_steps import finely_stepped
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
+from rhythmid.diagnose.intervals import profiled
+from rhythmid.diagnose.location import Dependence, dependences
+from rhythmid.diagnose.scoring import Scoring
+from rhythmid.diagnose.search.forward import Search, search
+from rhythmid.diagnose.search.refit import Trial, whole_fit
+from rhythmid.diagnose.search.score_tests import Trajectories, trajectories, under
+from rhythmid.diagnose.selection import Contest, Selection, select
+from rhythmid.diagnose.shape import shape_of
+from rhythmid.diagnose.verdict import Decision, decide
+from rhythmid.elements.element import Scales
+from rhythmid.errors import InputError
+from rhythmid.identify.output_error import Fit, start_only
+from rhythmid.identify.sample_clock.tick_interval import ticks_followed
+from rhythmid.identify.series import Series, scales
+
+
+@dataclass(frozen=True)
+class FreeRunResult:
+    """Everything behind an answer that was scored in free run or in windows.
+
+    `search` holds the chosen model as its `best`, with its fit; `before` and `after` are the free maps beside the nominal and
+    beside the chosen model; `unseen_nominal` and `unseen_augmented` their runs over separate held-out records.
+    """
+
+    scoring: Scoring
+    series: tuple[Series, ...]
+    unseen: tuple[Series, ...]
+    calibration: Calibration
+    search: Search
+    before: tuple[Dependence, ...]
+    after: tuple[Dependence, ...]
+    unseen_nominal: Fit | None
+    unseen_augmented: Fit | None
+    contest: Contest
+    selection: Selection
+    decision: Decision
+    detectable: float
+
+
+def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
+    """Search, weigh and decide."""
+    calibration, seen = scoring.calibration, list(scoring.calibration.series)
+    unseen = tuple(scoring.unseen) if case.holdout else ()
+    known = case.catalogue.within(scales(seen, calibration.fit.model))
+    if seen[0].observer is not None:  # which takes the measurement for the motion
+        known = known.without(*(name for name, element in known.elements.items() if element.slot == "sensor"))
+    found = search(seen, calibration.fit, case.nominal, known, case.pool, case.tell, case.budget)
+    case.tell("weighing the hypotheses on data that no fit has seen")
+    step = found.fit.run.max_step
+    rows = rows_of(seen, unseen, found.noise)
+    kinds: list[tuple[Trial, Kind]] = [(t, "effects" if t.added else "nominal") for t in found.trials]
+    contenders = contend(kinds, seen, rows, step)
+    run = trajectories(found.fit)
+    sizes = scales(seen, found.fit.model)
+    chosen = select(_contest(contenders, {}, rows, found, run, sizes)).chosen
+    trial = _trial_of(chosen, contenders)
+    if trial.added != found.best.added:
+        run = trajectories(whole_fit(trial, seen, found.noise, step, pool=case.pool))
+    if not case.budget.spent and chosen.kind != "freed_value":
+        nominal = next(one.trial for one in contenders if one.kind == "nominal")
+        others = alternatives(nominal, trial, seen, known, found.noise, step, run)
+        contenders += contend(others, seen, rows, step)
+    case.tell("locating what is left")
+    after = dependences(run, rows, case.pool)
+    contest = _contest(contenders, _maps(after, contenders, rows), rows, found, run, sizes)
+    selection = select(contest)
+    if selection.chosen.key != trial.added:
+        trial = _trial_of(selection.chosen, contenders)
+        run = trajectories(whole_fit(trial, seen, found.noise, step, pool=case.pool))
+        after = dependences(run, rows, case.pool)
+        contest = replace(contest, maps=_maps(after, contenders, rows))
+        selection = select(contest)
+        trial = _trial_of(selection.chosen, contenders)
+    found = _with_best(found, trial, case)
+    detectable = _detectable(contenders, selection.chosen, rows)
+    decision = decide(contest, selection, detectable)
+    if trial.added and selection.chosen.kind == "effects":
+        found = ticks_followed(profiled(finely_stepped(found, case.pool), case.pool), case.pool)
+    before = dependences(trajectories(found.nominal), rows, case.pool) if trial.added else after
+    return FreeRunResult(
+        scoring,
+        tuple(seen),
+        tuple(scoring.unseen),
+        calibration,
+        found,
+        tuple(before),
+        tuple(after),
+        _rerun(found.nominal, unseen, found),
+        _rerun(found.fit, unseen, found),
+        contest,
+        selection,
+        decision,
+        detectable,
+    )
+
+
+def _trial_of(hypothesis: Hypothesis, contenders: Sequence[Contender]) -> Trial:
+    return next(one.trial for one in contenders if tuple(sorted(one.trial.added)) == hypothesis.key)
+
+
+def _with_best(found: Search, trial: Trial, case: Case) -> Search:
+    """The search with another model chosen."""
+    if tuple(sorted(trial.added)) == tuple(sorted(found.best.added)):
+        return found
+    fit = whole_fit(trial, found.fit.run.series, found.noise, found.fit.run.max_step, pool=case.pool)
+    nominal = under(found.nominal, found.noise, case.pool)
+    others = [one for one in found.trials if one.added != trial.added]
+    trials = tuple(sorted([*others, trial], key=lambda one: one.bic()))
+    return replace(found, best=trial, fit=fit, nominal=nominal, trials=trials)
+
+
+def _contest(
+    contenders: Sequence[Contender],
+    maps: Mapping[str, Prediction],
+    rows: Rows,
+    found: Search,
+    run: Trajectories,
+    sizes: Scales,
+) -> Contest:
+    names = {score.element.name for one in found.rounds for score in one.scores}
+
+    def shape(trial: Trial) -> dict[str, float]:
+        return shape_of(trial.model, trial.added, run, sizes)
+
+    return Contest(tuple(hypotheses_of(contenders, rows, shape)), maps, len(names), rows.size, PRACTICAL)
+
+
+def _maps(found: Sequence[Dependence], contenders: Sequence[Contender], rows: Rows) -> dict[str, Prediction]:
+    """Predictions of the free maps, under the autocorrelation time of the contenders'."""
+    time = remembered(contenders, rows)
+    return {
+        one.quantity: prediction(one.found, rows.blocks, time, measured_errors(one.found.error, rows))
+        for one in found
+    }
+
+
+def _detectable(contenders: Sequence[Contender], chosen: Hypothesis, rows: Rows) -> float:
+    """The smallest rms that would show in these records, as a share of what errors are a share of: four standard deviations
+    of the mean square of the noise."""
+    error = next(one.error for one in contenders if tuple(sorted(one.trial.added)) == chosen.key)
+    time = autocorrelation_time(error, rows.record)
+    square = float(np.mean(error**2)) * math.sqrt(2.0 * time / max(len(error), 1))
+    return math.sqrt(4.0 * square) / max(rows.size, 1e-300)
+
+
+def _rerun(fit: Fit, unseen: Sequence[Series], found: Search) -> Fit | None:
+    """A model's run over separate held-out records, only their initial states estimated."""
+    if not unseen:
+        return None
+    try:
+        return start_only(fit.model, unseen, found.noise, fit.run.max_step)
+    except InputError:
+        return None

@@ -1,0 +1,41 @@
+"""Probabilities of names: how much of the evidence is for hypotheses that hold them.
+
+Hypotheses with no more effects than the chosen one share the evidence, as pseudo-BMA weights. A name's probability is the
+share of those that hold it, times the chance that the catalogue holds the truth at all, given how much of what anything
+explains the chosen hypothesis leaves.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rhythmid.diagnose.constants import ADEQUATE, STEEPNESS
+from rhythmid.diagnose.evidence import probabilities
+from rhythmid.diagnose.hypothesis import Hypothesis
+from rhythmid.diagnose.selection import Contest, Selection
+
+
+def weights_of(contest: Contest, selection: Selection) -> dict[tuple[str, ...], float]:
+    """Weight of each hypothesis, by its key, among those with no more effects than the chosen one."""
+    most = len(selection.chosen.elements)
+    rivals = [one for one in contest.hypotheses if len(one.elements) <= most]
+    return {one.key: float(weight) for one, weight in zip(rivals, probabilities(rivals))}
+
+
+def adequacy(explained: float) -> float:
+    """Chance that names which explain this share of what anything explains are the true ones.
+
+    A logistic function of the logarithm of what they leave.
+    """
+    left = min(max(1.0 - explained, 1e-9), 1.0)
+    return float(1.0 / (1.0 + (left / ADEQUATE) ** STEEPNESS))
+
+
+def joint_probability(
+    names: Sequence[str], hypotheses: Sequence[Hypothesis], weights: dict[tuple[str, ...], float]
+) -> float:
+    """Share of the evidence for hypotheses that hold all these names."""
+    wanted = set(names)
+    return float(
+        np.clip(sum(weights.get(one.key, 0.0) for one in hypotheses if wanted <= set(one.names)), 0.0, 1.0)
+    )

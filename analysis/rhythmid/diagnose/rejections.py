@@ -1,0 +1,172 @@
+"""Rejections: every reason for which a hypothesis is not believed, one row each of one table.
+
+A row has a statistic, and rejects where that is below its threshold. Rows are evaluated for every hypothesis; all that reject are
+told. `python -m rhythmid.diagnose.rejections` prints the table as Markdown.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from scipy.stats import t as student
+
+from rhythmid.diagnose.constants import EDGE, FALSE_ALARM, MISMATCH, REST
+from rhythmid.diagnose.evidence import difference
+from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A hypothesis, and what it has to be better than.
+
+    Parameters
+    ----------
+    hypothesis : what is claimed.
+    without : the hypothesis with one effect less that predicts best; kin compete for one place, so it need not be a part of
+        this one.
+    nominal : the refitted nominal model.
+    floor : mean squared error of the best prediction of all, free maps included.
+    candidates : number of effects that were looked at for this place.
+    size : rms of what errors are a share of.
+    practical : share of `size` below which an effect is of no practical matter.
+    """
+
+    hypothesis: Hypothesis
+    without: Hypothesis
+    nominal: Hypothesis
+    floor: float
+    candidates: int
+    size: float
+    practical: float
+
+    @property
+    def removed(self) -> float:
+        """Mean squared error that the last effect removes."""
+        return self.without.prediction.mean_square - self.hypothesis.prediction.mean_square
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One row: it rejects a claim whose `statistic` is below its `threshold`."""
+
+    name: str
+    says: str
+    reason: str
+    statistic: Callable[[Claim], float]
+    threshold: Callable[[Claim], float]
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """A hypothesis that a rule rejects."""
+
+    hypothesis: tuple[str, ...]
+    name: str
+    statistic: float
+    threshold: float
+    reason: str
+
+
+def _gain_in_errors(claim: Claim) -> float:
+    gain, error = difference(claim.hypothesis.prediction, claim.without.prediction)
+    return gain / error if error > 0.0 else math.copysign(math.inf, gain)
+
+
+def significance(prediction: Prediction, candidates: int) -> float:
+    """Standard errors that the best of so many candidates has to gain, by Student's t over the blocks."""
+    blocks = len(prediction.log_density)
+    return float(student.isf(FALSE_ALARM / max(candidates, 1), max(blocks - 1, 1)))
+
+
+def _share(part: float, whole: float) -> float:
+    return part / whole if whole > 0.0 else math.copysign(math.inf, part)
+
+
+def _share_of_rest(claim: Claim) -> float:
+    return _share(claim.removed, claim.without.prediction.mean_square - claim.floor)
+
+
+def _share_of_mismatch(claim: Claim) -> float:
+    return _share(claim.removed, claim.nominal.prediction.mean_square - claim.floor)
+
+
+def _size(claim: Claim) -> float:
+    return math.sqrt(max(claim.removed, 0.0)) / max(claim.size, 1e-300)
+
+
+def _of_shape(name: str) -> Callable[[Claim], float]:
+    return lambda claim: claim.hypothesis.shape.get(name, math.inf)
+
+
+RULES: tuple[Rule, ...] = (
+    Rule(
+        "predicts_better",
+        "gain in predictive log density over the best hypothesis with one effect less, in its standard errors over blocks",
+        "less would be found by chance among as many candidates",
+        _gain_in_errors,
+        lambda claim: significance(claim.hypothesis.prediction, claim.candidates),
+    ),
+    Rule(
+        "share_of_rest",
+        "share of the squared error which anything explains, free maps included, that the effect removes",
+        "so small a part of what is left belongs to something else",
+        _share_of_rest,
+        lambda _: REST,
+    ),
+    Rule(
+        "share_of_mismatch",
+        "share of the nominal model's explainable squared error that the effect removes",
+        "so small a part of the mismatch is an imperfection of the other effects",
+        _share_of_mismatch,
+        lambda _: MISMATCH,
+    ),
+    Rule(
+        "practical_size",
+        "rms that the effect removes, as a share of the motion or of the effort",
+        "an effect of this size is of no practical matter",
+        _size,
+        lambda claim: claim.practical,
+    ),
+    Rule(
+        "within_bounds",
+        "distance of the effect's parameters from the bounds of what its name means, as a share of the bound",
+        "the effect has become the limit of another one",
+        _of_shape("within_bounds"),
+        lambda _: EDGE,
+    ),
+    Rule(
+        "acts_within_records",
+        "whether the effect is curved where the motion has been (infinite), or only beyond (0)",
+        "the effect would act only where the motion has never been",
+        _of_shape("acts_within_records"),
+        lambda _: EDGE,
+    ),
+    Rule(
+        "own_frequency",
+        "distance of the effect's frequency from a multiple of the forcing's, in resolved lines",
+        "at a multiple of the forcing's frequency any change in the forcing's path looks like this",
+        _of_shape("own_frequency"),
+        lambda _: 1.0,
+    ),
+)
+
+
+def rejections_of(claim: Claim, rules: Sequence[Rule] = RULES) -> list[Rejection]:
+    """The rows that reject a claim, in the table's order."""
+    found = []
+    for rule in rules:
+        statistic, threshold = rule.statistic(claim), rule.threshold(claim)
+        if not statistic >= threshold:
+            found.append(Rejection(claim.hypothesis.elements, rule.name, statistic, threshold, rule.reason))
+    return found
+
+
+def table() -> str:
+    """The rules as a Markdown table."""
+    rows = ["| name | statistic | rejects because |", "| --- | --- | --- |"]
+    rows += [f"| `{rule.name}` | {rule.says} | {rule.reason} |" for rule in RULES]
+    return "\n".join(rows)
+
+
+if __name__ == "__main__":
+    print(table())

@@ -1,0 +1,106 @@
+"""Replay: the evidence of a diagnosis as plain data, from which the decision is made again without simulating.
+
+A change of the rules, or of the constants, is tried on answers that were kept.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
+from rhythmid.diagnose.selection import Contest, select
+from rhythmid.diagnose.verdict import Decision, decide
+
+DIGITS = 8  # significant, of each number of the ledger
+
+
+def ledger(contest: Contest, detectable: float) -> dict[str, Any]:
+    """All that a decision depends on, as plain JSON data."""
+    return {
+        "hypotheses": [
+            {
+                "elements": list(one.elements),
+                "names": list(one.names),
+                "kind": one.kind,
+                "free": one.free,
+                "heldout_nrmse": one.heldout_nrmse,
+                "shape": {name: value for name, value in one.shape.items() if math.isfinite(value)},
+                **_written(one.prediction),
+            }
+            for one in contest.hypotheses
+        ],
+        "maps": {quantity: _written(one) for quantity, one in contest.maps.items()},
+        "candidates": contest.candidates,
+        "size": contest.size,
+        "practical": contest.practical,
+        "detectable": detectable,
+    }
+
+
+def _written(one: Prediction) -> dict[str, list[float]]:
+    return {
+        name: [float(f"{value:.{DIGITS}g}") for value in getattr(one, name)]
+        for name in ("log_density", "squared_error", "samples")
+    }
+
+
+def _read(data: dict[str, Any]) -> Prediction:
+    return Prediction(*(np.array(data[name]) for name in ("log_density", "squared_error", "samples")))
+
+
+def contest_of(data: dict[str, Any]) -> Contest:
+    """The contest that a ledger describes."""
+    return Contest(
+        tuple(
+            Hypothesis(
+                tuple(one["elements"]),
+                tuple(one["names"]),
+                one["kind"],
+                one["free"],
+                _read(one),
+                one["heldout_nrmse"],
+                one["shape"],
+            )
+            for one in data["hypotheses"]
+        ),
+        {quantity: _read(one) for quantity, one in data["maps"].items()},
+        data["candidates"],
+        data["size"],
+        data["practical"],
+    )
+
+
+def decision_of(data: dict[str, Any]) -> Decision:
+    """The decision on a ledger by the rules as they are now."""
+    contest = contest_of(data)
+    return decide(contest, select(contest), data["detectable"])
+
+
+def redecide(answer: dict[str, Any]) -> dict[str, Any]:
+    """An answer with the verdict, names and probabilities that its kept evidence gives by the rules as they are now.
+
+    Effects that are named now and were not before have no parameters: the fit of another model was kept.
+    """
+    if "evidence" not in answer:
+        return answer
+    decision = decision_of(answer["evidence"])
+    contest = contest_of(answer["evidence"])
+    names = {e: n for one in contest.hypotheses for e, n in zip(one.elements, one.names)}
+    known = {effect["element"]: effect for effect in answer.get("missing", ())}
+    missing = [
+        {"slot": "", "equation": "", "parameters": {}}
+        | known.get(names[label], {})
+        | {
+            "element": names[label],
+            "share": decision.shares[label],
+            "probability": decision.probability[label],
+        }
+        for label in decision.named
+    ]
+    return answer | {
+        "verdict": decision.verdict,
+        "missing": missing,
+        "joint_probability": decision.joint,
+        "indistinguishable": [list(group) for group in decision.equivalent],
+    }

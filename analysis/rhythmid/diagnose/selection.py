@@ -1,0 +1,120 @@
+"""Selection: from all hypotheses the one that an answer may stand by, and what is said against the others.
+
+Effects are granted one place after the other. For each place all hypotheses with as many effects compete, whatever their
+effects are, so that kin (friction laws, stiffness laws, lags) compete before they may stand together; the place is granted
+where no row of the table of rejections speaks against the best of them.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from rhythmid.diagnose.constants import EQUIVALENT, REST
+from rhythmid.diagnose.evidence import difference
+from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
+from rhythmid.diagnose.rejections import Claim, Rejection, rejections_of
+
+SHAPE_RULES = ("within_bounds", "acts_within_records", "own_frequency")
+
+
+@dataclass(frozen=True)
+class Contest:
+    """All hypotheses of a case.
+
+    Parameters
+    ----------
+    hypotheses : the nominal model first; effects, freed values, delays and other locations.
+    maps : free maps, by the quantity that they depend on.
+    candidates : number of effects that were looked at for each place.
+    size : rms of what errors are a share of.
+    practical : share of it below which an effect is of no practical matter.
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    maps: Mapping[str, Prediction]
+    candidates: int
+    size: float
+    practical: float
+
+    @property
+    def nominal(self) -> Hypothesis:
+        """The refitted nominal model."""
+        return next(one for one in self.hypotheses if one.kind == "nominal")
+
+    @property
+    def floor(self) -> float:
+        """Mean squared error of the best prediction of all."""
+        every = [one.prediction for one in self.hypotheses]
+        return min(one.mean_square for one in (*every, *self.maps.values()))
+
+    def of_size(self, count: int) -> list[Hypothesis]:
+        """Hypotheses with so many effects, the one that predicts best first."""
+        found = [one for one in self.hypotheses if len(one.elements) == count]
+        return sorted(found, key=lambda one: -one.prediction.score)
+
+    def claim(self, hypothesis: Hypothesis, without: Hypothesis) -> Claim:
+        """A hypothesis and what it has to be better than."""
+        return Claim(
+            hypothesis,
+            without,
+            self.nominal,
+            self.floor,
+            self.candidates,
+            self.size,
+            self.practical,
+        )
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The chosen hypothesis, with the ones of each smaller number of effects that it grew from, the nominal model first; and
+    all rejections."""
+
+    chosen: Hypothesis
+    grown: tuple[Hypothesis, ...]
+    rejections: tuple[Rejection, ...]
+
+
+def select(contest: Contest) -> Selection:
+    """Grant effects their places. Hypotheses whose effects have lost their shape take no part."""
+    told: list[Rejection] = []
+    grown = [contest.nominal]
+    most = max(len(one.elements) for one in contest.hypotheses)
+    going = True
+    for count in range(1, most + 1):
+        sound: list[Hypothesis] = []
+        for one in contest.of_size(count):
+            against = rejections_of(contest.claim(one, grown[-1]))
+            told += against
+            if not any(row.name in SHAPE_RULES for row in against):
+                sound.append(one)
+        if not going or not sound:
+            going = False
+            continue
+        best = _simplest(sound, contest.floor)
+        if any(row.hypothesis == best.elements for row in told):
+            going = False
+            continue
+        grown.append(best)
+    return Selection(grown[-1], tuple(grown), tuple(told))
+
+
+def _simplest(ranked: Sequence[Hypothesis], floor: float) -> Hypothesis:
+    """The hypothesis with the fewest free parameters among those that the best one does not clearly beat."""
+    best = ranked[0]
+    close = [best, *(one for one in ranked[1:] if equivalent(one, best, floor))]
+    return min(close, key=lambda one: (one.free, -one.prediction.score))
+
+
+def equivalent(other: Hypothesis, best: Hypothesis, floor: float) -> bool:
+    """Whether another hypothesis predicts as well as the better one: within standard errors, or but for a small share of
+    what either leaves."""
+    gain, error = difference(best.prediction, other.prediction)
+    left = other.prediction.mean_square - floor
+    removed = other.prediction.mean_square - best.prediction.mean_square
+    return gain < EQUIVALENT * error or removed < REST * left
+
+
+def without_elements(contest: Contest, gone: Sequence[str]) -> Contest:
+    """The contest without hypotheses that hold one of these elements."""
+    kept = tuple(one for one in contest.hypotheses if not set(one.names) & set(gone))
+    return replace(contest, hypotheses=kept)
