@@ -10,6 +10,7 @@ from typing import Any, cast
 import yaml
 
 from rhythmid.document import Node, parse, read
+from rhythmid.elements.candidates import Setting
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.elements.element import SLOTS, Against, Element, Parameter
 from rhythmid.errors import InputError
@@ -83,6 +84,17 @@ class Model:
     def free(self) -> list[str]:
         """Names of the parameters that are estimated."""
         return [name for name, value in self.parameters.items() if not value.fixed]
+
+    @property
+    def setting(self) -> Setting:
+        """What decides which effects it could lack."""
+        return Setting(
+            frozenset((term.element.name, term.against) for term in self.terms),
+            frozenset(self.parameters),
+            frozenset(self.free),
+            rotational=self.units.position == "rad",
+            controlled=any(term.element.acts == "feedback" for term in self.terms),
+        )
 
     def value(self, name: str) -> float:
         """Value of one parameter. Raises InputError for an unknown name."""

@@ -31,6 +31,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.elements.first_guess import generic_guesses
+
 Slot = Literal["command", "actuator", "force", "sensor", "timing"]
 STEP = "simulation.step"  # borrowed under this name: the largest integration step [s], which no effect can be faster than
 ELAPSED = "simulation.elapsed"  # borrowed under this name: the time [s] since the integration step began
@@ -218,7 +220,7 @@ class Element:
         """The element with its parameters' bounds, and its first guesses, narrowed to its `ranges` for these scales."""
         if self.ranges is None:
             return self
-        ranges, propose = self.ranges(scales), self.starts
+        ranges, propose = self.ranges(scales), self.first_guesses
 
         def narrowed(parameter: Parameter) -> Parameter:
             (low, high), (least, most) = parameter.bounds, ranges.get(parameter.name, (-inf, inf))
@@ -230,8 +232,15 @@ class Element:
         return replace(
             self,
             parameters=tuple(narrowed(parameter) for parameter in self.parameters),
-            starts=propose and (lambda sizes: [start for start in propose(sizes) if inside(start)]),
+            starts=lambda sizes: [start for start in propose(sizes) if inside(start)],
         )
+
+    def first_guesses(self, scales: Scales) -> list[dict[str, float]]:
+        """What `starts` proposes for these scales; without `starts`, guesses from the parameters' units and bounds.
+
+        Empty where the effect says that the motion does not show it. Raises NoGuess with the reason where there is no telling.
+        """
+        return self.starts(scales) if self.starts is not None else generic_guesses(self, scales)
 
     @property
     def deterministic(self) -> bool:
