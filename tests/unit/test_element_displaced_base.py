@@ -1,12 +1,14 @@
 """What acts between the mass and a base that moves, against closed forms in the moving frame."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rhythmid.diagnose.search.score_tests import changes_of, guesses, trajectories
 from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.errors import InputError
 from rhythmid.identify.free_run import prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import start_only
@@ -49,6 +51,31 @@ def test_drag_of_the_air_does_not_know_of_the_base():
     c, m, fast = 0.8, 2.0, 3.0
     found = position(mass("quadratic_drag", {"coefficient": c}), (0.0, fast))
     assert found == pytest.approx(m / c * np.log1p(c * fast / m * TIME), abs=1e-6)
+
+
+@pytest.mark.parametrize(("side", "frame"), [("base", BASE_SPEED), ("room", 0.0)])
+@pytest.mark.parametrize("element", ["viscous_damper", "coulomb_friction"])
+def test_friction_and_dampers_bring_the_mass_to_rest_in_the_frame_that_they_act_against(element, side, frame):
+    values = {"damping": 20.0} if element == "viscous_damper" else {"force": 6.0, "transition": 1e-3}
+    plain = mass(element, values)
+    term = replace(plain.terms[-1], element=plain.terms[-1].element.acting_against(side))
+    found = position(replace(plain, terms=(*plain.terms[:-1], term)), (0.0, 1.0))
+    assert np.gradient(found, TIME)[-50:] == pytest.approx(frame, abs=2e-3)
+
+
+def test_a_model_file_says_against_what_friction_acts_and_keeps_saying_it():
+    friction, spring = "{coulomb_friction: {force: 1.0, against: %s}}", "{linear_spring: {stiffness: 1.0}}"
+    text = f"inertia: {{mass: 2.0}}\nforce: [{friction}, {spring}]"
+    for side in ("base", "room"):
+        given = Model.from_text(text % side)
+        assert given.terms[0].against == side
+        again = Model.from_text(given.to_yaml())
+        assert again.terms[0].against == side and again.terms[1].against is None
+        assert ("against" in given.to_yaml()) is (side == "room")
+    with pytest.raises(InputError, match="against: 'wall' is none of base, room"):
+        Model.from_text(text % "wall")
+    with pytest.raises(InputError, match="unknown key"):
+        Model.from_text("inertia: {mass: 2.0}\nforce: [{linear_spring: {stiffness: 1.0, against: room}}]")
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
