@@ -45,7 +45,11 @@ RELEASE = (0.25, 0.0)  # above the rest length, so that the hopper lifts off
 
 def starts_of(name, scales):
     element = CATALOGUE[name]
-    return element.starts(scales) if element.starts else [WITHOUT_STARTS[name]]
+    if element.starts is None:
+        return [WITHOUT_STARTS[name]]
+    return element.starts(scales) or element.starts(
+        replace(scales, low=-0.5, high=0.5)
+    )  # some need a wide motion
 
 
 def output(model: Model, max_step: float = 1e-3, command=CHIRP) -> np.ndarray:

@@ -78,6 +78,12 @@ def test_a_model_file_says_against_what_friction_acts_and_keeps_saying_it():
         Model.from_text("inertia: {mass: 2.0}\nforce: [{linear_spring: {stiffness: 1.0, against: room}}]")
 
 
+def test_what_acts_against_the_room_is_refused_where_only_the_base_s_acceleration_is_known():
+    text = "inertia: {mass: 2.0}\nforce: [{viscous_damper: {damping: 1.0, against: room}}]"
+    with pytest.raises(InputError, match="'viscous_damper' acts against the room"):
+        prepare_run(Model.from_text(text), series("base_acceleration"))
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_travel_stop_throws_the_mass_back_in_the_frame_of_the_base(side):
     stiffness, gap, fast, m = 5000.0, 0.1, 0.5, 2.0

@@ -19,6 +19,11 @@ MOTION = 0.2  # of its position, speed or acceleration
 CYCLE = 0.02  # of a period of the motion, as a time
 PLAIN = 0.1  # of what has no unit
 FURTHER = 4.0  # times these, the lengths, speeds and times of a second guess
+GUESSES = (  # the same in words, for the reference page
+    f"N is {FORCE:g} of the typical force, N/m, N*s/m and their like {COEFFICIENT:g} of what would make that force, kg {MASS:g} of "
+    f"the mass, m, m/s and m/s^2 {MOTION:g} of the motion, s {CYCLE:g} of its period, Hz its frequency, 1 is {PLAIN:g}, 1/s "
+    f"{PLAIN:g} of the inverse duration; lengths, speeds and times once more {FURTHER:g} times that"
+)
 SHAPES = (
     "m",
     "m/s",

@@ -125,6 +125,11 @@ class _Writer:
 def _right_hand_side(
     terms: tuple[Term, ...], excited: InputKind, disturbed: bool, measured: OutputKind
 ) -> _Writer:
+    if excited == "base_acceleration" and (room := [term for term in terms if term.against == "room"]):
+        raise InputError(
+            f"element {room[0].label!r} acts against the room, whose speed cannot be told where only the base's acceleration is "
+            "known; give its displacement, or leave out 'against: room'"
+        )
     writer = _Writer()
     kernels = [term for term in terms if term.element.kernel is not None]
     force = [term for term in kernels if term.element.slot == "force"]
