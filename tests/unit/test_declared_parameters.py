@@ -1,13 +1,17 @@
 """Parameters that records declare: read, refused, and applied wherever a record is simulated."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from machines import hopper, record
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.drive import driven
 from rhythmid.identify.free_run import prepare_run, start_of
+from rhythmid.identify.joint import fit_from
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
@@ -78,6 +82,27 @@ def test_what_only_some_records_declare_is_still_estimated_from_the_others():
     model = with_declared(servo(), [soft, undeclared]).with_values(TRUTH | {GAIN: 25.0})
     fit = estimate(model, prepare([soft, undeclared], block=1))
     assert fit.model.value(GAIN) == pytest.approx(GAINS["stiff"], rel=1e-3)
+
+
+def test_a_payload_that_differs_and_is_declared_leaves_the_hopper_s_stiffness_the_same():
+    masses = {"empty": 1.0, "loaded": 1.3}
+    given = [
+        replace(
+            record(
+                hopper().with_values({"inertia.mass": mass}),
+                {"type": "chirp", "amplitude": 0.3, "sweep": 6.0, "band": [0, 5]},
+            ),
+            name=name,
+            parameters={"inertia.mass": mass},
+        )
+        for name, mass in masses.items()
+    ]
+    start = hopper().with_values(
+        {"input_delay.delay": 0.02, "measurement_delay.delay": 0.015, "linear_spring.stiffness": 195.0}
+    )
+    fit = fit_from(start, given)
+    assert fit.model.value("linear_spring.stiffness") == pytest.approx(200.0, rel=1e-3)
+    assert fit.model.value("switched_damper.stance") == pytest.approx(2.0, rel=0.01)
 
 
 def test_a_series_is_simulated_with_what_its_record_declares():
