@@ -196,3 +196,11 @@ def test_a_kernel_with_the_wrong_arguments_is_refused_in_one_line_that_names_the
 
 def test_a_kernel_may_call_what_it_is_given_as_it_likes(tmp_path):
     assert load_element(written(tmp_path, "x, speed, time, drive, amount")).name == "law"
+
+
+def test_a_generic_guess_keeps_to_the_ranges_of_the_scales(scales):
+    element = replace(
+        law(Parameter("amount", "N", "how much")), ranges=lambda s: {"amount": (3.0 * s.force, 5.0 * s.force)}
+    )
+    (guess,) = element.within(scales).first_guesses(scales)
+    assert guess["amount"] == pytest.approx(4.0 * scales.force)

@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.search.score_tests import changes_of, guesses, trajectories
+from rhythmid.diagnose.search.score_tests import changes_of, guesses, score, trajectories
+from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.output_error import start_only
+from rhythmid.identify.output_error import estimate, start_only
 from rhythmid.identify.series import Series, prepare, scales
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
@@ -121,3 +122,40 @@ def test_what_lags_commands_neither_moves_a_machine_that_its_base_drives_nor_is_
         ("command_lag", {"time_constant": 0.02}), ("cubic_stiffness", {"coefficient": 1.0})
     )]  # fmt: skip
     assert [change.element.name for change in changes_of(known, named)] == ["cubic_stiffness"]
+
+
+@pytest.mark.parametrize("side", ["base", "room"])
+def test_the_score_test_tells_friction_against_the_room_from_friction_against_the_base(side):
+    nominal = Model.from_text(
+        "inertia: {mass: {value: 2.0, unit: kg, fixed: true}}\nforce:\n"
+        "  - linear_spring: {stiffness: {value: 800.0, unit: N/m}}\n  - viscous_damper: {damping: {value: 8.0, unit: N*s/m}}"
+    )
+    time = np.arange(0.0, 12.0, 5e-3)
+    rng = np.random.default_rng(8)
+    base = sum(
+        1e-3 * np.sin(2 * np.pi * f * time + rng.uniform(0, 6))
+        for f in (0.7, 1.3, 1.9, 2.6, 3.2, 3.9, 4.7, 6.1)
+    )
+    shaken = Record(
+        "rig",
+        Channel(time, base, "m"),
+        Channel(time, base, "m"),
+        hold="linear",
+        input_kind="base_displacement",
+    )
+    friction = CATALOGUE["coulomb_friction"].acting_against(side)
+    machine = nominal.with_element(friction, {"force": 0.15, "transition": 1e-3})
+    run = prepare_run(machine, prepare([shaken], block=1), 1e-3)
+    outputs = run.outputs(machine, [start_of(machine, run, 0, 0.0, 0.0)])
+    assert outputs is not None
+    measured = outputs[0] + 1e-6 * rng.standard_normal(len(time))
+    fit = estimate(nominal, prepare([replace(shaken, output=Channel(time, measured, "m"))], block=1))
+    sizes = scales(fit.run.series, fit.model)
+    tried = [
+        one
+        for one in candidates(CATALOGUE, fit.model.setting, sizes).tried
+        if one[0].name == "coulomb_friction"
+    ]
+    best = score(fit, changes_of(trajectories(fit), tried))
+    assert {one.element.against for one in best} == {"base", "room"}
+    assert best[0].element.against == side

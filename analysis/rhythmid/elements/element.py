@@ -220,7 +220,7 @@ class Element:
         """The element with its parameters' bounds, and its first guesses, narrowed to its `ranges` for these scales."""
         if self.ranges is None:
             return self
-        ranges, propose = self.ranges(scales), self.first_guesses
+        ranges, propose = self.ranges(scales), self.starts
 
         def narrowed(parameter: Parameter) -> Parameter:
             (low, high), (least, most) = parameter.bounds, ranges.get(parameter.name, (-inf, inf))
@@ -232,7 +232,7 @@ class Element:
         return replace(
             self,
             parameters=tuple(narrowed(parameter) for parameter in self.parameters),
-            starts=lambda sizes: [start for start in propose(sizes) if inside(start)],
+            starts=propose and (lambda sizes: [start for start in propose(sizes) if inside(start)]),
         )
 
     def first_guesses(self, scales: Scales) -> list[dict[str, float]]:
