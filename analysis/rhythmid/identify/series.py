@@ -277,6 +277,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
     stiffness = spring if spring > FAINT * inertial else inertial
     effort, peak, pumping, reference = 0.0, 0.0, 0.0, 0.0
+    fed = any(term.element.takes for term in model.terms)  # by a voltage, say: what is recorded is no force
     for one in series:
         total = np.zeros(len(one.time))
         for signal in (one.command, one.forcing):
@@ -285,7 +286,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
                 total[inside] += signal(one.time[inside])
         if one.kind == "reference":
             reference = max(reference, float(np.std(total)))
-        else:
+        elif not fed:
             effort = max(effort, float(np.std(total)))
             peak = max(peak, float(np.abs(total).max(initial=0.0)))
     forced = [one for one in series if one.forcing is not None]
