@@ -14,7 +14,6 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from types import CodeType, ModuleType
 
-from rhythmid.elements.candidates import variants
 from rhythmid.elements.element import SLOTS, Element, Scales
 from rhythmid.errors import InputError
 
@@ -111,11 +110,6 @@ class Catalogue(Mapping[str, Element]):
     def without(self, *names: str) -> "Catalogue":
         """The catalogue less the named elements."""
         return Catalogue({name: element for name, element in self.elements.items() if name not in names})
-
-    def variants(self, scales: Scales) -> Iterator[Element]:
-        """Every element as it may act: where the base moves, friction and dampers against the base and against the room."""
-        for element in self.elements.values():
-            yield from variants(element, scales)
 
     def within(self, scales: Scales) -> "Catalogue":
         """The catalogue with every element kept to what its name says in records of these scales."""

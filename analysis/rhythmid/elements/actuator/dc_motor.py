@@ -43,8 +43,8 @@ ELEMENT = Element(
     also_known_as=("permanent-magnet motor", "voltage-controlled motor", "back-EMF"),
     family="motor",
     confusable={
-        "viscous_damper": "its back-EMF is a viscous damping k_t²/R: with k_t, R and c all free nothing but k_t/R and "
-        "k_t²/R + c is identifiable, unless records differ in supply or gain and k_t or R is known",
+        "viscous_damper": "its back-EMF is a viscous damping k_t²/R: with k_t, R and c all free only k_t/R and "
+        "k_t²/R + c are identifiable: fix one of them, such as a measured R, or c at 0",
         "actuator_gain": "the same gain k_t/R without back-EMF: look at the damping",
         "position_control": "scales its gains by k_t/R: give the gains from the drive's settings",
     },
