@@ -2,16 +2,17 @@
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import yaml
 
 from rhythmid.document import Node, parse, read
+from rhythmid.elements.candidates import Setting
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
-from rhythmid.elements.element import SLOTS, Element, Parameter
+from rhythmid.elements.element import SLOTS, Against, Element, Parameter
 from rhythmid.errors import InputError
 from rhythmid.output import write_text
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
@@ -47,6 +48,11 @@ class Term:
     label: str
     values: Mapping[str, Value]
 
+    @property
+    def against(self) -> Against | None:
+        """Against what a friction or a damper acts; None where that is no choice."""
+        return self.element.against
+
 
 @dataclass(frozen=True)
 class Model:
@@ -78,6 +84,17 @@ class Model:
     def free(self) -> list[str]:
         """Names of the parameters that are estimated."""
         return [name for name, value in self.parameters.items() if not value.fixed]
+
+    @property
+    def setting(self) -> Setting:
+        """What decides which effects it could lack."""
+        return Setting(
+            frozenset((term.element.name, term.against) for term in self.terms),
+            frozenset(self.parameters),
+            frozenset(self.free),
+            rotational=self.units.position == "rad",
+            controlled=any(term.element.acts == "feedback" for term in self.terms),
+        )
 
     def value(self, name: str) -> float:
         """Value of one parameter. Raises InputError for an unknown name."""
@@ -128,7 +145,7 @@ class Model:
             value = given.pop(parameter.name, parameter.default)
             if value is None:
                 raise InputError(f"element {element.name!r}: parameter {parameter.name!r} needs a value")
-            unit = self.units.of(parameter.unit)
+            unit = self._units_at(element).of(parameter.unit)
             made[parameter.name] = Value(float(value), unit, fixed or parameter.fixed, parameter.bounds)
         if given:
             raise InputError(f"element {element.name!r} has no parameter {next(iter(given))!r}")
@@ -137,6 +154,11 @@ class Model:
         extended = replace(self, terms=(*self.terms, Term(element, label, made)))
         extended.check_borrowed()
         return extended
+
+    def _units_at(self, element: Element) -> Units:
+        """Units of an element at the end of its slot: of a command element before a motor in volts, the motor's."""
+        motors = [term.element for term in self.terms] if element.slot == "command" else []
+        return _fed(self.units, motors)
 
     def without(self, label: str) -> "Model":
         """A copy without the term called `label`. Raises InputError when another element needs it."""
@@ -179,15 +201,7 @@ class Model:
         for slot in SLOTS:
             terms = [term for term in self.terms if term.element.slot == slot]
             if terms or slot != "timing":
-                content[slot] = [
-                    {
-                        term.element.name: {
-                            name: _entry(value, term.element.parameter(name))
-                            for name, value in term.values.items()
-                        }
-                    }
-                    for term in terms
-                ]
+                content[slot] = [{term.element.name: _body(term)} for term in terms]
         return yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
 
     def save(self, path: str | Path) -> None:
@@ -199,6 +213,19 @@ def _labels(name: str) -> Iterator[str]:
     yield name
     for number in range(2, 1000):
         yield f"{name}_{number}"
+
+
+def _fed(units: Units, behind: Iterable[Element]) -> Units:
+    """Units of a signal that elements behind it take: volts before a motor that is fed with a voltage."""
+    taken = next((element.takes for element in behind if element.slot == "actuator" and element.takes), None)
+    return units if taken is None else replace(units, force=taken)
+
+
+def _body(term: Term) -> dict[str, Any]:
+    body: dict[str, Any] = {
+        name: _entry(value, term.element.parameter(name)) for name, value in term.values.items()
+    }
+    return body | ({"against": "room"} if term.against == "room" else {})
 
 
 def _entry(value: Value, usual: Parameter) -> dict[str, Any]:
@@ -279,7 +306,11 @@ def _term(item: Node, slot: str, catalogue: Catalogue, units: Units, taken: set[
         raise InputError(f"{body.place}: {error}") from None
     if element.slot != slot:
         body.fail(f"{name} belongs under '{element.slot}:', not under '{slot}:'")
-    given = {} if body.value is None else body.mapping([parameter.name for parameter in element.parameters])
+    names = [parameter.name for parameter in element.parameters]
+    sides = ["against"] if element.against is not None else []
+    given = {} if body.value is None else body.mapping([*names, *sides])
+    if "against" in given:
+        element = element.acting_against(cast(Against, given["against"].choice(["base", "room"])))
     values: dict[str, Value] = {}
     for parameter in element.parameters:
         if parameter.name in given:
@@ -295,6 +326,12 @@ def _term(item: Node, slot: str, catalogue: Catalogue, units: Units, taken: set[
     label = next(label for label in _labels(name) if label not in taken)
     taken.add(label)
     return Term(element, label, values)
+
+
+def _named(item: Node, catalogue: Catalogue) -> Iterator[Element]:
+    """The element that an entry of the path names, none where it names none that is known."""
+    if isinstance(item.value, dict):
+        yield from (catalogue[str(name)] for name in item.value if str(name) in catalogue)
 
 
 def _model(document: Node, catalogue: Catalogue) -> Model:
@@ -314,7 +351,13 @@ def _model(document: Node, catalogue: Catalogue) -> Model:
         inertia["mass"].fail("must be greater than 0")
     taken: set[str] = set()
     places = [(item, slot) for slot in SLOTS if slot in sections for item in sections[slot].items()]
-    model = Model(mass, tuple(_term(item, slot, catalogue, units, taken) for item, slot in places), units)
+    terms: list[Term] = []
+    for place, (item, slot) in enumerate(places):
+        later = (other for other, where in places[place + 1 :] if where == "actuator")
+        behind = [element for other in later for element in _named(other, catalogue)]
+        at = _fed(units, behind) if slot in ("command", "actuator") else units
+        terms.append(_term(item, slot, catalogue, at, taken))
+    model = Model(mass, tuple(terms), units)
     for (item, _), term in zip(places, model.terms):
         if (lacking := model.lacking(term)) is not None:
             item.fail(f"{term.label} needs {lacking!r}, which the model does not have")

@@ -1,5 +1,7 @@
 """An element along a given trajectory does what it does in the simulator."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -58,3 +60,14 @@ def test_what_an_actuator_remembers_along_a_path_is_what_it_does_in_the_simulato
     got = effect_along(CATALOGUE[name], values, hopper(), PATH)
     assert got == pytest.approx(run.effort - F, abs=1e-12)
     assert np.abs(got).max() > 0.1
+
+
+def test_a_gear_s_friction_along_a_path_is_loaded_by_the_model_s_forces_as_in_the_simulator():
+    values = {"coefficient": 0.1, "external_ratio": 0.5, "transition": 1e-3}
+    got = effect_along(CATALOGUE["transmitted_load_friction"], values, hopper(), PATH)
+    load = -200.0 * (X - 0.2) - 9.81
+    assert got == pytest.approx(-0.1 * np.abs(F - 0.5 * load) * np.tanh(V / 1e-3), abs=2e-3)
+    given = effect_along(
+        CATALOGUE["transmitted_load_friction"], values, hopper(), replace(PATH, load=0.0 * F)
+    )
+    assert given == pytest.approx(-0.1 * np.abs(F) * np.tanh(V / 1e-3), abs=2e-3)

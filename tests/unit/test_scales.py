@@ -35,3 +35,12 @@ def test_a_limit_is_looked_for_just_below_the_highest_force_too():
     assert starts is not None
     assert any(0.95 * highest < start["limit"] < highest for start in starts(sizes))
     assert not starts(replace(sizes, effort=0.0, peak_effort=0.0))
+
+
+def test_a_voltage_is_not_taken_for_the_force_of_the_motor_that_it_feeds():
+    one = replace(forced(1.0, 10.0), forcing=None)
+    driven = replace(one, command=spline(one.time, 100.0 * np.sin(one.time)))
+    motor = hopper().with_element(CATALOGUE["dc_motor"], {"torque_constant": 0.01, "resistance": 10.0})
+    assert scales([driven], hopper()).effort > 50.0
+    sizes = scales([driven], motor)
+    assert sizes.effort == pytest.approx(sizes.force) and sizes.peak_effort == 0.0

@@ -10,13 +10,14 @@ from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.sample_clock.tick_interval import ticks_followed
 from rhythmid.identify.sample_clock.tick_likelihood import ticks_sought
-from rhythmid.identify.sample_clock.tick_scan import DELAY, PERIOD
+from rhythmid.identify.sample_clock.tick_scan import DELAY
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.signal import zero_order_hold
 from rhythmid.simulation.simulate import simulate
 
 SAMPLE, DURATION, STEP = 1e-3, 12.0, 2e-3
+PERIOD = "command_hold.period"
 TRUE = {DELAY: 0.0130457, PERIOD: 0.0812347}
 NOISE = NoiseModel(np.empty(0), 1e-4)
 

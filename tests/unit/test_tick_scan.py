@@ -7,13 +7,14 @@ import pytest
 
 from machines import CATALOGUE, hopper
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.sample_clock.tick_scan import DELAY, PERIOD, scanned
+from rhythmid.identify.sample_clock.tick_scan import DELAY, scanned
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.signal import zero_order_hold
 from rhythmid.simulation.simulate import simulate
 
 SAMPLE, DURATION, STEP = 1e-3, 12.0, 2e-3
+PERIOD = "command_hold.period"
 TRUE = {DELAY: 0.0130457, PERIOD: 0.0812347}
 PERIODS = (0.0812347, 0.0613571)
 NOISE = NoiseModel(np.empty(0), 1e-4)

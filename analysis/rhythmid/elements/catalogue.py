@@ -4,6 +4,7 @@ A file becomes part of the catalogue by lying there: one `ELEMENT` a file. No li
 """
 
 import importlib.util
+import inspect
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -52,7 +53,29 @@ def load_element(path: Path) -> Element:
     element = getattr(_module(path), "ELEMENT", None)
     if not isinstance(element, Element):
         raise InputError(f"{path}: defines no ELEMENT; an element file ends with ELEMENT = Element(...)")
+    _check_arguments(element, path)
     return replace(element, source=str(path))
+
+
+def _check_arguments(element: Element, path: Path) -> None:
+    """Raise InputError where what an element computes with does not take what it is given."""
+    leading = {"delay": ("stamps",), "sampler": ("rng",)}
+    what = next(name for name in ("kernel", "delay", "sampler") if getattr(element, name) is not None)
+    expected = (
+        leading[what] + tuple(p.name for p in element.parameters) if what in leading else element.arguments
+    )
+    try:
+        given = tuple(inspect.signature(getattr(element, what)).parameters)
+    except (TypeError, ValueError):  # no text of ours, which is told where it is to be compiled
+        return
+    # a kernel is called by position, so that it may call what it is given as it likes, but not in another order
+    fits = given == expected if what in leading else len(given) == len(expected)
+    if not fits or (given != expected and set(given) == set(expected)):
+        kind = f"slot={element.slot!r}" + (f", acts={element.acts!r}" if what == "kernel" else "")
+        raise InputError(
+            f"{path}: the {what} of {element.name!r} takes ({', '.join(given)}); for {kind} and its parameters it is given "
+            f"({', '.join(expected)})"
+        )
 
 
 def _files(folder: Path) -> Iterator[Path]:

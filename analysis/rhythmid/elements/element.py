@@ -4,11 +4,16 @@ A file in `elements/<slot>/` defines one `ELEMENT`. Exactly one of these says wh
 
 - `kernel`   a pure numeric function of one instant, compiled into the simulator. Its arguments by slot:
                command, actuator   (f, t, <parameters>, <borrowed>, <states>, <memories>) -> new f
-               command, `acts="feedback"`  (f, x, v, t, <parameters>, …)                 -> force, of a controller
+               command, `acts="feedback"`    (f, x, v, t, <parameters>, …)               -> force, of a controller
+               actuator, `acts="transducer"` (f, x, v, t, <parameters>, …)               -> new f, which feels the motion
                force               (x, v, t, f, <parameters>, …)                         -> force on the mass
-               force, `acts="modifier"`  (leg, x, v, t, f, <parameters>, …)              -> new sum of the leg's forces
-               force, `acts="drive"`     (t, <parameters>, …)                            -> added to f before the actuator
+               force, `acts="transmission"`  (load, x, v, t, f, <parameters>, …)         -> force on the mass
+               force, `acts="modifier"`      (leg, x, v, t, f, <parameters>, …)          -> new sum of the leg's forces
+               force, `acts="drive"`         (t, <parameters>, …)                        -> added to f before the actuator
                sensor              (y, t, <parameters>, …)                               -> new y
+             `acts` says which motion x and v are, where the input displaces the base: of the mass relative to the base
+             ("leg", the default, "transmission", "modifier", "transducer"), or in the room ("body"). "load" is the sum of
+             the forces on the mass but for the actuator's and for friction and damping: what a gear carries besides f.
              A kernel with states or memories returns (result, dstate/dt, …, new memory, …). It may use `math` and nothing
              else. A memory is what an operator (play, a limit of rate) remembers: it takes the kernel's new value
              where an integration step begins and where it ends, and keeps it between. `ELAPSED` is the time since it began.
@@ -26,11 +31,27 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.elements.first_guess import generic_guesses
+
 Slot = Literal["command", "actuator", "force", "sensor", "timing"]
 STEP = "simulation.step"  # borrowed under this name: the largest integration step [s], which no effect can be faster than
 ELAPSED = "simulation.elapsed"  # borrowed under this name: the time [s] since the integration step began
 SLOTS: tuple[Slot, ...] = ("command", "actuator", "force", "sensor", "timing")
-Acts = Literal["body", "leg", "modifier", "drive", "feedback"]
+Acts = Literal["body", "leg", "transmission", "modifier", "drive", "feedback", "transducer"]
+Against = Literal["base", "room"]
+DISSIPATIVE = ("friction", "damping")  # families whose forces are no load that a gear carries, but losses
+LEADING: Mapping[tuple[Slot, Acts], tuple[str, ...]] = {  # what a kernel is given before its parameters
+    ("command", "leg"): ("f", "t"),
+    ("command", "feedback"): ("f", "x", "v", "t"),
+    ("actuator", "leg"): ("f", "t"),
+    ("actuator", "transducer"): ("f", "x", "v", "t"),
+    ("force", "leg"): ("x", "v", "t", "f"),
+    ("force", "body"): ("x", "v", "t", "f"),
+    ("force", "transmission"): ("load", "x", "v", "t", "f"),
+    ("force", "modifier"): ("leg", "x", "v", "t", "f"),
+    ("force", "drive"): ("t",),
+    ("sensor", "leg"): ("y", "t"),
+}
 Sampler = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
 
@@ -116,6 +137,11 @@ class Element:
     `controlled` one a controller in the model, one of a `displaced_base` an input that moves the base.
     `ranges` bounds parameters by the record's scales to where the effect still is what its name says: a ripple repeats
     within the travel, or it is but another spring. `hops` says how far apart the minima lie at most that a fit has in a parameter.
+    `needless_with` names elements, or as "element.parameter" parameters that are estimated, beside which another candidate
+    or the nominal model says the same. `against` says whether a friction or a damper acts between mass and base or between
+    mass and room; None where that is no choice. `takes` is the unit of the signal that an actuator is fed with, where that
+    is no force. `clock` names the parameter that is the period of a clock of its own, which no descent finds: a fit seeks
+    it on a grid as fine as the ticks of the last second of a record ask for.
     """
 
     name: str
@@ -140,7 +166,7 @@ class Element:
     size: str = ""
     absent: float = 0.0
     candidate: bool = True  # takes part in the search for missing physics
-    needless_with: tuple[str, ...] = ()  # elements beside which another candidate says the same
+    needless_with: tuple[str, ...] = ()
     same_as: tuple[str, ...] = ()  # elements that make one and the same model, with other parameters
     same_beside: Mapping[str, str] = field(
         default_factory=dict
@@ -151,6 +177,9 @@ class Element:
     starts: Callable[[Scales], list[dict[str, float]]] | None = None
     ranges: Callable[[Scales], Mapping[str, tuple[float, float]]] | None = None
     hops: Callable[[Scales], Mapping[str, float]] | None = None
+    against: Against | None = None
+    takes: str = ""
+    clock: str = ""
     source: str = ""  # file that defines it
 
     def __post_init__(self) -> None:
@@ -159,6 +188,21 @@ class Element:
             raise TypeError(f"element {self.name}: needs exactly one of kernel, delay, sampler; has {given}")
         if self.slot not in SLOTS:
             raise TypeError(f"element {self.name}: slot {self.slot!r} is none of {', '.join(SLOTS)}")
+        if self.kernel is not None and (self.slot, self.acts) not in LEADING:
+            known = ", ".join(acts for slot, acts in LEADING if slot == self.slot)
+            raise TypeError(
+                f"element {self.name}: acts={self.acts!r} is for slot {self.slot!r} none of {known}"
+            )
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Names for what its kernel is given, in order."""
+        own = (parameter.name for parameter in self.parameters)
+        return (*LEADING[self.slot, self.acts], *own, *self.borrows, *self.own)
+
+    def acting_against(self, side: Against) -> "Element":
+        """The same friction or damper between the mass and the moving base, or between the mass and the room."""
+        return replace(self, against=side, acts="body" if side == "room" else "leg")
 
     @property
     def own(self) -> tuple[str, ...]:
@@ -190,6 +234,13 @@ class Element:
             parameters=tuple(narrowed(parameter) for parameter in self.parameters),
             starts=propose and (lambda sizes: [start for start in propose(sizes) if inside(start)]),
         )
+
+    def first_guesses(self, scales: Scales) -> list[dict[str, float]]:
+        """What `starts` proposes for these scales; without `starts`, guesses from the parameters' units and bounds.
+
+        Empty where the effect says that the motion does not show it. Raises NoGuess with the reason where there is no telling.
+        """
+        return self.starts(scales) if self.starts is not None else generic_guesses(self, scales)
 
     @property
     def deterministic(self) -> bool:

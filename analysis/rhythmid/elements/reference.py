@@ -3,10 +3,12 @@
 import ast
 import math
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 
 from rhythmid.elements.catalogue import load_catalogue
-from rhythmid.elements.element import ELAPSED, SLOTS, STEP, Element, Parameter
+from rhythmid.elements.element import ELAPSED, LEADING, SLOTS, STEP, Element, Parameter, Scales
+from rhythmid.elements.first_guess import GUESSES
 
 SLOT_TITLES = {
     "command": "Command elements, on u",
@@ -14,6 +16,23 @@ SLOT_TITLES = {
     "force": "Forces on the mass",
     "sensor": "Sensor elements, on y",
     "timing": "Timing of the measurements",
+}
+MOTION: Mapping[str, str] = {  # by `acts`: x and v of which frame
+    "leg": "of the mass relative to the base",
+    "body": "of the mass in the room",
+    "transmission": "of the mass relative to the base",
+    "modifier": "of the mass relative to the base",
+    "transducer": "of the mass relative to the base",
+    "feedback": "of the mass, as positions are measured",
+}
+ACTS: Mapping[str, str] = {
+    "leg": "a force between mass and base",
+    "body": "a force between mass and room, such as a weight or the drag of the air",
+    "transmission": "a force between mass and base of a gear that carries `load`: the other forces, without friction and damping",
+    "modifier": "what changes the sum `leg` of all forces between mass and base, such as a loss of contact",
+    "drive": "a force made on the robot, which depends on time alone; it goes through the actuator",
+    "transducer": "an actuator that feels the motion it makes",
+    "feedback": "a controller, whose reference is the command",
 }
 PREAMBLE = """# The elements
 
@@ -28,6 +47,41 @@ reads N as N·m, m as rad, kg as kg·m².
 *Candidate* elements take part in the search for missing physics; the others are nominal, or exactly absorbed by
 nominal parameters. An element is absent when its *size* parameter has the value given. Parameters marked *fixed* are
 not estimated unless a model file says so. Names in brackets are other names of the same thing.
+
+## Which motion an effect sees
+
+Where the input displaces the base (`kind: base_displacement`), x and v of the room are not those of the leg. Each element says
+which it sees. With any other input they are the same; with `kind: base_acceleration` all positions are relative to the base.
+
+{acts}
+
+Friction and dampers marked *against base or room* act between mass and base, unless a model file says
+`against: room`, as in `coulomb_friction: {{force: 1.0, against: room}}`. Where the base moves a search tries both.
+
+## Writing an element
+
+An element is one file that ends with `ELEMENT = Element(…)`; it lies in a folder given with `--elements`. Copy the file of a
+similar one. What to fill in, besides names, equation, parameters and reference:
+
+- `kernel`, a plain function in Python and `math`. What it is given, in this order, is said by slot and `acts` in the table
+  below; then follow the parameters, what it `borrows` from other elements (their parameters, the mass, the step), and its
+  states. It returns its value, and with states their rates after it: `return force, rate`.
+- `acts`: which motion a force sees, and where it is added; left out it is `leg`.
+- `size`: the parameter that says how much of the effect there is, and `absent` (0 unless said) the value at which the model
+  behaves as without it. The score test moves this parameter alone.
+- `starts`: first guesses from the records' scales, a function such as
+  `lambda s: [{{"force": 0.02 * s.force, "transition": 0.1 * s.velocity}}]`. Right within a factor of ten is enough for a size,
+  which the score test scales; frequencies and lengths need several guesses, as far apart as the minima lie. An empty list says that
+  this motion does not show the effect. Without `starts` the guesses come from the units: {guesses}. A parameter with a
+  default keeps it. What cannot be guessed in this way is not tried, and the answer says why.
+- `ranges`: bounds from the scales, beyond which the effect is another by name; `confusable`, `special_case_of`, `needless_with`:
+  what it could be taken for.
+
+| slot | `acts` | the kernel is given | x and v are |
+| --- | --- | --- | --- |
+{kernels}
+
+The scales: {scales}.
 """
 
 
@@ -74,6 +128,14 @@ def describe(element: Element) -> str:
         facts.append("- For rotational machines only.")
     if element.controlled:
         facts.append("- For machines whose controller is in the model.")
+    if element.kernel is not None and element.slot == "force" and element.acts in MOTION:
+        facts.append(f"- Sees x and v {MOTION[element.acts]}.")
+    if element.against is not None:
+        facts.append("- Acts against base or room.")
+    if element.takes:
+        facts.append(
+            f"- Takes a signal in {element.takes}; so do the command elements, and the actuators before it."
+        )
     if element.displaced_base:
         facts.append("- For machines on a base that the input displaces.")
     facts.append("- Candidate." if element.candidate else "- Not a candidate.")
@@ -84,9 +146,24 @@ def describe(element: Element) -> str:
     return "\n".join([*lines, *facts, ""])
 
 
+def _preamble() -> str:
+    """The page's introduction, its lists taken from what the code goes by."""
+    acts = "\n".join(
+        f"- `{name}`: {what}{'; x and v ' + MOTION[name] if name in MOTION else ''}."
+        for name, what in ACTS.items()
+    )
+    kernels = "\n".join(
+        f"| {slot} | `{name}` | {', '.join(f'`{one}`' for one in given)} | "
+        f"{MOTION.get(name, '') if 'x' in given else ''} |"
+        for (slot, name), given in LEADING.items()
+    )
+    scales = ", ".join(f"`{one.name}`" for one in fields(Scales))
+    return PREAMBLE.format(acts=acts, kernels=kernels, scales=scales, guesses=GUESSES)
+
+
 def reference(catalogue: Mapping[str, Element]) -> str:
     """The whole page as Markdown, in the order of the signal path."""
-    parts = [PREAMBLE]
+    parts = [_preamble()]
     for slot in SLOTS:
         elements = [element for _, element in sorted(catalogue.items()) if element.slot == slot]
         if elements:

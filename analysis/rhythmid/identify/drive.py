@@ -7,6 +7,7 @@ that was commanded or measured.
 from dataclasses import replace
 
 from rhythmid.errors import InputError
+from rhythmid.identify.declared import own_model
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 
@@ -19,8 +20,10 @@ def controlled(model: Model) -> bool:
 def driven(record: Record, model: Model) -> Record:
     """The record with that channel as input which drives this model.
 
-    Raises InputError where the model has a controller and the record no reference, or the other way round.
+    Raises InputError where the model has a controller and the record no reference, or the other way round, and where the
+    record declares parameters that the model does not have.
     """
+    own_model(model, record)
     if controlled(model):
         if record.input_kind == "reference" and record.input is not None:
             return record

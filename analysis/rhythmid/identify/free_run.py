@@ -10,6 +10,7 @@ from scipy.interpolate import PPoly
 
 from rhythmid.elements.element import STEP
 from rhythmid.errors import InputError
+from rhythmid.identify.declared import own_model
 from rhythmid.identify.observer import tied, with_observer
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
@@ -58,9 +59,11 @@ class FreeRun:
     def rows(self, model: Model, index: int, start: Array, disturbance: PPoly | None = None) -> Array | None:
         """Rows (blocks, states + 2) of the compiled loop at the block centres of series `index`.
 
-        The start is the state at the first centre. None when the simulation diverges.
+        The start is the state at the first centre; what the record declares of the model's parameters replaces the model's own.
+        None when the simulation diverges.
         """
         one, given = self.series[index], self.inputs[index]
+        model = own_model(model, one)
         times = np.ascontiguousarray(physical_times(model, one.centres))
         late = _delay_of(model, given.command[0][1:-1])
         varies = late is not None and len(late) > 0 and np.ptp(late) > 0.0
@@ -190,6 +193,7 @@ def start_of(model: Model, run: FreeRun, index: int, position: float, velocity: 
     """State of series `index` at its first block with this position and velocity; the elements' own as in the middle of
     the motion, at the command and forcing that act there."""
     one = run.series[index]
+    model = own_model(model, one)
     begin = physical_times(model, one.centres[:1])
     late = _delay_of(model, begin)
     command = _value(one.command, begin[0] - (0.0 if late is None else late[0]))

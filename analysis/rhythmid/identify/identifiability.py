@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rhythmid.errors import InputError
+from rhythmid.identify.declared import own_model
 from rhythmid.identify.harmonic_likelihood import INPUT_DELAY, MEASUREMENT_DELAY, visible_sidebands
 from rhythmid.identify.identification import Delays, Estimate, Observables
 from rhythmid.identify.joint import JointFit, without_forcing
@@ -128,7 +129,7 @@ def _cycle_slope(joint: JointFit) -> Array | None:
             output = cycle.output.copy()
             output[-1] = output[0]
             rate = CubicSpline(cycle.time, output, bc_type="periodic").derivative()
-            physical = physical_times(fit.model, one.centres) - pumping.origin
+            physical = physical_times(own_model(fit.model, one), one.centres) - pumping.origin
             slope = -rate(np.mod(physical, pumping.period))
         white = problem.whitened(index, slope)
         basis = fit.linearisation.bases[index]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.delay_fit import DelayEstimate
 from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.identifiability import Forcing, Offset, delays_of
@@ -196,11 +197,11 @@ def _identified(
     offset: Offset | None,
     htf: HtfMethod,
 ) -> Identification:
-    nominal = model or paper_hopper()
+    nominal = with_declared(model or paper_hopper(), given)
     results: list[PaperResult] = []
     pumpings: list[Pumping] = []
     for record in given:
-        own, pumping = forced_by(nominal, record)
+        own, pumping = forced_by(own_model(nominal, record), record)
         results.append(paper_method(record, own, pumping, harmonics if pumping.active else 0))
         pumpings.append(pumping)
     if method == "joint":
@@ -310,7 +311,7 @@ def _nrmse(model: Model, records: Sequence[Record], results: Sequence[PaperResul
     for record, result in zip(records, results):
         cycle, delay = result.fit.linearised.cycle, model.value("measurement_delay.delay")
         begin = (record.output.time[0] - delay - result.pumping.origin) % result.pumping.period
-        nrmse = max(nrmse, free_run_nrmse(model, record, cycle.path(begin)))
+        nrmse = max(nrmse, free_run_nrmse(own_model(model, record), record, cycle.path(begin)))
     return nrmse
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.harmonic_likelihood import DELAYS, INPUT_DELAY, MEASUREMENT_DELAY, harmonic_likelihood
 from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
@@ -170,7 +171,9 @@ def _start(
             continue
         try:
             own = (pumping_of(record) or pumping) if pumping is not None else NO_PUMPING
-            fit = harmonic_likelihood(record, plain, own or NO_PUMPING, 3, cycle, longest, search=True)
+            fit = harmonic_likelihood(
+                record, own_model(plain, record), own or NO_PUMPING, 3, cycle, longest, search=True
+            )
         except InputError:
             continue
         values = {name: v for name, v in zip(fit.names, fit.values) if name in model.free}
@@ -249,7 +252,7 @@ def joint_likelihood(
     given = (records,) if isinstance(records, Record) else tuple(records)
     if not given:
         raise InputError("nothing to identify from: give at least one record")
-    model, pumping = prepared_model(model, given)
+    model, pumping = prepared_model(with_declared(model, given), given)
     starts = _start(model, given, pumping, longest, cycle)
     best: JointFit | None = None
     for start in starts:
@@ -283,7 +286,7 @@ def fit_from(
 ) -> Fit:
     """The fit that the model's own values lead to, without a search: for values that are known to be near."""
     given = (records,) if isinstance(records, Record) else tuple(records)
-    ready, pumping = prepared_model(model, given)
+    ready, pumping = prepared_model(with_declared(model, given), given)
     late = sum(max(ready.value(name), 0.0) for name in DELAYS if name in ready.parameters)
     series = _series(given, late, block, cycle, pumping)
     return estimate(ready, series, max_step=step_of(series))

@@ -4,8 +4,8 @@ Samples are compared in block averages: far above the machine's dynamics there i
 simulation in the same way keeps the comparison unbiased.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +37,7 @@ class Series:
     what is in neither, like a gap, counts for nothing. `period` [s] is the usual sample period.
     `ignored` (n // block, q) are signals any multiple of which the averages may contain, so that nothing is learnt from
     them (the limit cycle's harmonics, where the cycle is not to be used). `observer` ties simulations to the record.
+    `parameters` are values of the model's parameters that the record declares; see `own_model`.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Series:
     ignored: Array | None = None
     observer: Observer | None = None
     hidden: Mask | None = None
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def blocks(self) -> int:
@@ -212,6 +214,7 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
                 period,
                 record.input_kind,
                 record.output_kind,
+                parameters=record.parameters,
             )
         )
     if block is None:
@@ -274,6 +277,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
     stiffness = spring if spring > FAINT * inertial else inertial
     effort, peak, pumping, reference = 0.0, 0.0, 0.0, 0.0
+    fed = any(term.element.takes for term in model.terms)  # by a voltage, say: what is recorded is no force
     for one in series:
         total = np.zeros(len(one.time))
         for signal in (one.command, one.forcing):
@@ -282,7 +286,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
                 total[inside] += signal(one.time[inside])
         if one.kind == "reference":
             reference = max(reference, float(np.std(total)))
-        else:
+        elif not fed:
             effort = max(effort, float(np.std(total)))
             peak = max(peak, float(np.abs(total).max(initial=0.0)))
     forced = [one for one in series if one.forcing is not None]

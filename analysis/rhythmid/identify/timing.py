@@ -20,6 +20,7 @@ from rhythmid.identify.free_run import FreeRun, prepare_run
 from rhythmid.identify.identification import Estimate
 from rhythmid.identify.joint import JointFit
 from rhythmid.identify.output_error import Fit, estimate, minimise
+from rhythmid.identify.sample_clock.clock import clock_of
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.series import Series, scales
 from rhythmid.model import Model
@@ -242,16 +243,17 @@ def command_hold(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tup
 
     On average over its ticks a held command is smeared over P: the roll-off tells P, and half of it belongs to the hold
     and not to the delay. Where the machine feels single ticks, only a period that stays in step over the whole record fits
-    (the element `command_hold`); such periods are tried as finely as that takes, the usual rates among them. Each step must
+    (an element with a clock of its own); such periods are tried as finely as that takes, the usual rates among them. Each step must
     lower chi2 by more than 25.
     """
     fit, name = joint.fit, "input_delay.delay"
-    element, none = load_catalogue()["command_hold"], Estimate(None, None, "s")
+    none = Estimate(None, None, "s")
+    element = next((one for one in load_catalogue().values() if one.clock and one.slot == "command"), None)
     smear = None
-    if fit.model.term("command_hold") is None and name in fit.names:
+    if clock_of(fit.model) is None and name in fit.names:
         smear = _smear(fit, LONGEST_HOLD / math.sqrt(12.0), pool)
     step = fit.run.series[0].period
-    if element.starts is None or smear is None or smear[0] < CERTAIN * smear[1]:
+    if element is None or smear is None or smear[0] < CERTAIN * smear[1]:
         return joint, none
     rough = math.sqrt(12.0 * smear[0])
     if rough < SLOWER * step:
@@ -269,14 +271,14 @@ def command_hold(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tup
     best = _widened(best, name, math.hypot(0.5 * spread, own))
 
     share = min(max(REACH, 3.0 * spread / rough), 0.5)
-    usual = [values["period"] for values in element.starts(scales(fit.run.series, fit.model))]
+    usual = [values[element.clock] for values in element.first_guesses(scales(fit.run.series, fit.model))]
     longest = max(float(np.ptp(one.time)) for one in fit.run.series)
     count = int(np.clip(4.0 * share * longest / rough, 8, FINEST))
     tried = {*rough * np.linspace(1.0 - share, 1.0 + share, count + 1)}
     tried |= {p for p in usual if abs(p - rough) < 2.0 * share * rough}
 
     def held(ticks: float) -> tuple[Model, FreeRun]:
-        model = fit.model.with_element(element, {"period": ticks}, fixed=True)
+        model = fit.model.with_element(element, {element.clock: ticks}, fixed=True)
         model = model.with_values({name: max(model.value(name) - 0.5 * ticks, 0.0)})
         return model, prepare_run(model, fit.run.series, fit.run.max_step)
 

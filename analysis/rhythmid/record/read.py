@@ -243,7 +243,7 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
     notes = (*quality.notes, *_clock_notes(judged))
     return Record(
         name, input_kind=signals.input_kind, output_kind=signals.output_kind, forcing_law=signals.forcing_law,
-        quality=replace(quality, channels=judged, notes=notes), **channels,
+        quality=replace(quality, channels=judged, notes=notes), parameters=signals.declared(name), **channels,
     )  # fmt: skip
 
 

@@ -83,6 +83,7 @@ class Record:
     output_kind : position, velocity or acceleration.
     forcing_law : the forcing's formula, if that is how it is known; `forcing` then holds samples of it.
     run : the description of the experiment that the recording itself carries.
+    parameters : what parameters of the model, by "element.parameter", were in this record, where that is declared.
     """
 
     name: str
@@ -99,6 +100,7 @@ class Record:
     forcing_law: Sinusoid | None = None
     run: Mapping[str, Any] | None = None
     output_kind: OutputKind = "position"
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def channels(self) -> dict[str, Channel]:

@@ -7,11 +7,14 @@
     use: [10, 90]                     # seconds of the record's time, the end excluded
     # on input: kind: force (default) | base_displacement | base_acceleration | reference; hold: zero | linear | band_limited
     # on output: kind: position (default) | velocity | acceleration
+    parameters: {position_control.proportional: 12.5}      # what the model's parameters were in this record
 
 A channel is a field of a topic, or a `column` of a `file` (.mat, .csv, .npz; relative to signals.yaml; `tables: {file: …}`
 names one file for all; without either it is a column of the table that is read). Its value is `scale` * recorded + `offset`, in `unit`. `input: none` says that nothing but the
 forcing, if that, drives the machine. `forcing: {amplitude: 1.0, frequency: 1.0, phase: 0.0}` states
-amplitude * cos(2π frequency t + phase) in the record's time.
+amplitude * cos(2π frequency t + phase) in the record's time. A parameter of the model that differs from record to record, such
+as a controller's gain, is declared by its value, or where one file is for several records, by record:
+`parameters: {position_control.proportional: {slow: 12.5, fast: 25}}`. What all records declare is not estimated.
 """
 
 import math
@@ -98,6 +101,7 @@ class Signals:
     hold : how the input continues between its samples; None stands for the default of its kind of record.
     use : [t0, t1) in seconds of the record's time.
     optional : roles that may be absent from the bag (the forcing of the default signals).
+    parameters : values of the model's parameters in this record, by "element.parameter"; or by record's name for each.
     """
 
     channels: Mapping[str, Source]
@@ -109,6 +113,20 @@ class Signals:
     use: tuple[float, float] = (-math.inf, math.inf)
     optional: frozenset[str] = field(default_factory=frozenset)
     path: Path | None = None
+    parameters: Mapping[str, float | Mapping[str, float]] = field(default_factory=dict)
+
+    def declared(self, record: str) -> dict[str, float]:
+        """Values of the model's parameters that are declared for a record. Raises InputError where it is left out of a list."""
+        found: dict[str, float] = {}
+        for name, value in self.parameters.items():
+            if isinstance(value, Mapping):
+                if record not in value:
+                    raise InputError(
+                        f"{self.path}: parameters: {name}: has no value for the record {record!r}"
+                    )
+                value = value[record]
+            found[name] = value
+        return found
 
     @property
     def from_tables(self) -> bool:
@@ -152,7 +170,7 @@ class Signals:
 
 
 def _signals(document: Node, path: Path) -> Signals:
-    keys = document.mapping(["time", *ROLES, "use", "tables"])
+    keys = document.mapping(["time", *ROLES, "use", "tables", "parameters"])
     file = _default_file(keys.get("tables"), path.parent)
     channels: dict[str, Source] = {}
     law: Sinusoid | None = None
@@ -192,7 +210,17 @@ def _signals(document: Node, path: Path) -> Signals:
     else:
         use = -math.inf, math.inf
     clock = _clock(keys.get("time"), document, not output.topic)
-    return Signals(channels, clock, law, kind, measured, hold, use, path=path)
+    parameters = _parameters(keys["parameters"]) if "parameters" in keys else {}
+    return Signals(channels, clock, law, kind, measured, hold, use, path=path, parameters=parameters)
+
+
+def _parameters(node: Node) -> dict[str, float | Mapping[str, float]]:
+    return {
+        name: {record: one.number() for record, one in given.mapping().items()}
+        if isinstance(given.value, dict)
+        else given.number()
+        for name, given in node.mapping().items()
+    }
 
 
 def _default_file(node: Node | None, folder: Path) -> Path | None:

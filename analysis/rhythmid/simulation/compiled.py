@@ -30,8 +30,8 @@ def _key(terms: tuple[Term, ...]) -> Hashable:
     """Equal for terms that compile to the same code, whatever their values; a kernel's code compares by content."""
     return tuple(
         (
-            term.label, term.element.name, term.element.slot, term.element.acts, term.element.states,
-            term.element.memories, tuple(term.element.borrows.items()),
+            term.label, term.element.name, term.element.slot, term.element.acts, term.element.family,
+            term.element.states, term.element.memories, tuple(term.element.borrows.items()),
             tuple(parameter.name for parameter in term.element.parameters),
             getattr(term.element.kernel, "__code__", None),
         )

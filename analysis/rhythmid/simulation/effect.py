@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.elements.element import ELAPSED, STEP, Element
+from rhythmid.elements.element import DISSIPATIVE, ELAPSED, LEADING, STEP, Element
 from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.simulation.generated_source import kernel_module
@@ -23,7 +23,8 @@ MAX_STEP = 2.5e-4  # [s] for the element's own states; what it remembers takes o
 @dataclass(frozen=True)
 class Path:
     """A trajectory: arrays (n,) of time [s], position, velocity, actuator force, leg force, and the signal that enters
-    a command, actuator or sensor element."""
+    a command, actuator or sensor element. `load` is the load that a gear carries besides the actuator force; where it is
+    not given, the model's own forces along the path make it up."""
 
     time: Array
     position: Array
@@ -31,6 +32,7 @@ class Path:
     effort: Array
     leg: Array
     signal: Array
+    load: Array | None = None
 
 
 def _module(element: Element) -> Module:
@@ -41,13 +43,13 @@ def _module(element: Element) -> Module:
         *(parameter.name for parameter in element.parameters),
         *(source for source, _ in element.borrows.values()),
     ]
+    signal = "f" if element.slot in ("command", "actuator") else "y"
+    names = LEADING[element.slot, element.acts]
     if element.slot == "force":
-        leading = ["leg"] if element.acts == "modifier" else []
-        arguments = ["t"] if element.acts == "drive" else [*leading, "x", "v", "t", "f"]
-        change = "value - leg" if element.acts == "modifier" else "value"
+        arguments, change = list(names), "value - leg" if element.acts == "modifier" else "value"
     else:
-        arguments, change = ["z", "t"], "value - z"
-    rows = ["x", "v", "f", "leg", "z"]
+        arguments, change = ["z" if name == signal else name for name in names], "value - z"
+    rows = ["x", "v", "f", "leg", "z", *(["load"] if element.acts == "transmission" else [])]
 
     def call(at: str, number: int, states: list[str], elapsed: str) -> list[str]:
         sets = "; ".join(f"{name} = {name}0 + {at} * ({name}1 - {name}0)" for name in rows)
@@ -143,12 +145,26 @@ def effect_along(element: Element, values: Mapping[str, float], model: Model, pa
         given = {p.name: v for p, v in zip(element.parameters, parameters, strict=True)} | borrowed
         signal = path.effort[0] if element.slot == "force" else path.signal[0]
         states[:] = element.initial(float(first), float(path.velocity[0]), float(signal), **given)
-    rows = np.ascontiguousarray(
-        np.vstack([path.position, path.velocity, path.effort, path.leg, path.signal]), dtype=float
-    )
+    known = [path.position, path.velocity, path.effort, path.leg, path.signal]
+    if element.acts == "transmission":
+        known.append(_load(model, path) if path.load is None else path.load)
+    rows = np.ascontiguousarray(np.vstack(known), dtype=float)
     out = np.empty(len(path.time))
     load_run(_module(element))(
         np.ascontiguousarray(path.time), rows, np.array([*parameters, *borrowed.values()], dtype=float), states,
         MAX_STEP, out,
     )  # fmt: skip
     return out
+
+
+def _load(model: Model, path: Path) -> Array:
+    """Sum (n,) of the model's forces along the path that are neither the actuator's nor losses."""
+    total = np.zeros(len(path.time))
+    for term in model.terms:
+        element = term.element
+        if element.slot != "force" or element.kernel is None or element.family in DISSIPATIVE:
+            continue
+        if element.acts in ("leg", "body"):
+            values = {name: value.value for name, value in term.values.items()}
+            total += effect_along(element, values, model, path)
+    return total

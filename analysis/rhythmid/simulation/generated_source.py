@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.elements.element import ELAPSED, STEP, Element
+from rhythmid.elements.element import DISSIPATIVE, ELAPSED, STEP, Element
 from rhythmid.errors import InputError
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.simulation.machine_code import Module
@@ -125,11 +125,17 @@ class _Writer:
 def _right_hand_side(
     terms: tuple[Term, ...], excited: InputKind, disturbed: bool, measured: OutputKind
 ) -> _Writer:
+    if excited == "base_acceleration" and (room := [term for term in terms if term.against == "room"]):
+        raise InputError(
+            f"element {room[0].label!r} acts against the room, whose speed cannot be told where only the base's acceleration is "
+            "known; give its displacement, or leave out 'against: room'"
+        )
     writer = _Writer()
     kernels = [term for term in terms if term.element.kernel is not None]
     force = [term for term in kernels if term.element.slot == "force"]
     writer.lines.append("f = u" if excited in DRIVES else "f = 0.0")
     command = [term for term in kernels if term.element.slot == "command" and excited in DRIVES]
+    relative = ["s0 - u", "s1 - du"] if excited == "base_displacement" else ["s0", "s1"]
     for term in sorted(
         command, key=lambda term: term.element.acts == "feedback"
     ):  # the controller gets what is left of u
@@ -141,17 +147,22 @@ def _right_hand_side(
         writer.call(term, ["t"], "part")
         writer.drive += [writer.lines.pop(), "w = w + part"]
     for term in (term for term in kernels if term.element.slot == "actuator"):
-        writer.call(term, ["f", "t"], "f")
-    writer.lines.append("leg = 0.0")
-    writer.lines.append("body = 0.0")
-    for acts in ("leg", "body"):
+        motion = relative if term.element.acts == "transducer" else []
+        writer.call(term, ["f", *motion, "t"], "f")
+    carried = any(term.element.acts == "transmission" for term in force)
+    writer.lines += ["leg = 0.0", "body = 0.0", *(["load = 0.0"] if carried else [])]
+    for acts, sum_of, at in (
+        ("leg", "leg", relative),
+        ("body", "body", ["s0", "s1"]),
+        ("transmission", "leg", ["load", *relative]),
+    ):
         for term in (term for term in force if term.element.acts == acts):
-            moved = excited == "base_displacement" and acts == "leg"
-            writer.call(term, ["s0 - u", "s1 - du", "t", "f"] if moved else ["s0", "s1", "t", "f"], "part")
-            writer.lines.append(f"{acts} = {acts} + part")
+            writer.call(term, [*at, "t", "f"], "part")
+            writer.lines.append(f"{sum_of} = {sum_of} + part")
+            if carried and term.element.family not in DISSIPATIVE:
+                writer.lines.append("load = load + part")
     for term in (term for term in force if term.element.acts == "modifier"):
-        at = ["s0 - u", "s1 - du"] if excited == "base_displacement" else ["s0", "s1"]
-        writer.call(term, ["leg", *at, "t", "f"], "leg")
+        writer.call(term, ["leg", *relative, "t", "f"], "leg")
     writer.lines.append(
         "absolute = (f + leg + body + d) / p0" if disturbed else "absolute = (f + leg + body) / p0"
     )

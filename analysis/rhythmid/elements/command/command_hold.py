@@ -27,6 +27,7 @@ ELEMENT = Element(
     parameters=(Parameter("period", "s", "period P of the drive's own clock", bounds=(0.0, math.inf)),),
     delay=delay_of,
     size="period",
+    clock="period",
     starts=lambda s: [  # usual rates of drives and buses, from twice the sample period to a quarter of the motion's
         {"period": 1.0 / rate}
         for rate in (

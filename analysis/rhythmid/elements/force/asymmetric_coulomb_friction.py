@@ -36,6 +36,7 @@ ELEMENT = Element(
         {"force": 0.02 * s.force, "asymmetry": a, "transition": 0.1 * s.velocity} for a in (-0.5, 0.5)
     ],
     ranges=lambda s: {"transition": s.turning},
+    against="base",
     also_known_as=("direction-dependent dry friction",),
     family="friction",
     confusable={

@@ -1,4 +1,7 @@
-"""Constant force: F = F_0 (bias of the actuator, weight of a tilted axis)."""
+"""Constant force: F = F_0 (bias of the actuator, weight of a tilted axis).
+
+A candidate where nothing that is estimated absorbs it, such as the rest length of a spring or the weight.
+"""
 
 from rhythmid.elements.element import Element, Parameter
 
@@ -16,8 +19,18 @@ ELEMENT = Element(
     kernel=kernel,
     acts="body",
     size="force",
-    candidate=False,  # any spring's rest length absorbs it: calibration, not physics
+    starts=lambda s: [{"force": 0.02 * s.force}],
+    # a rest length, a hanging position or a weight that is estimated takes it up
+    needless_with=(
+        "linear_spring.rest_length",
+        "pendulum_gravity.reference",
+        "gravity.acceleration",
+    ),
     also_known_as=("bias force",),
-    confusable={"sensor_offset": "not separable where a spring's rest length is free"},
+    confusable={
+        "sensor_offset": "the same on a linear spring: record the effort at rest",
+        "asymmetric_coulomb_friction": "changes sign with nothing: let the machine rest",
+        "linear_spring": "a displacement of its rest length: move over a wide range",
+    },
     reference="Elementary mechanics",
 )

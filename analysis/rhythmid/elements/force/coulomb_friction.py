@@ -30,6 +30,7 @@ ELEMENT = Element(
     size="force",
     starts=lambda s: [{"force": 0.02 * s.force, "transition": w * s.velocity} for w in (0.02, 0.2)],
     ranges=lambda s: {"transition": s.turning},
+    against="base",
     also_known_as=("dry friction", "kinetic friction"),
     family="friction",
     special_case_of=(
@@ -37,12 +38,15 @@ ELEMENT = Element(
         "stribeck_friction",
         "lugre_friction",
         "elastoplastic_hysteresis",
+        "bouc_wen_hysteresis",
     ),
     confusable={
         "viscous_damper": "one amplitude only: Coulomb's apparent damping falls as 1/amplitude",
         "stribeck_friction": "differ near v = 0 alone: dwell at low speed, reverse slowly",
         "elastoplastic_hysteresis": "differ before sliding: small slow reversals",
+        "bouc_wen_hysteresis": "differ before sliding: small slow reversals",
         "load_dependent_friction": "same at constant load: vary the actuator force",
+        "transmitted_load_friction": "same at constant load: vary the load",
     },
     reference="B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30(7), 1994, 1083-1138",
 )

@@ -36,15 +36,16 @@ ELEMENT = Element(
     ],
     # what does not yield within the travel is a spring
     ranges=lambda s: {"yield_displacement": (0.0, s.high - s.low)},
+    against="base",
     also_known_as=(
         "Jenkins element",
         "Iwan element",
-        "Bouc-Wen hysteresis",
+        "Bouc-Wen hysteresis with exponent 2",
         "presliding friction",
-        "Dahl friction",
     ),
     family="friction",
     confusable={
+        "bouc_wen_hysteresis": "differs in how round the loop's knee is: reversals of many sizes",
         "coulomb_friction": "differ before sliding: small slow reversals",
         "viscoelastic_relaxation": "its loop does not depend on speed: repeat slower",
         "lugre_friction": "has no fall of friction with speed",

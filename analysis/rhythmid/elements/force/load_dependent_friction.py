@@ -1,6 +1,7 @@
 """Load-dependent friction of a gear or a bearing: F = -mu |f| sgn(v), with f the actuator force it transmits.
 
-It comes on top of the load-free level, which is a `coulomb_friction` of its own. The sign is regularised as there.
+Only the motor loads it; where gravity, springs or an attached machine load the gear from the other side, see
+`transmitted_load_friction`. It comes on top of the load-free level, which is a `coulomb_friction` of its own. The sign is regularised as there.
 """
 
 import math
@@ -31,11 +32,13 @@ ELEMENT = Element(
     ranges=lambda s: {"transition": s.turning},
     also_known_as=("gear friction", "torque-dependent friction"),
     family="friction",
+    special_case_of=("transmitted_load_friction",),  # for an external ratio of 0
     confusable={
         "coulomb_friction": "same at constant load: vary the actuator force",
+        "transmitted_load_friction": "the same where the external load follows the motor's force: hold, lift and lower a load",
         "viscous_damper": "one amplitude only",
         "actuator_gain": "where f and v always have one sign",
     },
     reference="M. Duclusaud et al., Extended friction models for the physics simulation of servo actuators, "
-    "arXiv 2410.08650, 2024",
+    "ICRA 2025, arXiv 2410.08650",
 )

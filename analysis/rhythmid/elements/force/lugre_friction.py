@@ -57,6 +57,7 @@ ELEMENT = Element(
             "damping_time": 0.0,
         }
     ],
+    against="base",
     also_known_as=("dynamic friction", "bristle model"),
     family="friction",
     confusable={

@@ -19,11 +19,32 @@ def kernel(x, v, t, f, mass, frequency, damping_ratio, step, position, velocity)
     return mass * pull, velocity, -pull
 
 
+RATIOS = (
+    0.7,
+    1.0,
+    1.4,
+    2.0,
+    2.4,
+    2.8,
+    3.4,
+    4.0,
+    4.8,
+    5.6,
+)  # of the mode's frequency to the mass's on its spring
+DAMPING_RATIOS = (0.1, 0.01)  # of a joint or a payload, and of a metal structure
+SHARE = 0.03  # of the first mass
+NEAR = (1.0, 0.97, 1.03)  # of the strongest line left: a mode answers beside the line that it splits off
+
+
 def starts(scales):
-    frequencies = [ratio * scales.natural_frequency for ratio in (0.7, 1.4, 2.0, 2.8, 4.0, 5.6)]
-    if scales.residual_frequency > 0.0:
-        frequencies.insert(0, scales.residual_frequency)
-    return [{"mass": 0.03 * scales.mass, "frequency": f, "damping_ratio": 0.1} for f in frequencies]
+    """At the strongest line that is left, and on a grid; lightly damped ones close to the line, where alone they show."""
+    line = scales.residual_frequency
+    found = [(ratio * line, damping) for damping in DAMPING_RATIOS for ratio in NEAR if line > 0.0]
+    found += [(ratio * scales.natural_frequency, DAMPING_RATIOS[0]) for ratio in RATIOS]
+    return [
+        {"mass": SHARE * scales.mass, "frequency": frequency, "damping_ratio": damping}
+        for frequency, damping in found
+    ]
 
 
 ELEMENT = Element(

@@ -41,6 +41,7 @@ ELEMENT = Element(
         for w in (0.2, 0.6)
     ],
     ranges=lambda s: {"transition": s.turning},
+    against="base",
     also_known_as=("stiction", "static and kinetic friction", "negative viscous friction"),
     family="friction",
     special_case_of=("lugre_friction",),

@@ -24,7 +24,9 @@ ELEMENT = Element(
     kernel=kernel,
     size="stance",
     candidate=False,
+    against="base",
     also_known_as=("hybrid damper", "asymmetric damper"),
+    family="damping",
     confusable={"viscous_damper": "no sidebands; adds the same damping to both phases"},
     reference="Paper, equation (10)",
 )

@@ -18,6 +18,7 @@ ELEMENT = Element(
     kernel=kernel,
     size="damping",
     starts=lambda s: [{"damping": 0.02 * (s.stiffness * s.mass) ** 0.5}],
+    against="base",
     also_known_as=("dashpot", "linear damper"),
     family="damping",
     special_case_of=("viscoelastic_relaxation", "second_mode"),  # for τ_m → 0; of a mode far below the motion

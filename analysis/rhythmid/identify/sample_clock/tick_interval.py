@@ -16,8 +16,8 @@ from rhythmid.diagnose.search.forward import Search
 from rhythmid.errors import InputError
 from rhythmid.identify.covariance import covariance_of
 from rhythmid.identify.output_error import Fit, minimise
+from rhythmid.identify.sample_clock.clock import clock_of
 from rhythmid.identify.sample_clock.tick_likelihood import moved_to, places_of, tried, white_residual
-from rhythmid.identify.sample_clock.tick_scan import HOLD, PERIOD
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
@@ -25,9 +25,10 @@ LIKELY = 6.0  # of chi2 above the best, up to which 95 % of two parameters are, 
 
 
 def ticks_followed(found: Search, pool: ThreadPoolExecutor | None = None) -> Search:
-    """The search with the likeliest period (and input delay) of a command hold, and intervals that hold what is likely; as it is
-    without a hold whose period is free."""
-    if HOLD not in found.best.added or PERIOD not in found.fit.names:
+    """The search with the likeliest period (and input delay) of a drive's clock, and intervals that hold what is likely; as it is
+    without a clock that the search has added and whose period is free."""
+    period = clock_of(found.fit.model)
+    if period is None or period.split(".")[0] not in found.best.added or period not in found.fit.names:
         return found
     fit = found.fit
     places = places_of(fit)

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import Fit, minimise, noise_of
-from rhythmid.identify.sample_clock.tick_scan import DELAY, PERIOD, scanned
+from rhythmid.identify.sample_clock.clock import clock_of
+from rhythmid.identify.sample_clock.tick_scan import DELAY, scanned
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.model import Model
 
@@ -33,9 +34,10 @@ BETTER = 0.98  # of chi2, above which a scan has found nothing new
 
 
 def ticks_sought(fit: Fit, floor: float, pool: ThreadPoolExecutor | None = None) -> Fit:
-    """The fit of a model with a command hold where the ticks are likeliest that are found under the noise that it leaves, of at
+    """The fit of a model with a clock of its own where the ticks are likeliest that are found under the noise that it leaves, of at
     least `floor` [unit of the measurement]; under that noise, unless it is the fit as it was."""
-    if PERIOD not in fit.names:
+    period = clock_of(fit.model)
+    if period is None or period not in fit.names:
         return fit
     series, places = fit.run.series, places_of(fit)
     for _ in range(SCANS):
@@ -43,7 +45,7 @@ def ticks_sought(fit: Fit, floor: float, pool: ThreadPoolExecutor | None = None)
         try:
             now = minimise(fit.model, fit.run, fit.names, noise, fit.starts, 0, pool)
             late = fit.model.value(DELAY) if DELAY in fit.model.parameters else 0.0
-            mean = {DELAY: late + 0.5 * fit.model.value(PERIOD)} if DELAY in fit.names else {}
+            mean = {DELAY: late + 0.5 * fit.model.value(period)} if DELAY in fit.names else {}
             guesses = scanned(now.model.with_values(mean), series, now.starts, noise)
             cases, costs = tried(now, places, guesses, pool)
             moved = moved_to(now, places, cases[np.argmin(costs)])
@@ -60,7 +62,7 @@ def ticks_sought(fit: Fit, floor: float, pool: ThreadPoolExecutor | None = None)
 
 def places_of(fit: Fit) -> list[int]:
     """Where period and input delay stand among the free parameters."""
-    return [fit.names.index(name) for name in (PERIOD, DELAY) if name in fit.names]
+    return [fit.names.index(name) for name in (clock_of(fit.model), DELAY) if name in fit.names]
 
 
 def moved_to(fit: Fit, places: Sequence[int], case: Array) -> Model:

@@ -20,12 +20,14 @@ from rhythmid.identify.free_run import FreeRun, prepare_run
 from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import minimise
+from rhythmid.identify.sample_clock.clock import clock_of
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-HOLD, PERIOD, DELAY = "command_hold", "command_hold.period", "input_delay.delay"
+HOLD = "command_hold"  # what the search takes for the one element with a clock
+DELAY = "input_delay.delay"
 COARSE = 50  # rates of the coarse scan
 # of the way from the best to the middling cost of the coarse scan, up to which a rate is in the band
 BAND = 0.5
@@ -46,15 +48,16 @@ SHIFTS = np.linspace(-1.0, 1.0, 5)
 def scanned(
     model: Model, series: Sequence[Series], starts: Sequence[Array], noise: NoiseModel
 ) -> list[dict[str, float]]:
-    """First guesses of period and delay [s] of a model with a command hold, best first; empty where no rate is possible.
+    """First guesses of period and delay [s] of a model with a clock of its own, best first; empty where no rate is possible.
 
     `starts` are the initial states of the series; the other parameters stay at the model's values.
     """
+    period = clock_of(model)
     mean = model.parameters[DELAY].value if DELAY in model.parameters else 0.0
     driven = [
         (one, start) for one, start in zip(series, starts) if one.command is not None and one.kind == "force"
     ]
-    if mean <= 0.0 or not driven:
+    if period is None or mean <= 0.0 or not driven:
         return []
     slowest = max(0.45 / mean, SLOWEST * max(dominant_frequency(one) for one, _ in driven))
     fastest = min(FASTEST, 0.5 / max(one.period for one, _ in driven))
@@ -66,7 +69,7 @@ def scanned(
     longest = max(one.time[-1] - one.time[0] for one in chosen)
 
     def guess(rate: float, shift: float) -> dict[str, float]:
-        return {PERIOD: float(1.0 / rate), DELAY: float(max(mean - 0.5 / rate + shift, 0.0))}
+        return {period: float(1.0 / rate), DELAY: float(max(mean - 0.5 / rate + shift, 0.0))}
 
     def best_of(length: float, cases: Array, middle: Array) -> tuple[Array, Array]:
         """The cases (n, 2) of rate and shift, best first, with their costs over stretches of this length."""
@@ -128,7 +131,7 @@ def _costs(
     noise: NoiseModel,
 ) -> Array:
     """Whitened sums of squares that the guesses leave, beyond what the model's other parameters can do at `middle`."""
-    names = tuple(name for name in middle.free if name != PERIOD)
+    names = tuple(name for name in middle.free if name != clock_of(middle))
     try:
         linearisation = minimise(middle, run, names, noise, starts, iterations=0).linearisation
     except InputError:

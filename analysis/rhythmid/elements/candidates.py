@@ -1,0 +1,91 @@
+"""Which elements could be missing from a model, with first guesses; and which are not tried, and why."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from rhythmid.elements.element import Element, Scales
+from rhythmid.elements.first_guess import NoGuess
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What of a model decides which effects it could lack.
+
+    `present` holds what each of its terms is, as (element, against what it acts); `parameters` and `free` the names of all and
+    of the estimated parameters; `rotational` says whether positions are angles, `controlled` whether a controller closes
+    the loop.
+    """
+
+    present: frozenset[tuple[str, str | None]]
+    parameters: frozenset[str]
+    free: frozenset[str]
+    rotational: bool = False
+    controlled: bool = False
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """`tried` are first guesses of elements; `not_tried` says why a candidate of the catalogue has none, by its name."""
+
+    tried: tuple[tuple[Element, dict[str, float]], ...]
+    not_tried: Mapping[str, str]
+
+
+def candidates(catalogue: Mapping[str, Element], setting: Setting, scales: Scales) -> Candidates:
+    """First guesses of all elements that a model of this setting could lack, in records of these scales.
+
+    Where the input displaces the base, friction and dampers are tried against the base and against the room; the second come as
+    elements that act against the room (`Element.against`), with the same name.
+    """
+    tried: list[tuple[Element, dict[str, float]]] = []
+    not_tried: dict[str, str] = {}
+    for name, element in catalogue.items():
+        if not element.candidate:
+            continue
+        reasons = [(one, _unsuitable(one, setting, scales)) for one in variants(element, scales)]
+        suitable = [one for one, reason in reasons if reason is None]
+        if not suitable:
+            not_tried[name] = reasons[0][1] or ""
+            continue
+        try:
+            starts = element.first_guesses(scales)
+        except NoGuess as reason:
+            not_tried[name] = str(reason)
+            continue
+        if not starts:
+            not_tried[name] = "the motion is too small or too slow to show it"
+        tried += [(one, dict(start)) for one in suitable for start in starts]
+    return Candidates(tuple(tried), not_tried)
+
+
+def variants(element: Element, scales: Scales) -> tuple[Element, ...]:
+    """The element as it may act: where the base moves, a friction or a damper against the base or against the room."""
+    if element.against is None or not scales.displaced_base:
+        return (element,)
+    return element.acting_against("base"), element.acting_against("room")
+
+
+def _unsuitable(element: Element, setting: Setting, scales: Scales) -> str | None:
+    """Why an element cannot be what the model lacks; None where it can."""
+    names = {name for name, _ in setting.present}
+    if (element.name, element.against) in setting.present or (
+        element.name in names and not scales.displaced_base
+    ):
+        return "the model has it"
+    for other in element.needless_with if element.against != "room" else ():
+        if other in names or other in setting.free:
+            return (
+                f"{other} is in the model and does the same"
+                if other in names
+                else f"{other} is free and does the same"
+            )
+    if element.rotational and not setting.rotational:
+        return "it needs an angle as position"
+    if element.controlled and not setting.controlled:
+        return "it needs a controller in the model"
+    if element.displaced_base and not scales.displaced_base:
+        return "it needs an input that displaces the base"
+    for source, default in element.borrows.values():
+        if default is None and source not in setting.parameters:
+            return f"it needs {source.split('.')[0]}, which the model does not have"
+    return None

@@ -1,0 +1,118 @@
+"""First guesses for elements that propose none: each parameter from its unit, its bounds and the scales of the records.
+
+A guess needs no more than the right order of magnitude: what the score test measures is scaled to the data, and a refit does
+the rest. The shares are those of the built-in elements' own guesses: an effect of a few per cent of the machine's forces.
+"""
+
+import math
+import re
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rhythmid.elements.element import Element, Parameter, Scales
+
+FORCE = 0.02  # of the leg's typical force
+COEFFICIENT = 0.05  # of a stiffness, a damping, or any other force per power of position and speed
+MASS = 0.03  # of the machine's
+MOTION = 0.2  # of its position, speed or acceleration
+CYCLE = 0.02  # of a period of the motion, as a time
+PLAIN = 0.1  # of what has no unit
+FURTHER = 4.0  # times these, the lengths, speeds and times of a second guess
+GUESSES = (  # the same in words, for the reference page
+    f"N is {FORCE:g} of the typical force, N/m, N*s/m and their like {COEFFICIENT:g} of what would make that force, kg {MASS:g} of "
+    f"the mass, m, m/s and m/s^2 {MOTION:g} of the motion, s {CYCLE:g} of its period, Hz its frequency, 1 is {PLAIN:g}, 1/s "
+    f"{PLAIN:g} of the inverse duration; lengths, speeds and times once more {FURTHER:g} times that"
+)
+SHAPES = (
+    "m",
+    "m/s",
+    "m/s^2",
+    "s",
+    "1/m",
+    "1/s",
+)  # units of parameters that say where or how fast, not how much
+
+
+class NoGuess(Exception):
+    """Why an element gets no first guess."""
+
+
+def generic_guesses(element: "Element", scales: "Scales") -> list[dict[str, float]]:
+    """First guesses from units, bounds and scales: two where a length, a speed or a time is to be guessed, for a phase two.
+
+    A parameter with a default keeps it, unless it is the effect's size. Raises NoGuess with the reason where a parameter's unit
+    says nothing, or where its bounds leave nothing.
+    """
+    if math.isinf(element.absent):
+        raise NoGuess(
+            f"its {element.size} is absent at infinity: what size shows cannot be told from its unit"
+        )
+    cases = (
+        [1.0, FURTHER] if any(_open(element, p) and p.unit in SHAPES for p in element.parameters) else [1.0]
+    )
+    guesses = [
+        {
+            p.name: _inside(
+                p, _magnitude(p, scales) * (factor if p.unit in SHAPES and p.name != element.size else 1.0)
+            )
+            for p in element.parameters
+            if p.default is None or p.name == element.size
+        }
+        for factor in cases
+    ]
+    for phase in (p for p in element.parameters if math.isfinite(p.turn)):
+        quarters = (0.0, 0.25 * phase.turn)
+        guesses = [guess | {phase.name: _inside(phase, turned)} for guess in guesses for turned in quarters]
+    if element.size and any(guess[element.size] == element.absent for guess in guesses):
+        raise NoGuess(f"no {element.size} other than {element.absent:g} lies within its bounds")
+    return guesses
+
+
+def _open(element: "Element", parameter: "Parameter") -> bool:
+    """Whether a parameter is guessed but says nothing of how much of the effect there is."""
+    return parameter.default is None and parameter.name != element.size
+
+
+def _magnitude(parameter: "Parameter", scales: "Scales") -> float:
+    """A size of some consequence of a parameter in its unit."""
+    rate = scales.velocity / scales.position  # [1/s] angular frequency of the motion
+    known = {
+        "N": FORCE * scales.force,
+        "N/m": COEFFICIENT * scales.stiffness,
+        "N*s/m": COEFFICIENT * scales.damping,
+        "kg": MASS * scales.mass,
+        "m": MOTION * scales.position,
+        "m/s": MOTION * scales.velocity,
+        "m/s^2": MOTION * scales.velocity * rate,
+        "s": CYCLE / scales.frequency,
+        "Hz": scales.frequency,
+        "1": PLAIN,
+        "rad": 0.0,
+        "1/m": MOTION / scales.position,
+        "1/s": PLAIN / scales.duration,
+    }
+    if parameter.unit in known:
+        return known[parameter.unit]
+    powers = dict(_powers(parameter.unit))
+    if "N" not in powers or not set(powers) <= {"N", "m", "s", "kg"}:
+        raise NoGuess(f"the unit {parameter.unit} of its {parameter.name} says nothing of its size")
+    sizes = {"N": scales.force, "m": scales.position, "s": 1.0 / rate, "kg": scales.mass}
+    return COEFFICIENT * math.prod(sizes[unit] ** power for unit, power in powers.items())
+
+
+def _powers(unit: str) -> Iterator[tuple[str, int]]:
+    """The units in a product such as N*s^2/m^2, with their powers."""
+    for divided, name, power in re.findall(r"([*/]?)([A-Za-z]+)(?:\^(\d+))?", unit):
+        yield name, (-1 if divided == "/" else 1) * int(power or 1)
+
+
+def _inside(parameter: "Parameter", value: float) -> float:
+    """The value, or its mirror image, within the parameter's bounds; else the middle of finite ones, or the nearer one."""
+    low, high = parameter.bounds
+    for one in (value, -value):
+        if low <= one <= high:
+            return one
+    if math.isfinite(low) and math.isfinite(high):
+        return 0.5 * (low + high)
+    return 2.0 * low if math.isfinite(low) and low > 0.0 else low if math.isfinite(low) else high
