@@ -30,7 +30,9 @@ from rhythmid.proof.sizes import EQUIVALENT, SIZES, motion_of
 Kind = Literal["single", "pairs", "null", "left-out"]
 KINDS: tuple[Kind, ...] = ("single", "null", "pairs", "left-out")
 ATTEMPTS = 20
-LACKED = "pendulum_gravity"  # part of a machine, not an effect that is added to it: a nominal model may lack it
+LACKED = (
+    "pendulum_gravity"  # part of a machine, not an effect that is added to it: a nominal model may lack it
+)
 
 
 @dataclass(frozen=True)
@@ -175,9 +177,7 @@ def _draw(
     believed, error = wrong(rig.believed, rng, [name for name in free if getattr(rig.believed, name)])
     delays = (rig.input_delay, rig.measurement_delay)
     complete = replace(rig, believed=rig.machine, lacks=None)
-    exact = Model.from_text(
-        nominal_model(complete, design, rig.machine, fixed, delays), catalogue=catalogue
-    )
+    exact = Model.from_text(nominal_model(complete, design, rig.machine, fixed, delays), catalogue=catalogue)
     plain = complete.observe_all([])
     if plain is None:
         return None

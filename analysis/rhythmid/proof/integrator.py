@@ -143,7 +143,9 @@ def command_at(t, j, knots, values, slopes, level, smooth):
           float64[:, ::1], numbers),
     cache=True,
 )  # fmt: skip
-def integrate(effects, places, layout, m, p, held, z, begin, knots, values, slopes, mode, samples, out, efforts):
+def integrate(
+    effects, places, layout, m, p, held, z, begin, knots, values, slopes, mode, samples, out, efforts
+):
     """Integrate from `begin` through all `samples`, filling the rows of `out`.
 
     The command is 0 before the first of its `knots`, then values[j] from knots[j] on, or with as many `slopes` as knots a
@@ -181,15 +183,21 @@ def integrate(effects, places, layout, m, p, held, z, begin, knots, values, slop
                 for q in range(n):
                     trial[q] = z[q] + step * k1[q] / 5.0
                 u, du = command_at(t + step / 5.0, j, knots, values, slopes, level, smooth)
-                rates(t + step / 5.0, trial, u, du, drive, effects, places, layout, m, p, held, False, k2, told)
+                rates(
+                    t + step / 5.0, trial, u, du, drive, effects, places, layout, m, p, held, False, k2, told
+                )
                 for q in range(n):
                     trial[q] = z[q] + step * (3.0 * k1[q] + 9.0 * k2[q]) / 40.0
                 u, du = command_at(t + 0.3 * step, j, knots, values, slopes, level, smooth)
-                rates(t + 0.3 * step, trial, u, du, drive, effects, places, layout, m, p, held, False, k3, told)
+                rates(
+                    t + 0.3 * step, trial, u, du, drive, effects, places, layout, m, p, held, False, k3, told
+                )
                 for q in range(n):
                     trial[q] = z[q] + step * (44.0 / 45.0 * k1[q] - 56.0 / 15.0 * k2[q] + 32.0 / 9.0 * k3[q])
                 u, du = command_at(t + 0.8 * step, j, knots, values, slopes, level, smooth)
-                rates(t + 0.8 * step, trial, u, du, drive, effects, places, layout, m, p, held, False, k4, told)
+                rates(
+                    t + 0.8 * step, trial, u, du, drive, effects, places, layout, m, p, held, False, k4, told
+                )
                 for q in range(n):
                     trial[q] = z[q] + step * (
                         19372.0 / 6561.0 * k1[q] - 25360.0 / 2187.0 * k2[q] + 64448.0 / 6561.0 * k3[q]

@@ -164,9 +164,7 @@ def observe(
     widths = [(len(one.parameters), len(one.states), one.held) for one in known] + [(0, 0, 0)] * spare
     layout = np.vstack([np.zeros((1, 3), int), np.cumsum(widths, axis=0)]).astype(np.int64)
     parameters = [effect.parameters[name] for effect, one in zip(inside, known) for name in one.parameters]
-    begin, (position, speed) = (
-        (time[0] - WARM_UP, (machine.rest, 0.0)) if start is None else (time[0], start)
-    )
+    begin, (position, speed) = (time[0] - WARM_UP, (machine.rest, 0.0)) if start is None else (time[0], start)
     first = np.array([position, speed, *(share * position for one in known for share in one.states)])
     held = _memory(machine, inside, position, float(begin))
     out, efforts = np.empty((len(time), COLUMNS)), np.zeros(len(arrival))
@@ -182,7 +180,13 @@ def observe(
         return None
     efforts[-1:] = efforts[-2:-1]  # what is given out at the last sample acts after it
     return Observation(
-        stamp(time, measurement_delay, effects), out[:, 2], out[:, 0], out[:, 1], out[:, 4], out[:, 3], efforts
+        stamp(time, measurement_delay, effects),
+        out[:, 2],
+        out[:, 0],
+        out[:, 1],
+        out[:, 4],
+        out[:, 3],
+        efforts,
     )
 
 

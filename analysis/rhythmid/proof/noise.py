@@ -78,7 +78,10 @@ class Log:
 
 
 def draw_noise(
-    rng: np.random.Generator, size: float, kind: NoiseKind | None = None, share: tuple[float, float] = (0.008, 0.03)
+    rng: np.random.Generator,
+    size: float,
+    kind: NoiseKind | None = None,
+    share: tuple[float, float] = (0.008, 0.03),
 ) -> Noise:
     """Noise of a `share` of `size` [m], 0.8 to 3 % if not said otherwise."""
     std = size * log_uniform(rng, *share)

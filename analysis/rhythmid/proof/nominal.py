@@ -40,7 +40,12 @@ def nominal_model(
     if machine.stiffness:
         rest = parameter("rest_length", position)
         terms.append(
-            {"linear_spring": {"stiffness": parameter("stiffness", f"{force}/{position}"), "rest_length": rest}}
+            {
+                "linear_spring": {
+                    "stiffness": parameter("stiffness", f"{force}/{position}"),
+                    "rest_length": rest,
+                }
+            }
         )
     damping = f"{force}*s/{position}"
     if machine.return_damping:

@@ -31,7 +31,9 @@ def draw(rng: Rng, conceals: Sequence[str]) -> Rig:
     )  # fmt: skip
 
     def moves(name: str) -> Run:
-        return draw_moves(rng, name, (-travel, travel), float(rng.integers(8, 14)), rate, 0.3, 1.2, speeds=by_speed)
+        return draw_moves(
+            rng, name, (-travel, travel), float(rng.integers(8, 14)), rate, 0.3, 1.2, speeds=by_speed
+        )
 
     def tones(name: str) -> Run:
         low, high = 0.3, 4.0
@@ -54,5 +56,10 @@ def draw(rng: Rng, conceals: Sequence[str]) -> Rig:
 
 
 DESIGN = Design(
-    "axis", EFFECTS, draw, {"inertia.mass": "mass", "viscous_damper.damping": "damping"}, (1e-5, 1e-4), by_effort=True
+    "axis",
+    EFFECTS,
+    draw,
+    {"inertia.mass": "mass", "viscous_damper.damping": "damping"},
+    (1e-5, 1e-4),
+    by_effort=True,
 )

@@ -30,7 +30,11 @@ def draw(rng: Rng, conceals: Sequence[str]) -> Rig:
     def release(name: str, share: float) -> Run:
         return draw_release(name, (rest + share * wide, 0.0), float(rng.integers(8, 18)), rate)
 
-    runs = [release("wide", 1.0), release("other_side", -rng.uniform(0.5, 0.8)), release("small", rng.uniform(0.25, 0.45))]
+    runs = [
+        release("wide", 1.0),
+        release("other_side", -rng.uniform(0.5, 0.8)),
+        release("small", rng.uniform(0.25, 0.45)),
+    ]
     unseen = (release("unseen_wide", -rng.uniform(0.8, 1.0)), release("unseen_half", rng.uniform(0.4, 0.7)))
     return Rig(machine, machine, tuple(runs[: rng.integers(2, 4)]), unseen, 0.3 * wide, "nothing")
 

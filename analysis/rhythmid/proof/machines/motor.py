@@ -30,19 +30,30 @@ def draw(rng: Rng, conceals: Sequence[str]) -> Rig:
     start = (0.1, 0.0) if lacks else (0.0, 0.0)
 
     def tones(name: str, scale: float) -> Run:
-        return draw_tones(
-            rng, name, scale * size, 0.4, 5.0, float(rng.integers(10, 20)), rate, start=start
-        )
+        return draw_tones(rng, name, scale * size, 0.4, 5.0, float(rng.integers(10, 20)), rate, start=start)
 
     runs = [tones("small", rng.uniform(0.4, 0.6)), tones("large", 1.0)]
     if rng.random() < 0.5:
         runs.append(draw_sweep(rng, "sweep", size, 0.3, 3.0, 12.0, rate, start))
     unseen = (tones("unseen_large", 0.9), tones("unseen_small", 0.5))
     return Rig(
-        machine, believed, tuple(runs), unseen, speed, "command", velocity=True, lacks=lacks, units=("A", "rad")
+        machine,
+        believed,
+        tuple(runs),
+        unseen,
+        speed,
+        "command",
+        velocity=True,
+        lacks=lacks,
+        units=("A", "rad"),
     )
 
 
 DESIGN = Design(
-    "motor", EFFECTS, draw, {"inertia.mass": "mass", "viscous_damper.damping": "damping"}, (0.003, 0.02), by_effort=True
+    "motor",
+    EFFECTS,
+    draw,
+    {"inertia.mass": "mass", "viscous_damper.damping": "damping"},
+    (0.003, 0.02),
+    by_effort=True,
 )

@@ -41,5 +41,9 @@ def draw(rng: Rng, conceals: Sequence[str]) -> Rig:
 
 
 DESIGN = Design(
-    "shaken", EFFECTS, draw, {"linear_spring.stiffness": "stiffness", "viscous_damper.damping": "damping"}, (0.002, 0.02)
+    "shaken",
+    EFFECTS,
+    draw,
+    {"linear_spring.stiffness": "stiffness", "viscous_damper.damping": "damping"},
+    (0.002, 0.02),
 )
