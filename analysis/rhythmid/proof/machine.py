@@ -140,22 +140,25 @@ def observe(
     slopes: Array | None = None,
     start: tuple[float, float] | None = None,
     velocity: bool = False,
+    samples: Array | None = None,
     lag: float = 0.0,
 ) -> Observation | None:
     """Run the machine through one record.
 
-    `time` (n,) [s] are the instants at which commands (n,) [N] are sent and measurements taken. The command is held, or with
+    `time` (n,) [s] are the instants at which commands (n,) [N] are sent and, but for other `samples`, measurements taken. The command is held, or with
     `slopes` (n,) smooth. With a `start`, position [m] and velocity [m/s], the machine is let go there at the first instant;
     else it has run before. `velocity`: it is the velocity that is measured. Measurements are taken `lag` [s] before they are
     said to be. None if it diverges.
     """
+    taken = np.ascontiguousarray(time if samples is None else samples, dtype=float)
     arrival, value = time + input_delay, np.ascontiguousarray(command, dtype=float)
     for effect in effects:
         if effect.name == "input_delay_drift":
             arrival = arrival + effect.parameters["rate"] * time
     for effect in effects:
         if effect.name == "command_hold":
-            arrival, value = held_command(arrival, value, effect.parameters["period"])
+            taken = np.ascontiguousarray(time if samples is None else samples, dtype=float)
+    arrival, value = held_command(arrival, value, effect.parameters["period"])
     inside = [effect for effect in effects if effect.name not in TIMING]
     known = [EQUATIONS[effect.name] for effect in inside]
     spare = MOST - len(known)
@@ -167,20 +170,20 @@ def observe(
     begin, (position, speed) = (time[0] - WARM_UP, (machine.rest, 0.0)) if start is None else (time[0], start)
     first = np.array([position, speed, *(share * position for one in known for share in one.states)])
     held = _memory(machine, inside, position, float(begin))
-    out, efforts = np.empty((len(time), COLUMNS)), np.zeros(len(arrival))
+    out, efforts = np.empty((len(taken), COLUMNS)), np.zeros(len(arrival))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
         done = integrate(
             functions, places, layout, constants(machine, forcing, velocity), np.array(parameters, dtype=float), held,
             first, float(begin), np.ascontiguousarray(arrival, dtype=float), value,
             NO_SLOPES if slopes is None else np.ascontiguousarray(slopes, dtype=float), MODES[machine.mode],
-            np.ascontiguousarray(time - lag, dtype=float), out, efforts,
+            taken - lag, out, efforts,
         )  # fmt: skip
-    if done < len(time) or not np.isfinite(out).all():
+    if done < len(taken) or not np.isfinite(out).all():
         return None
     efforts[-1:] = efforts[-2:-1]  # what is given out at the last sample acts after it
     return Observation(
-        stamp(time, measurement_delay, effects),
+        stamp(taken, measurement_delay, effects),
         out[:, 2],
         out[:, 0],
         out[:, 1],

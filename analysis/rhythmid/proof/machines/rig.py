@@ -12,6 +12,7 @@ from rhythmid.proof.protocol import Run
 
 Array = NDArray[np.float64]
 Rng = np.random.Generator
+FINER = 8  # knots a sample of a smooth command
 Recorded = Literal["command", "effort", "base", "reference", "nothing"]  # what drives it, as recorded
 
 
@@ -43,10 +44,13 @@ class Rig:
         """The noise-free record of one run; None where the machine diverges."""
         scaled = replace(self.forcing, amplitude=self.forcing.amplitude * run.forcing)
         inside = [effect for effect in effects if effect != self.lacks]
+        moved = self.recorded == "base"
+        sent = (
+            replace(run, rate=FINER * run.rate) if moved else run
+        )  # what moves a base is smooth between samples, too
         return observe(
-            self.machine, inside, scaled, run.time, run.command, self.input_delay, self.measurement_delay,
-            slopes=run.slopes if self.recorded == "base" else None, start=run.start, velocity=self.velocity,
-            lag=self.lag,
+            self.machine, inside, scaled, sent.time, sent.command, self.input_delay, self.measurement_delay,
+            slopes=sent.slopes if moved else None, start=run.start, velocity=self.velocity, samples=run.time, lag=self.lag,
         )  # fmt: skip
 
     def observe_all(self, effects: Sequence[Effect]) -> list[Observation] | None:
