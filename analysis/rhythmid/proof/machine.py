@@ -145,8 +145,8 @@ def observe(
 ) -> Observation | None:
     """Run the machine through one record.
 
-    `time` (n,) [s] are the instants at which commands (n,) [N] are sent and, but for other `samples`, measurements taken. The command is held, or with
-    `slopes` (n,) smooth. With a `start`, position [m] and velocity [m/s], the machine is let go there at the first instant;
+    `time` (n,) [s] are the instants at which commands (n,) [N] are sent and, but for other `samples`, measurements taken.
+    The command is held, or with `slopes` (n,) smooth. With a `start`, position [m] and velocity [m/s], the machine is let go there at the first instant;
     else it has run before. `velocity`: it is the velocity that is measured. Measurements are taken `lag` [s] before they are
     said to be. None if it diverges.
     """
@@ -157,8 +157,7 @@ def observe(
             arrival = arrival + effect.parameters["rate"] * time
     for effect in effects:
         if effect.name == "command_hold":
-            taken = np.ascontiguousarray(time if samples is None else samples, dtype=float)
-    arrival, value = held_command(arrival, value, effect.parameters["period"])
+            arrival, value = held_command(arrival, value, effect.parameters["period"])
     inside = [effect for effect in effects if effect.name not in TIMING]
     known = [EQUATIONS[effect.name] for effect in inside]
     spare = MOST - len(known)
