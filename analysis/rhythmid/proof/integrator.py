@@ -140,15 +140,15 @@ def command_at(t, j, knots, values, slopes, level, smooth):
 
 @njit(
     int64(EFFECTS, whole, table, numbers, numbers, numbers, numbers, float64, numbers, numbers, numbers, int64, numbers,
-          float64[:, ::1], numbers),
+          float64[:, ::1], numbers, float64),
     cache=True,
 )  # fmt: skip
 def integrate(
-    effects, places, layout, m, p, held, z, begin, knots, values, slopes, mode, samples, out, efforts
+    effects, places, layout, m, p, held, z, begin, knots, values, slopes, mode, samples, out, efforts, before
 ):
     """Integrate from `begin` through all `samples`, filling the rows of `out`.
 
-    The command is 0 before the first of its `knots`, then values[j] from knots[j] on, or with as many `slopes` as knots a
+    The command is `before` until the first of its `knots`, then values[j] from knots[j] on, or with as many `slopes` as knots a
     smooth curve through them. `efforts` (knots,) become the forces that a sampled controller gives out at the knots. Returns
     how many rows are good.
     """
@@ -159,7 +159,7 @@ def integrate(
     smooth = len(slopes) == len(knots) and len(knots) > 0
     drive = FORCE if mode >= SAMPLED_POSITION else mode
     summed = 0.0
-    t, level, j = begin, 0.0, 0
+    t, level, j = begin, before, 0
     h = 1e-4
     for i in range(len(samples)):
         while t < samples[i]:

@@ -167,6 +167,9 @@ def observe(
     layout = np.vstack([np.zeros((1, 3), int), np.cumsum(widths, axis=0)]).astype(np.int64)
     parameters = [effect.parameters[name] for effect, one in zip(inside, known) for name in one.parameters]
     begin, (position, speed) = (time[0] - WARM_UP, (machine.rest, 0.0)) if start is None else (time[0], start)
+    before = (
+        value[0] if machine.mode == "continuous" and start is not None else 0.0
+    )  # it stands where it was sent
     first = np.array([position, speed, *(share * position for one in known for share in one.states)])
     held = _memory(machine, inside, position, float(begin))
     out, efforts = np.empty((len(taken), COLUMNS)), np.zeros(len(arrival))
@@ -176,7 +179,7 @@ def observe(
             functions, places, layout, constants(machine, forcing, velocity), np.array(parameters, dtype=float), held,
             first, float(begin), np.ascontiguousarray(arrival, dtype=float), value,
             NO_SLOPES if slopes is None else np.ascontiguousarray(slopes, dtype=float), MODES[machine.mode],
-            taken - lag, out, efforts,
+            taken - lag, out, efforts, before,
         )  # fmt: skip
     if done < len(taken) or not np.isfinite(out).all():
         return None
