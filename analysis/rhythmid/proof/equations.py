@@ -158,6 +158,19 @@ def load_dependent_friction(value, t, x, v, f, m, p, s, ds, held, accepted):
     return value - p[0] * abs(f) * sgn(v, m)
 
 
+@equation("leg", "coefficient", "external_ratio")
+def transmitted_load_friction(value, t, x, v, f, m, p, s, ds, held, accepted):
+    load = -m[STIFFNESS] * (x - m[REST_LENGTH]) - m[MASS] * m[GRAVITY] - m[MOMENT] * math.sin(x - m[HANGING])
+    return value - p[0] * abs(f - p[1] * load) * sgn(v, m)
+
+
+@equation("leg", "stiffness", "yield_displacement", "shape", states=(0.0,))
+def bouc_wen_hysteresis(value, t, x, v, f, m, p, s, ds, held, accepted):
+    z = s[0]
+    ds[0] = v * (1.0 - (abs(z) + p[2] * (math.copysign(abs(z), v * z) - abs(z))) / p[1])
+    return value - p[0] * z
+
+
 @equation("leg", "stiffness", "yield_displacement", states=(0.0,))
 def elastoplastic_hysteresis(value, t, x, v, f, m, p, s, ds, held, accepted):
     z = s[0]
@@ -257,6 +270,11 @@ def end_stop_contact(value, t, x, v, f, m, p, s, ds, held, accepted):
         return value
     damping = 2.0 * p[1] * math.sqrt(p[0] * m[MASS])
     return value - p[3] * max(0.0, p[0] * depth + damping * p[3] * v)
+
+
+@equation("body", "force")
+def constant_force(value, t, x, v, f, m, p, s, ds, held, accepted):
+    return value + p[0]
 
 
 @equation("body", "coefficient")

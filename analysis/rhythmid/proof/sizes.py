@@ -161,6 +161,10 @@ SIZES: dict[str, Callable[[Rng, Motion], Sized]] = {
         "force", 0.3 * m.unit, static_ratio=rng.uniform(1.5, 3.0), stribeck_speed=m.velocity * rng.uniform(0.15, 0.5)
     ),
     "load_dependent_friction": lambda rng, m: _of("coefficient", 0.5),
+    "transmitted_load_friction": lambda rng, m: _of("coefficient", 0.5, external_ratio=rng.uniform(0.3, 1.5)),
+    "bouc_wen_hysteresis": lambda rng, m: _of(
+        "stiffness", m.stiffness, yield_displacement=m.cycle * _log(rng, 0.1, 1.5), shape=0.5
+    ),
     "elastoplastic_hysteresis": lambda rng, m: _of(
         "stiffness", m.stiffness, yield_displacement=m.cycle * _log(rng, 0.1, 1.5)
     ),
@@ -168,6 +172,7 @@ SIZES: dict[str, Callable[[Rng, Motion], Sized]] = {
     "flight_damping": lambda rng, m: _of("damping", 2.0 * m.damping),
     "switching_threshold": lambda rng, m: _of("threshold", _sign(rng) * 1.5 * m.velocity),
     "position_dependent_damping": _position_damping,
+    "constant_force": lambda rng, m: _of("force", _sign(rng) * 0.5 * m.unit),
     "quadratic_drag": lambda rng, m: _of("coefficient", 2.0 * m.damping / m.velocity),
     "quadratic_damping": lambda rng, m: _of("coefficient", 2.0 * m.damping / m.velocity),
     "quadratic_stiffness": lambda rng, m: _of("coefficient", _sign(rng) * 0.4 * m.stiffness / m.stretch),

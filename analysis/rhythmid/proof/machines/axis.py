@@ -9,9 +9,9 @@ from rhythmid.proof.protocol import Run, draw_moves, draw_sweep, draw_tones, fro
 
 RATES = (500, 1000, 2000)  # [Hz]
 EFFECTS = (
-    "coulomb_friction", "asymmetric_coulomb_friction", "stribeck_friction", "load_dependent_friction", "quadratic_drag",
-    "position_ripple", "position_dependent_damping", "actuator_deadband", "actuator_nonlinearity", "actuator_lag",
-    "backlash", "second_mode", "periodic_disturbance",
+    "coulomb_friction", "asymmetric_coulomb_friction", "stribeck_friction", "load_dependent_friction",
+    "quadratic_drag", "constant_force", "bouc_wen_hysteresis", "position_ripple", "position_dependent_damping",
+    "actuator_deadband", "actuator_nonlinearity", "actuator_lag", "backlash", "second_mode", "periodic_disturbance",
 )  # fmt: skip
 
 

@@ -10,8 +10,9 @@ from rhythmid.proof.protocol import Run, draw_moves, draw_tones, from_reference
 
 RATES = (200, 500, 1000)  # [Hz]
 EFFECTS = (
-    "pendulum_gravity", "coulomb_friction", "asymmetric_coulomb_friction", "stribeck_friction", "load_dependent_friction",
-    "quadratic_drag", "position_ripple", "actuator_deadband", "actuator_nonlinearity", "backlash", "second_mode",
+    "pendulum_gravity", "coulomb_friction", "asymmetric_coulomb_friction", "stribeck_friction",
+    "load_dependent_friction", "transmitted_load_friction", "quadratic_drag", "position_ripple",
+    "actuator_deadband", "actuator_nonlinearity", "backlash", "second_mode",
 )  # fmt: skip
 
 

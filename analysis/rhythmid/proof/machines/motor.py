@@ -10,8 +10,9 @@ from rhythmid.proof.protocol import Run, draw_sweep, draw_tones
 
 RATES = (200, 500, 1000)  # [Hz]
 EFFECTS = (
-    "coulomb_friction", "asymmetric_coulomb_friction", "stribeck_friction", "load_dependent_friction", "quadratic_drag",
-    "pendulum_gravity", "actuator_deadband", "actuator_saturation", "actuator_nonlinearity", "actuator_lag", "second_mode",
+    "coulomb_friction", "asymmetric_coulomb_friction", "stribeck_friction", "load_dependent_friction",
+    "quadratic_drag", "pendulum_gravity", "constant_force", "actuator_deadband", "actuator_saturation",
+    "actuator_nonlinearity", "actuator_lag", "second_mode",
 )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from rhythmid.proof.protocol import Run, draw_release, draw_tones
 RATES = (50, 100, 200)  # [Hz]
 EFFECTS = (
     "pendulum_gravity", "coulomb_friction", "quadratic_drag", "position_dependent_damping", "position_ripple",
-    "elastoplastic_hysteresis", "viscoelastic_relaxation",
+    "elastoplastic_hysteresis", "bouc_wen_hysteresis", "viscoelastic_relaxation",
 )  # fmt: skip
 
 

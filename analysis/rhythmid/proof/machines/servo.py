@@ -9,7 +9,7 @@ from rhythmid.proof.protocol import Run, draw_moves, draw_tones, from_reference
 RATES = (50, 100, 200)  # [Hz]
 EFFECTS = (
     "actuator_saturation", "actuator_deadband", "reference_rate_limit", "coulomb_friction", "command_lag",
-    "asymmetric_coulomb_friction", "quadratic_drag", "second_mode",
+    "constant_force", "asymmetric_coulomb_friction", "quadratic_drag", "second_mode",
 )  # fmt: skip
 
 

@@ -9,8 +9,9 @@ from rhythmid.proof.protocol import Run, draw_sweep, draw_tones
 
 RATES = (200, 500, 1000)  # [Hz]
 EFFECTS = (
-    "cubic_stiffness", "quadratic_stiffness", "bilinear_stiffness", "coulomb_friction", "quadratic_damping", "travel_stop",
-    "elastoplastic_hysteresis", "viscoelastic_relaxation", "second_mode", "freeplay", "sensor_lag",
+    "cubic_stiffness", "quadratic_stiffness", "bilinear_stiffness", "coulomb_friction", "quadratic_damping",
+    "travel_stop", "elastoplastic_hysteresis", "bouc_wen_hysteresis", "viscoelastic_relaxation", "second_mode",
+    "freeplay", "sensor_lag",
 )  # fmt: skip
 
 
