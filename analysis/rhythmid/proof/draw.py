@@ -25,11 +25,12 @@ from rhythmid.proof.machines.rig import Design, Rig, log_uniform
 from rhythmid.proof.noise import NOISES, Log, Noise, draw_log, draw_noise
 from rhythmid.proof.nominal import free_attributes, nominal_model, wrong
 from rhythmid.proof.protocol import Run
-from rhythmid.proof.sizes import EQUIVALENT, SIZES, motion_of
+from rhythmid.proof.sizes import EQUIVALENT, SIZES, Motion, motion_of
 
 Kind = Literal["single", "pairs", "null", "left-out"]
 KINDS: tuple[Kind, ...] = ("single", "null", "pairs", "left-out")
 ATTEMPTS = 20
+BEYOND = 1.2  # factor by which an effect may come out beyond the strongest that is asked for
 LACKED = (
     "pendulum_gravity"  # part of a machine, not an effect that is added to it: a nominal model may lack it
 )
@@ -183,35 +184,17 @@ def _draw(
         return None
     motion = motion_of(rig.machine, rig.forcing, rig.runs, plain)
     stick = Yardstick.of(complete, exact, free, noise, design.by_effort, plain)
-    least, most = faintest(stick), MOST_EFFORT / stick.noise if design.by_effort else STRONGEST
-    if least > most:
+    concealed = _conceal(names, rig, stick, motion, catalogue, rng)
+    if concealed is None:
         return None
-    concealed: list[Concealed] = []
-    for name in names:
-        if rig.lacks is not None and name == rig.lacks.name:
-            share = stick.lacking(rig)
-            found = Concealed(rig.lacks, share / stick.noise, share) if share >= stick.least else None
-        else:
-            target = log_uniform(rng, least, most)
-            found = sized_effect(stick, name, SIZES[name](rng, motion), target, least, 1.2 * most)
-        if found is None:
-            return None
-        concealed.append(found)
-    added = [one.effect for one in concealed if one.effect != rig.lacks]
-    for effect in added if len(added) > 1 else ():  # one may hide the other: each must show beside it
-        beside = next(other for other in added if other is not effect)
-        known = exact.with_element(catalogue[beside.name], beside.parameters)
-        if not design.by_effort and stick.ratio(added, known) < FAINTEST:
-            return None
-    clutter: tuple[Concealed, ...] = ()
+    clutter: tuple[Concealed, ...] | None = ()
     if cluttered:
-        main = min((one.share for one in concealed), default=None)
         pool = [name for name in design.effects if name != LACKED and name in catalogue]
-        pool = [name for name in pool if not any(related(catalogue, name, main_name) for main_name in names)]
-        drawn = put_clutter(rng, stick, motion, pool, main)
-        if drawn is None:
-            return None
-        clutter = drawn
+        pool = [name for name in pool if not any(related(catalogue, name, other) for other in names)]
+        clutter = put_clutter(rng, stick, motion, pool, min((one.share for one in concealed), default=None))
+    if clutter is None:
+        return None
+    added = [one.effect for one in concealed if one.effect != rig.lacks]
     every = [*added, *(one.effect for one in clutter)]
     joint = concealed[0].ratio if len(concealed) == 1 and not clutter else stick.joint(rig, every)
     if not math.isfinite(joint):
@@ -221,7 +204,39 @@ def _draw(
     gone = absent_with(catalogue, names[0]) if kind == "left-out" else ()
     used = {term.element.name for term in Model.from_text(nominal, catalogue=catalogue).terms}
     case = Case(
-        label, kind, design.name, cluttered, rig, noise, draw_log(rng, noise) if cluttered else Log(), tuple(concealed),
+        label, kind, design.name, cluttered, rig, noise, draw_log(rng, noise) if cluttered else Log(), concealed,
         clutter, tuple(name for name in gone if name not in used), joint, error, nominal, start_ns,
     )  # fmt: skip
     return case if all(case.observe(run) is not None for run in (*rig.runs, *rig.unseen)) else None
+
+
+def _conceal(
+    names: Sequence[str],
+    rig: Rig,
+    stick: Yardstick,
+    motion: Motion,
+    catalogue: Catalogue,
+    rng: np.random.Generator,
+) -> tuple[Concealed, ...] | None:
+    """The effects to be named, each of a size that shows; None where that cannot be had on this rig."""
+    least, most = faintest(stick), MOST_EFFORT / stick.noise if stick.by_effort else STRONGEST
+    if least > most:
+        return None
+    concealed: list[Concealed] = []
+    for name in names:
+        if rig.lacks is not None and name == rig.lacks.name:
+            share = stick.lacking(rig)
+            found = Concealed(rig.lacks, share / stick.noise, share) if share >= stick.least else None
+        else:
+            target = log_uniform(rng, least, most)
+            found = sized_effect(stick, name, SIZES[name](rng, motion), target, least, BEYOND * most)
+        if found is None:
+            return None
+        concealed.append(found)
+    added = [one.effect for one in concealed if one.effect != rig.lacks]
+    for effect in added if len(added) > 1 and not stick.by_effort else ():  # one may hide the other
+        beside = next(other for other in added if other is not effect)
+        known = stick.exact.with_element(catalogue[beside.name], beside.parameters)
+        if stick.ratio(added, known) < FAINTEST:
+            return None
+    return tuple(concealed)
