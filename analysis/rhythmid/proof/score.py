@@ -198,7 +198,7 @@ def _outcome(
 def by_effort(answer: dict[str, Any]) -> bool:
     """Whether the answer was reached by comparing forces."""
     scoring = answer.get("scoring") or ""
-    return scoring.get("kind") == "effort" if isinstance(scoring, dict) else "force" in scoring
+    return scoring.get("kind") == "effort" if isinstance(scoring, dict) else "balance of forces" in scoring
 
 
 def _heldout(truth: dict[str, Any], answer: dict[str, Any]) -> float | None:
