@@ -160,7 +160,10 @@ def test_a_name_is_stood_by_from_a_probability_of_four_fifths():
 
 def test_an_error_in_units_of_force_is_not_held_against_the_noise_of_the_motion():
     true = truth("coulomb_friction")
-    for scoring in ({"kind": "effort", "bandwidth": 10.0, "reason": ""}, "the balance of forces: the model integrates"):
+    for scoring in (
+        {"kind": "effort", "bandwidth": 10.0, "reason": ""},
+        "the balance of forces: the model integrates",
+    ):
         assert judged(true, answer("missing_physics", "coulomb_friction", scoring=scoring)).heldout is None
     windows = answer("missing_physics", "coulomb_friction", scoring={"kind": "windows"})
     assert judged(true, windows).heldout == pytest.approx(1.05)
