@@ -7,6 +7,7 @@ import pytest
 
 from rhythmid.errors import InputError
 from rhythmid.proof.campaign import SHARES, Campaign, Task, _shares, begin, carry_out
+from rhythmid.proof.machines.designs import DESIGNS
 
 
 def test_a_campaign_of_all_kinds_keeps_their_proportions():
@@ -25,6 +26,23 @@ def test_a_longer_campaign_begins_with_the_cases_of_a_shorter_one():
 def test_no_case_is_drawn_twice():
     tasks = Campaign(1, "all", 100).tasks
     assert len(set(tasks)) == len(tasks)
+
+
+def test_machines_take_turns_and_a_campaign_of_one_machine_has_the_same_cases():
+    turns = Campaign(1, "single", 16).tasks
+    assert [task.design for task in turns] == 2 * list(DESIGNS)
+    alone = Campaign(1, "single", 2, machine="joint").tasks
+    assert alone == [task for task in turns if task.design == "joint"]
+
+
+def test_the_command_of_a_campaign_says_what_it_is():
+    command = Campaign(7, "null", 12, "servo", cluttered=True, budget=30.0).command
+    assert command == "rhythmid proof --kind null --machine servo --cluttered --budget 30 --cases 12 --seed 7"
+
+
+def test_clean_and_cluttered_cases_of_one_number_differ_in_name_and_noise():
+    clean, cluttered = (Campaign(1, "null", 1, cluttered=wanted).tasks[0] for wanted in (False, True))
+    assert clean.name != cluttered.name and clean.stream != cluttered.stream
 
 
 def test_a_campaign_is_not_begun_over_another(tmp_path: Path):

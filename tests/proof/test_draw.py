@@ -9,19 +9,20 @@ import pytest
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model
-from rhythmid.proof.draw import (
+from rhythmid.proof.concealment import (
     FAINTEST,
-    LONGEST_DELAY,
-    NOISES,
+    LEAST_EFFORT,
+    LEAST_MOTION,
+    MOST_EFFORT,
+    NULL_CLUTTER_MOST,
     STRONGEST,
-    absent_with,
-    candidates,
-    draw_case,
-    draw_noise,
-    related,
 )
-from rhythmid.proof.equations import EQUATIONS
+from rhythmid.proof.draw import LACKED, absent_with, candidates, draw_case, related
+from rhythmid.proof.equations import EQUATIONS, FOREIGN
 from rhythmid.proof.machine import TIMING
+from rhythmid.proof.machines.designs import DESIGNS
+from rhythmid.proof.machines.hopper import LONGEST_DELAY
+from rhythmid.proof.noise import NOISES, Log, draw_log, draw_noise
 from rhythmid.proof.seal import seal, truth_of, unseal
 from rhythmid.proof.sizes import SIZES
 from rhythmid.proof.sizing import strength_for
@@ -37,14 +38,17 @@ def case(catalogue):
     return draw_case(3, "single", 0, catalogue)
 
 
-def test_every_candidate_of_the_catalogue_can_be_concealed(catalogue):
-    # a spring or a pendulum's gravity can only be missing from another kind of machine than the one drawn here
-    elsewhere = {
-        name for name, e in catalogue.items() if e.rotational or e.controlled or e.displaced_base
-    } | {"linear_spring"}
-    expected = {name for name, e in catalogue.items() if e.candidate} - elsewhere
-    assert expected <= set(SIZES)
+def test_every_candidate_of_the_catalogue_can_be_concealed_in_some_machine(catalogue):
+    # a spring can only be missing from a machine that nobody would take for one without
+    expected = {name for name, e in catalogue.items() if e.candidate} - {"linear_spring"}
+    concealable = {name for design in DESIGNS.values() for name in design.effects}
+    assert expected <= concealable
+    assert concealable <= set(SIZES) | {LACKED}
     assert set(SIZES) == set(EQUATIONS) | set(TIMING)
+
+
+def test_what_is_outside_the_catalogue_is(catalogue):
+    assert set(FOREIGN) <= set(EQUATIONS) and not set(FOREIGN) & set(catalogue)
 
 
 def test_concealed_parameters_bear_the_catalogues_names(catalogue):
@@ -53,31 +57,29 @@ def test_concealed_parameters_bear_the_catalogues_names(catalogue):
             assert set(equation.parameters) <= {p.name for p in catalogue[name].parameters}
 
 
-def test_the_same_seed_draws_the_same_case(case, catalogue):
-    assert draw_case(3, "single", 0, catalogue) == case
-
-
-def test_another_seed_draws_another_case(case, catalogue):
-    assert draw_case(4, "single", 0, catalogue) != case
+def test_another_seed_draws_another_case(catalogue):
+    first, second = (draw_case(seed, "single", 0, catalogue, "axis") for seed in (3, 4))
+    assert first != second
 
 
 def test_a_case_stays_within_what_is_promised(case, catalogue):
     assert FAINTEST <= case.ratio <= 1.2 * STRONGEST
-    assert 3 <= len(case.runs) <= 6
-    assert all(10.0 <= run.duration <= 30.0 for run in case.runs)
-    assert 0.0 <= case.input_delay <= LONGEST_DELAY["input"]
-    assert 0.0 <= case.measurement_delay <= LONGEST_DELAY["measurement"]
-    assert 0.5 <= case.machine.mass <= 3.0 and 50.0 <= case.machine.stiffness <= 800.0
+    assert 3 <= len(case.rig.runs) <= 6
+    assert all(10.0 <= run.duration <= 30.0 for run in case.rig.runs)
+    assert 0.0 <= case.rig.input_delay <= LONGEST_DELAY["input"]
+    assert 0.0 <= case.rig.measurement_delay <= LONGEST_DELAY["measurement"]
+    assert 0.5 <= case.rig.machine.mass <= 3.0 and 50.0 <= case.rig.machine.stiffness <= 800.0
+    assert case.concealed[0].share >= LEAST_MOTION
     assert 0.02 <= case.nominal_error <= 0.5
     believed = Model.from_text(case.nominal, catalogue=catalogue)
-    assert believed.value("inertia.mass") == case.machine.mass
-    assert believed.value("linear_spring.stiffness") != case.machine.stiffness
+    assert believed.value("inertia.mass") == case.rig.machine.mass
+    assert believed.value("linear_spring.stiffness") != case.rig.machine.stiffness
     assert not {term.element.name for term in believed.terms} & {effect.name for effect in case.effects}
 
 
 def test_effects_take_turns_so_that_each_is_concealed_equally_often(catalogue, monkeypatch):
     monkeypatch.setattr("rhythmid.proof.draw._draw", lambda label, kind, names, *_: names)
-    classes = candidates(catalogue)
+    classes = candidates(catalogue, DESIGNS["hopper"])
     names: list[Any] = [draw_case(5, "single", i, catalogue) for i in range(2 * len(classes))]
     drawn = Counter(name for (name,) in names)
     assert all(sum(drawn[name] for name in group) == 2 for group in classes)
@@ -95,6 +97,69 @@ def test_what_contains_or_equals_an_effect_leaves_the_catalogue_with_it(catalogu
     assert {"coulomb_friction", "stribeck_friction"} <= set(absent_with(catalogue, "coulomb_friction"))
     assert set(absent_with(catalogue, "clock_skew")) == {"clock_skew", "delay_drift"}
     assert "coulomb_friction" not in absent_with(catalogue, "stribeck_friction")
+
+
+@pytest.mark.parametrize("design", ["axis", "joint", "decay", "motor"])
+def test_the_same_seed_draws_the_same_case(design, catalogue):
+    assert draw_case(6, "single", 0, catalogue, design) == draw_case(6, "single", 0, catalogue, design)
+
+
+@pytest.mark.parametrize("design", [name for name in DESIGNS if name != "hopper"])
+def test_every_machine_draws_a_case_of_practical_size(design, catalogue):
+    case = draw_case(5, "single", 2, catalogue, design)
+    (one,) = case.concealed
+    if DESIGNS[design].by_effort:
+        assert one.effect.name == LACKED or LEAST_EFFORT <= one.share <= 1.2 * MOST_EFFORT
+    else:
+        assert one.effect.name == LACKED or (LEAST_MOTION <= one.share and one.ratio <= 1.2 * STRONGEST)
+    assert one.ratio >= FAINTEST and not case.clutter and case.log == Log()
+    believed = Model.from_text(case.nominal, catalogue=catalogue)
+    assert one.effect.name not in {term.element.name for term in believed.terms}
+    assert set(believed.free) - {"pendulum_gravity.reference"} <= set(case.true_parameters)
+    assert 50 <= case.rig.runs[0].rate <= 2000
+
+
+@pytest.mark.parametrize("design", ["axis", "decay"])
+def test_clutter_is_three_small_effects_some_of_them_outside_the_catalogue(design, catalogue):
+    case = draw_case(5, "single", 0, catalogue, design, cluttered=True)
+    names = [one.effect.name for one in case.clutter]
+    assert len(set(names)) == 3 and 1 <= len(set(names) & set(FOREIGN)) <= 2
+    main = case.concealed[0].share
+    assert all(0.0025 * main <= one.share <= 0.2 * main for one in case.clutter)
+    ordinary = [name for name in names if name not in FOREIGN]
+    assert not any(related(catalogue, name, case.concealed[0].effect.name) for name in ordinary)
+    assert case.log.jitter > 0.0 and case.log.outliers > 0.0 and case.noise.kind == "coloured"
+
+
+def test_clutter_without_a_main_effect_is_of_no_practical_size(catalogue):
+    case = draw_case(5, "null", 0, catalogue, "motor", cluttered=True)
+    assert len(case.clutter) == 3 and not case.concealed
+    assert case.ratio * max(one.share / one.ratio for one in case.clutter) <= NULL_CLUTTER_MOST
+
+
+def test_gravity_that_a_nominal_model_lacks_is_part_of_the_machine(catalogue):
+    names = [group[0] for group in candidates(catalogue, DESIGNS["pendulum"])]
+    cases = (draw_case(6, "single", index, catalogue, "pendulum") for index in range(len(names)))
+    case = next(case for case in cases if case.effects[0].name == LACKED)
+    assert case.effects[0].parameters["moment"] == case.rig.machine.moment > 0.0
+    believed = Model.from_text(case.nominal, catalogue=catalogue)
+    assert believed.value("linear_spring.stiffness") == pytest.approx(case.rig.machine.moment, rel=0.51)
+    assert case.true_parameters["linear_spring.stiffness"] == 0.0
+
+
+def test_an_untidy_log_jitters_rounds_and_has_rare_outliers():
+    rng = np.random.default_rng(2)
+    noise = draw_noise(rng, 1.0, "coloured")
+    log = draw_log(rng, noise)
+    clean, stamps = np.sin(np.arange(100_000) / 50.0), np.arange(100_000) / 1000.0
+    written, stamped = log.written(clean, rng), log.stamped(stamps, 1e-3, rng)
+    assert np.allclose(written / log.step, np.round(written / log.step))
+    off = np.abs(written - clean) > log.step
+    assert off.mean() == pytest.approx(log.outliers, rel=0.5)
+    assert np.std(stamped - stamps) == pytest.approx(log.jitter * 1e-3, rel=0.05)
+    assert (np.diff(stamped) > 0.0).all()
+    tidy = Log()
+    assert tidy.written(clean, rng) is clean and tidy.stamped(stamps, 1e-3, rng) is stamps
 
 
 @pytest.mark.parametrize("kind", NOISES)

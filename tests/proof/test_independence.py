@@ -10,8 +10,9 @@ import pytest
 import rhythmid.proof
 
 FOLDER = Path(rhythmid.proof.__file__).parent
-TRUTH = ("equations.py", "machine.py", "protocol.py", "sizes.py")
-OWN = {"rhythmid.proof.equations", "rhythmid.proof.machine", "rhythmid.proof.protocol"}
+MACHINES = tuple(f"machines/{path.name}" for path in sorted((FOLDER / "machines").glob("*.py")))
+TRUTH = ("equations.py", "integrator.py", "machine.py", "protocol.py", "sizes.py", "noise.py", *MACHINES)
+OWN = {f"rhythmid.proof.{name[:-3].replace('/', '.')}" for name in TRUTH} | {"rhythmid.proof.machines"}
 
 
 def _imported(path: Path) -> set[str]:
@@ -44,11 +45,12 @@ def test_running_the_concealed_machine_loads_no_element_no_simulator_and_no_mode
         "rhythmid",
         "rhythmid.proof",
         "rhythmid.proof.equations",
+        "rhythmid.proof.integrator",
         "rhythmid.proof.machine",
     }
 
 
-def test_diagnosis_reads_the_bags_and_the_nominal_model_and_knows_no_seal():
+def test_diagnosis_reads_the_records_and_the_nominal_model_and_knows_no_seal():
     imported = _imported(FOLDER / "examine.py")
     assert not imported & {
         "rhythmid.proof.seal",

@@ -12,6 +12,8 @@ from rhythmid.proof.machine import (
     Effect,
     Forcing,
     Machine,
+    _memory,
+    constants,
     held_command,
     observe,
     stamp,
@@ -25,7 +27,7 @@ FORCING = Forcing(1.0, 1.0, 0.3)
 QUIET = Forcing(0.0, 1.0, 0.0)
 TIME = np.arange(3000) / 1000.0
 BEFORE = 0.1  # [s] instead of the usual warm-up
-NEED_MORE_MOTION = ("ground_contact_loss", "freeplay", "end_stop_contact")
+NEED_MORE_MOTION = ("ground_contact_loss", "freeplay", "end_stop_contact", "travel_stop")
 
 
 def _motion():
@@ -45,8 +47,9 @@ def _by_scipy(effect: Effect, command: np.ndarray, samples: int) -> np.ndarray:
     """The same equations, called as plain Python and integrated from one jump of the command to the next by scipy."""
     one = EQUATIONS[effect.name]
     p = np.array([effect.parameters[name] for name in one.parameters])
-    m = np.array([1.0, 200.0, 2.0, 0.2, 9.81, 1.0, 1.0, 0.3])
-    held = np.zeros(one.held)
+    m = constants(MACHINE, FORCING)
+    rest = 0.2 - 9.81 / 200.0
+    held = _memory(MACHINE, [effect], rest, -BEFORE)
 
     def walk(t, z, u, accepted=False):
         x, v, s, ds = z[0], z[1], z[2:], np.zeros(len(z) - 2)
@@ -63,7 +66,6 @@ def _by_scipy(effect: Effect, command: np.ndarray, samples: int) -> np.ndarray:
         measured = at("sensor", x)
         return np.array([v, total, *ds]), measured
 
-    rest = 0.2 - 9.81 / 200.0
     z = np.array([rest, 0.0, *(share * rest for share in one.states)])
     out = []
     grid = np.arange(-round(BEFORE * 1000), samples + 1) / 1000
@@ -83,7 +85,7 @@ def _by_scipy(effect: Effect, command: np.ndarray, samples: int) -> np.ndarray:
 def test_every_concealed_effect_agrees_with_scipy_on_the_same_equations(name, motion, monkeypatch):
     monkeypatch.setattr("rhythmid.proof.machine.WARM_UP", BEFORE)
     parameters = SIZES[name](np.random.default_rng(3), motion)(0.6)
-    parameters |= {"time": 0.1} if name == "stiffness_jump" else {}
+    parameters |= {"stiffness_jump": {"time": 0.1}, "reference_rate_limit": {"rate": 20.0}}.get(name, {})
     effect = Effect(name, parameters)
     command = motion.effort * np.sin(2 * np.pi * 4.0 * TIME)
     expected = _by_scipy(effect, command, 300)

@@ -6,28 +6,36 @@ from dataclasses import replace
 import pytest
 
 from rhythmid.elements.catalogue import load_catalogue
-from rhythmid.proof.card import Rate, confusion, coverage, markdown, rate, summary
+from rhythmid.proof.card import confusion, coverage, markdown, summary
+from rhythmid.proof.rate import Rate, rate
+from rhythmid.proof.reliability import EDGES, reliability
 from rhythmid.proof.score import Estimated, score
 
 CATALOGUE = load_catalogue()
 
 
-def truth(*names: str, ratio: float = 1.0, **more) -> dict:
+def truth(*names: str, ratio: float = 1.0, clutter: tuple[str, ...] = (), **more) -> dict:
     concealed = [{"effect": {"name": name, "parameters": {"force": 0.1}}, "ratio": ratio} for name in names]
+    small = [
+        {"effect": {"name": name, "parameters": {"force": 0.01}}, "ratio": 0.05 * ratio} for name in clutter
+    ]
     return {
         "name": "single-0000", "kind": "single", "concealed": concealed, "ratio": ratio, "noise": {"kind": "white"},
-        "nominal_error": 0.1, "floors": {"5": 0.01}, "absent": [], "input_delay": 0.02, "measurement_delay": 0.03,
-        "machine": {"stiffness": 200.0, "rest_length": 0.2, "damping": 2.0},
+        "nominal_error": 0.1, "floors": {"5": 0.01}, "absent": [],
+        "parameters": {"linear_spring.stiffness": 200.0, "input_delay.delay": 0.02}, "design": "hopper",
+        "cluttered": bool(clutter), "clutter": small,
     } | more  # fmt: skip
 
 
 def answer(
-    verdict: str, *names: str, families=(), value: float = 0.1, std: float = 0.01, heldout: float = 0.0105
-) -> dict:
+    verdict: str, *names: str, families=(), value: float = 0.1, std: float = 0.01, heldout: float = 0.0105,
+    probability: float = 0.9, scoring="free run",
+) -> dict:  # fmt: skip
     missing = [
         {
             "element": name,
             "slot": CATALOGUE[name].slot,
+            "probability": probability,
             "parameters": {"force": {"value": value, "std": std, "unit": "N"}},
         }
         for name in names
@@ -36,7 +44,7 @@ def answer(
         "verdict": verdict, "missing": missing, "indistinguishable": [list(group) for group in families], "block": 5,
         "location": {"slot": missing[0]["slot"] if missing else None}, "fit": {"augmented": {"heldout_nrmse": heldout}},
         "parameters": {"linear_spring.stiffness": {"value": 201.0, "std": 1.0, "unit": "N/m"}},
-        "seconds": 10.0, "processor_seconds": 15.0,
+        "seconds": 10.0, "processor_seconds": 15.0, "scoring": scoring,
     }  # fmt: skip
 
 
@@ -120,6 +128,72 @@ def test_only_parameters_of_an_exact_name_are_held_against_their_intervals():
     assert coverage(one.effects).hits == 0
     assert coverage(one.machine).hits == 1
     assert judged(truth("coulomb_friction"), answer("missing_physics", "backlash")).effects == ()
+
+
+def test_clutter_that_is_named_beside_the_concealed_effect_is_no_fault():
+    true = truth("coulomb_friction", clutter=("quadratic_drag", "magnet"))
+    assert judged(true, answer("missing_physics", "coulomb_friction")).outcome == "exact"
+    both = judged(true, answer("missing_physics", "coulomb_friction", "quadratic_drag"))
+    assert both.outcome == "exact" and not both.stated_wrong
+    stranger = judged(true, answer("missing_physics", "coulomb_friction", "backlash"))
+    assert stranger.outcome == "wrong" and stranger.stated_wrong == ("backlash",)
+    assert judged(true, answer("missing_physics", "quadratic_drag")).outcome == "wrong"
+
+
+def test_the_dominant_effect_is_the_one_with_the_largest_share():
+    true = truth("coulomb_friction", clutter=("quadratic_drag",))
+    said = answer("missing_physics", "quadratic_drag", "coulomb_friction")
+    assert not judged(true, said).dominant_first
+    said["missing"][0]["share"], said["missing"][1]["share"] = 0.05, 0.9
+    assert judged(true, said).dominant_first
+    assert not judged(true, answer("unknown_physics")).dominant_first
+
+
+def test_a_name_is_stood_by_from_a_probability_of_four_fifths():
+    hesitant = judged(truth("backlash"), answer("missing_physics", "coulomb_friction", probability=0.79))
+    assert hesitant.outcome == "wrong" and hesitant.stated_wrong == ()
+    sure = judged(truth("backlash"), answer("missing_physics", "coulomb_friction", probability=0.8))
+    assert sure.stated_wrong == ("coulomb_friction",)
+    declared = answer("missing_physics", "delay_drift", families=[("delay_drift", "clock_skew")])
+    assert judged(truth("clock_skew"), declared).stated_wrong == ()
+
+
+def test_an_error_in_units_of_force_is_not_held_against_the_noise_of_the_motion():
+    true = truth("coulomb_friction")
+    for scoring in (
+        {"kind": "effort", "bandwidth": 10.0, "reason": ""},
+        "the balance of forces: the model integrates",
+    ):
+        assert judged(true, answer("missing_physics", "coulomb_friction", scoring=scoring)).heldout is None
+    windows = answer("missing_physics", "coulomb_friction", scoring={"kind": "windows"})
+    assert judged(true, windows).heldout == pytest.approx(1.05)
+
+
+def test_the_reliability_diagram_counts_every_stated_name_in_its_bin():
+    right = [
+        judged(truth("backlash"), answer("missing_physics", "backlash", probability=p))
+        for p in (0.6, 0.9, 1.0)
+    ]
+    wrong = [judged(truth("backlash"), answer("undecided", "sensor_lag", probability=p)) for p in (0.3, 0.9)]
+    bins = {row["from"]: row for row in reliability([*right, *wrong])}
+    assert [bins[edge]["right"]["of"] for edge in EDGES[:-1]] == [1, 1, 0, 2, 1]
+    assert bins[0.85]["right"]["hits"] == 1 and bins[0.85]["stated"] == pytest.approx(0.9)
+    assert bins[0.85]["inside"] and bins[0.7]["inside"] is None
+    assert "| 0.85–0.95 | 0.90 | 1/2" in markdown([*right, *wrong], "")
+
+
+def test_the_card_counts_clean_and_cluttered_cases_apart_and_by_machine():
+    clean = judged(truth("backlash"), answer("missing_physics", "backlash"))
+    cluttered = judged(
+        truth("backlash", clutter=("magnet",), design="axis"), answer("missing_physics", "sensor_lag")
+    )
+    joint = replace(cluttered, design="joint", outcome="exact")
+    card = summary([clean, cluttered, joint])
+    assert card["single"]["cases"] == 1 and card["single, cluttered"]["cases"] == 2
+    assert card["single, cluttered"]["by_machine"]["axis"]["right"]["hits"] == 0
+    assert card["single, cluttered"]["by_machine"]["joint"]["right"]["hits"] == 1
+    assert card["single, cluttered"]["rates"]["stated with p ≥ 0.8 and wrong"]["hits"] == 2
+    assert "| joint | 1/1" in markdown([clean, cluttered, joint], "")
 
 
 def test_the_interval_of_a_rate_is_wilsons():

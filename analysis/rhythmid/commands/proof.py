@@ -18,6 +18,7 @@ from rich.progress import (
 from rhythmid.errors import InputError
 
 Kinds = Literal["single", "pairs", "null", "left-out", "all"]
+Machines = Literal["hopper", "axis", "joint", "pendulum", "shaken", "servo", "decay", "motor", "all"]
 
 
 def proof(
@@ -25,25 +26,44 @@ def proof(
     cases: Annotated[int, typer.Option("--cases", min=1, help="Number of cases.")] = 24,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all that is drawn.")] = 0,
     kind: Annotated[Kinds, typer.Option("--kind", help="What is concealed.")] = "all",
+    machine: Annotated[
+        Machines, typer.Option("--machine", help="In which machine; all take turns by default.")
+    ] = "all",
+    cluttered: Annotated[
+        bool, typer.Option("--cluttered", help="With three small effects beside, and untidy logs.")
+    ] = False,
+    budget: Annotated[
+        float, typer.Option("--budget", min=0.0, help="Seconds that each diagnosis may search; 0: no bound.")
+    ] = 0.0,
     jobs: Annotated[
         int, typer.Option("--jobs", min=1, help="Cases at a time; they share the processors evenly.")
     ] = 2,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a campaign.")] = False,
+    again: Annotated[
+        bool, typer.Option("--replay", help="Score the answers in --out once more, without simulating.")
+    ] = False,
     only: Annotated[list[str] | None, typer.Option("--only", help="Only this case; may be repeated.")] = None,
-    keep: Annotated[bool, typer.Option("--keep-bags", help="Keep the bags of cases that are done.")] = False,
+    keep: Annotated[
+        bool, typer.Option("--keep-bags", help="Keep the records of cases that are done.")
+    ] = False,
 ) -> None:
-    """Draw machines with concealed effects, seal the truth, diagnose from bags, open the seals and score."""
-    from rhythmid.proof.campaign import Campaign, Sealed, begin, carry_out, scores_in, write_card
+    """Draw machines with concealed effects, seal the truth, diagnose from their records, open the seals and score."""
+    from rhythmid.proof.campaign import Campaign, Sealed, Task, begin, carry_out, scores_in, write_card
 
-    campaign = Campaign(seed, kind, cases)
-    tasks = campaign.tasks
-    if only:
-        unknown = sorted(set(only) - {task.name for task in tasks})
+    def chosen(campaign: Campaign) -> list[Task]:
+        tasks = campaign.tasks
+        unknown = sorted(set(only or ()) - {task.name for task in tasks})
         if unknown:
             raise InputError(f"--only {unknown[0]}: is none of the cases {tasks[0].name} … {tasks[-1].name}")
-        tasks = [task for task in tasks if task.name in only]
-    begin(out, campaign, resume)
+        return [task for task in tasks if not only or task.name in only]
+
     console = Console()
+    if again:
+        _replay(out, console, chosen)
+        return
+    campaign = Campaign(seed, kind, cases, machine, cluttered, budget)
+    tasks = chosen(campaign)
+    begin(out, campaign, resume)
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -75,3 +95,15 @@ def proof(
     console.print(f"{out / 'proof.md'}, {out / 'proof.json'}")
     if failures:
         raise typer.Exit(1)
+
+
+def _replay(out: Path, console: Console, chosen) -> None:
+    """Score kept answers of the campaign that the folder holds."""
+    from rhythmid.proof.campaign import read_campaign
+    from rhythmid.proof.replay import replay_campaign
+
+    campaign = read_campaign(out)
+    scores, anew = replay_campaign(out, campaign, chosen(campaign))
+    console.print(Markdown((out / "replay.md").read_text(encoding="utf-8")))
+    console.print(f"{len(scores)} answers scored, {anew} of them decided anew from their evidence")
+    console.print(f"{out / 'replay.md'}, {out / 'replay.json'}")

@@ -8,6 +8,7 @@ it is.
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
@@ -17,10 +18,12 @@ from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.baseline import causal
 from rhythmid.diagnose.case import Budget, Case
 from rhythmid.diagnose.free_run import FreeRunResult, free_run
+from rhythmid.diagnose.replay import ledger
 from rhythmid.diagnose.scoring import settle
 from rhythmid.diagnose.unit_check import check_units
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.declared import with_declared
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.parallel import cores
@@ -35,6 +38,15 @@ class Answer:
     diagnosis: Diagnosis
     model: Model
     result: FreeRunResult
+
+    @property
+    def block(self) -> int:
+        """Samples that were averaged before they were compared."""
+        return self.result.series[0].block
+
+    def ledger(self) -> dict[str, Any]:
+        """All that the decision depends on, as plain data; see `replay`."""
+        return ledger(self.result.contest, self.result.detectable)
 
 
 def diagnose(
@@ -61,6 +73,7 @@ def diagnose(
     """
     if not records:
         raise InputError("no record is given; name at least one bag or table")
+    model = with_declared(model, (*records, *holdout))
     given = admitted(records, holdout, model)
     count = len(records)
     # the matrices are tall and thin, and workers run side by side: threads inside linear algebra only get in the way

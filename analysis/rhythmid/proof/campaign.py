@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,27 +19,38 @@ from rhythmid.output import write_json, write_text
 from rhythmid.proof.card import markdown, summary
 from rhythmid.proof.draw import KINDS, Kind, draw_case
 from rhythmid.proof.examine import examine
+from rhythmid.proof.machines.designs import DESIGNS
 from rhythmid.proof.perform import perform
-from rhythmid.proof.score import Estimated, Score, score
+from rhythmid.proof.score import Estimated, Score, Stated, score
 from rhythmid.proof.seal import seal, truth_of, unseal
 
 SHARES: dict[Kind, int] = {"single": 3, "null": 3, "pairs": 1, "left-out": 1}  # of a campaign of all kinds
 LIFETIME = 40  # cases that a worker process does before a fresh one takes its place
+ALL = "all"  # machines
 SEALED, CASES = "sealed", "cases"
 Report = Callable[["Sealed | Score"], None]
 
 
 @dataclass(frozen=True)
 class Task:
-    """One case to be done."""
+    """One case to be done; `budget` [s] bounds its diagnosis, 0 stands for none."""
 
     seed: int
     kind: Kind
     index: int
+    design: str = "hopper"
+    cluttered: bool = False
+    budget: float = 0.0
 
     @property
     def name(self) -> str:
-        return f"{self.kind}-{self.index:04d}"
+        return f"{self.kind}{'-cluttered' if self.cluttered else ''}-{self.design}-{self.index:04d}"
+
+    @property
+    def stream(self) -> list[int]:
+        """Seeds of the noise: no two cases have the same."""
+        apart = [list(DESIGNS).index(self.design), int(self.cluttered)]
+        return [self.seed, KINDS.index(self.kind), self.index, 1_000_000, *(apart if any(apart) else [])]
 
 
 @dataclass(frozen=True)
@@ -52,39 +63,51 @@ class Sealed:
 
 @dataclass(frozen=True)
 class Campaign:
-    """What is to be proved: `cases` cases of a kind, or of all kinds in the proportions of `SHARES`."""
+    """What is to be proved: `cases` cases of a kind, or of all kinds in the proportions of `SHARES`; on one machine, or on all
+    in turns; with clutter or clean."""
 
     seed: int
     kind: str
     cases: int
+    machine: str = ALL
+    cluttered: bool = False
+    budget: float = 0.0
 
     @property
     def tasks(self) -> list[Task]:
-        if self.kind != "all":
-            only: list[Kind] = [kind for kind in KINDS if kind in (self.kind,)]
-            return [Task(self.seed, only[0], index) for index in range(self.cases)]
         whole = sum(SHARES.values())
         order: list[Kind] = [kind for kind in KINDS for _ in range(SHARES[kind])]
+        machines = list(DESIGNS) if self.machine == ALL else [self.machine]
         found: list[Task] = []
         counts: dict[Kind, int] = dict.fromkeys(KINDS, 0)
         for number in range(self.cases):
-            kind = order[(number * 3) % whole]  # 3 and the sum of the shares have no common divisor
-            found.append(Task(self.seed, kind, counts[kind]))
+            # 3 and the sum of the shares have no common divisor
+            drawn: list[Kind] = [one for one in KINDS if one == self.kind] or [order[(number * 3) % whole]]
+            kind = drawn[0]
+            index, machine = divmod(counts[kind], len(machines))
+            found.append(Task(self.seed, kind, index, machines[machine], self.cluttered, self.budget))
             counts[kind] += 1
         return found
 
     @property
     def command(self) -> str:
-        return f"rhythmid proof --kind {self.kind} --cases {self.cases} --seed {self.seed}"
+        more = "".join(
+            [
+                f" --machine {self.machine}" if self.machine != ALL else "",
+                " --cluttered" if self.cluttered else "",
+                f" --budget {self.budget:g}" if self.budget else "",
+            ]
+        )
+        return f"rhythmid proof --kind {self.kind}{more} --cases {self.cases} --seed {self.seed}"
 
 
 def _prepare(task: Task, out: Path) -> Sealed:
-    """Draw a case, write its bags and seal the truth."""
-    case = draw_case(task.seed, task.kind, task.index)
+    """Draw a case, write its records and seal the truth."""
+    case = draw_case(task.seed, task.kind, task.index, design=task.design, cluttered=task.cluttered)
     folder = out / CASES / task.name
     if folder.exists():
         shutil.rmtree(folder)
-    floors = perform(case, folder, [task.seed, KINDS.index(task.kind), task.index, 1_000_000])
+    floors = perform(case, folder, task.stream)
     told = seal(out / SEALED / f"{task.name}.json", truth_of(case, floors))
     return Sealed(task.name, told)
 
@@ -92,7 +115,7 @@ def _prepare(task: Task, out: Path) -> Sealed:
 def _diagnose(task: Task, out: Path, absent: Sequence[str]) -> None:
     """Diagnose from the case's folder; `absent` are the elements that the catalogue is robbed of."""
     folder = out / CASES / task.name
-    answer = examine(folder, load_catalogue().without(*absent))
+    answer = examine(folder, load_catalogue().without(*absent), task.budget or None)
     write_json(folder / "answer.json", answer)
 
 
@@ -121,7 +144,8 @@ def read_score(path: Path) -> Score:
     data = json.loads(path.read_text(encoding="utf-8"))
     for name in ("effects", "machine"):
         data[name] = tuple(Estimated(**one) for one in data[name])
-    for name in ("true", "named", "absent"):
+    data["stated"] = tuple(Stated(**one) for one in data["stated"])
+    for name in ("true", "clutter", "named", "absent"):
         data[name] = tuple(data[name])
     data["families"] = tuple(tuple(group) for group in data["families"])
     return Score(**data)
@@ -182,18 +206,28 @@ def _steps(task: Task, out: Path, keep: bool, worker: _Worker, report: Report) -
     report(scored.result())
 
 
+def read_campaign(out: Path) -> Campaign:
+    """The campaign that a folder holds. Raises InputError when it holds none."""
+    about = out / "campaign.json"
+    if not about.exists():
+        raise InputError(f"{out}: holds no campaign")
+    try:
+        return Campaign(**json.loads(about.read_text(encoding="utf-8")))
+    except (TypeError, ValueError):
+        raise InputError(f"{about}: is not the description of a campaign") from None
+
+
 def begin(out: Path, campaign: Campaign, resume: bool) -> None:
     """Prepare the folder. Raises InputError when it holds another campaign, or this one without `resume`."""
     about = out / "campaign.json"
     if about.exists():
-        known = json.loads(about.read_text(encoding="utf-8"))
         if not resume:
             raise InputError(
                 f"{out}: holds a campaign already; continue it with --resume, or choose another folder"
             )
-        if (known["seed"], known["kind"]) != (campaign.seed, campaign.kind):
+        if replace(read_campaign(out), cases=campaign.cases) != campaign:
             raise InputError(
-                f"{out}: holds the campaign --kind {known['kind']} --seed {known['seed']}; only --cases may change"
+                f"{out}: holds the campaign {read_campaign(out).command}; only --cases may change"
             )
     elif out.exists() and any(out.iterdir()):
         raise InputError(f"{out}: is not empty and holds no campaign; choose another folder")

@@ -3,51 +3,16 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from rhythmid.proof.score import Estimated, Score
+from rhythmid.proof.rate import NORMAL_95, Rate, rate
+from rhythmid.proof.reliability import reliability, reliability_lines
+from rhythmid.proof.score import SURE, Estimated, Score
 
 BINS = ((0.3, 1.0), (1.0, 3.0), (3.0, math.inf))
-NORMAL_95 = 1.959964
-
-
-@dataclass(frozen=True)
-class Rate:
-    """So many of so many, with the 95 % interval of E. B. Wilson (J. Am. Stat. Assoc. 22 (1927) 209)."""
-
-    hits: int
-    of: int
-
-    @property
-    def share(self) -> float:
-        return self.hits / self.of if self.of else math.nan
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        if not self.of:
-            return 0.0, 1.0
-        z2, n, p = NORMAL_95**2, self.of, self.share
-        centre = (p + z2 / (2 * n)) / (1 + z2 / n)
-        half = NORMAL_95 / (1 + z2 / n) * math.sqrt(p * (1 - p) / n + z2 / (4 * n * n))
-        return max(0.0, centre - half), min(1.0, centre + half)
-
-    def __str__(self) -> str:
-        if not self.of:
-            return "–"
-        low, high = self.interval
-        return f"{self.hits}/{self.of} = {100 * self.share:.1f} % ({100 * low:.1f}–{100 * high:.1f})"
-
-    def to_dict(self) -> dict[str, Any]:
-        low, high = self.interval
-        return {"hits": self.hits, "of": self.of, "share": self.share, "interval": [low, high]}
-
-
-def rate(scores: Sequence[Score], holds: Callable[[Score], bool]) -> Rate:
-    """How many of the scores something holds for."""
-    return Rate(sum(map(holds, scores)), len(scores))
 
 
 def coverage(estimates: Sequence[Estimated]) -> Rate:
@@ -71,30 +36,51 @@ def confusion(scores: Sequence[Score]) -> dict[str, Counter[str]]:
 
 
 def _rates(kind: str, scores: Sequence[Score]) -> dict[str, Rate]:
+    """The rates of a kind of case, by what they are rates of."""
+    sure = {f"stated with p ≥ {SURE} and wrong": rate(scores, lambda s: bool(s.stated_wrong))}
     if kind == "null":
-        found = {"false alarms": rate(scores, lambda s: s.false_alarm)}
+        found = {
+            "something named": rate(scores, lambda s: s.verdict == "missing_physics"),
+            "false alarms": rate(scores, lambda s: s.false_alarm),
+        }
         for noise in ("white", "coloured", "quantised"):
             some = [s for s in scores if s.noise == noise]
             found[f"false alarms, {noise} noise"] = rate(some, lambda s: s.false_alarm)
         wrong = [s for s in scores if s.nominal_error > 0.25]
         found["false alarms, nominal model more than 25 % wrong"] = rate(wrong, lambda s: s.false_alarm)
         found["undecided"] = rate(scores, lambda s: s.outcome == "undecided")
-        return found
+        return found | sure
     if kind == "left-out":
         return {
             "unknown, undecided or a declared family": rate(scores, lambda s: s.honest),
             "of these unknown": rate(scores, lambda s: s.outcome == "unknown"),
             "a confident wrong name": rate(scores, lambda s: s.outcome == "wrong" and not s.families),
-        }
+        } | sure
     found = {
         "exact name" if kind == "single" else "exact names": rate(scores, lambda s: s.outcome == "exact"),
         "exact, or in a declared family of two": rate(scores, lambda s: s.right_within_family),
+        "dominant effect first": rate(scores, lambda s: s.dominant_first),
         "slot": rate(scores, lambda s: s.slot_right),
-    }
+    } | sure
     held = [s for s in scores if s.right_within_family and s.heldout is not None]
     found["held-out error within 1.1 of the noise floor"] = rate(
         held, lambda s: (s.heldout or math.inf) <= 1.1
     )
+    return found
+
+
+def _machines(kind: str, scores: Sequence[Score]) -> dict[str, dict[str, Rate]]:
+    """The main rates of a kind by machine."""
+    right: dict[str, Callable[[Score], bool]] = {
+        "null": lambda s: s.outcome == "consistent", "left-out": lambda s: s.honest,
+    }  # fmt: skip
+    found: dict[str, dict[str, Rate]] = {}
+    for name in dict.fromkeys(one.design for one in scores):
+        some = [one for one in scores if one.design == name]
+        found[name] = {"right": rate(some, right.get(kind, lambda s: s.right_within_family))}
+        if kind in ("single", "pairs"):
+            found[name]["dominant effect first"] = rate(some, lambda s: s.dominant_first)
+        found[name][f"stated with p ≥ {SURE} and wrong"] = rate(some, lambda s: bool(s.stated_wrong))
     return found
 
 
@@ -106,8 +92,9 @@ def _sizes(scores: Sequence[Score]) -> list[tuple[str, list[Score]]]:
 def summary(scores: Sequence[Score]) -> dict[str, Any]:
     """The whole score card as plain data."""
     card: dict[str, Any] = {}
-    for kind in dict.fromkeys(one.kind for one in scores):
-        some = [one for one in scores if one.kind == kind]
+    for group in dict.fromkeys(one.group for one in scores):
+        some = [one for one in scores if one.group == group]
+        kind = some[0].kind
         part: dict[str, Any] = {
             "cases": len(some),
             "rates": {name: value.to_dict() for name, value in _rates(kind, some).items()},
@@ -118,14 +105,19 @@ def summary(scores: Sequence[Score]) -> dict[str, Any]:
         }
         if kind != "null":
             part["by_size"] = {
-                size: {name: value.to_dict() for name, value in _rates(kind, group).items()}
-                for size, group in _sizes(some)
+                size: {name: value.to_dict() for name, value in _rates(kind, sized).items()}
+                for size, sized in _sizes(some)
             }
         part["coverage"] = {
             "effects": coverage([e for s in some for e in s.effects]).to_dict(),
             "machine": coverage([e for s in some for e in s.machine]).to_dict(),
         }
-        card[kind] = part
+        part["by_machine"] = {
+            name: {what: value.to_dict() for what, value in rates.items()}
+            for name, rates in _machines(kind, some).items()
+        }
+        card[group] = part
+    card["reliability"] = reliability(scores)
     card["cases"] = [
         asdict(one) | {"deviations": {e.name: e.deviation for e in (*one.effects, *one.machine)}}
         for one in scores
@@ -145,10 +137,11 @@ def markdown(scores: Sequence[Score], command: str, complete: bool = True) -> st
     if not complete:
         lines += ["Not all cases have been scored yet.", ""]
     lines.append("Rates with 95 % intervals; the mismatch is in units of the noise of a sample.")
-    for kind in dict.fromkeys(one.kind for one in scores):
-        some = [one for one in scores if one.kind == kind]
-        lines += ["", f"## {kind}: {len(some)} cases", ""]
-        lines += _table(kind, some)
+    for group in dict.fromkeys(one.group for one in scores):
+        some = [one for one in scores if one.group == group]
+        kind = some[0].kind
+        lines += ["", f"## {group}: {len(some)} cases", "", *_table(kind, some)]
+        lines += _machine_table(kind, some)
         estimates = [e for s in some for e in s.effects]
         nuisance = [e for s in some for e in s.machine]
         if estimates:
@@ -186,6 +179,7 @@ def markdown(scores: Sequence[Score], command: str, complete: bool = True) -> st
                     f"| {s.case} | {s.faintest:.2f} | {' + '.join(s.true) or 'nothing'} | "
                     f"{s.verdict}: {' + '.join(s.named) or '–'} | {families} |"
                 )
+    lines += reliability_lines(scores)
     return "\n".join(lines) + "\n"
 
 
@@ -204,3 +198,15 @@ def _table(kind: str, scores: Sequence[Score]) -> list[str]:
     for name in rates[0]:
         lines.append(f"| {name} | " + " | ".join(str(column[name]) for column in rates) + " |")
     return lines
+
+
+def _machine_table(kind: str, scores: Sequence[Score]) -> list[str]:
+    machines = _machines(kind, scores)
+    if len(machines) < 2:
+        return []
+    names = list(next(iter(machines.values())))
+    lines = ["", "| machine | " + " | ".join(names) + " |", "| --- |" + " --- |" * len(names)]
+    return [
+        *lines,
+        *(f"| {name} | " + " | ".join(map(str, rates.values())) + " |" for name, rates in machines.items()),
+    ]

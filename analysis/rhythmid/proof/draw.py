@@ -6,186 +6,90 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-import yaml
-from numpy.typing import NDArray
 
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.model import Model
-from rhythmid.proof.machine import Effect, Forcing, Machine, Observation, observe
-from rhythmid.proof.protocol import PUMPING, Run, draw_runs
+from rhythmid.proof.concealment import (
+    FAINTEST,
+    MOST_EFFORT,
+    STRONGEST,
+    Concealed,
+    Yardstick,
+    faintest,
+    put_clutter,
+    sized_effect,
+)
+from rhythmid.proof.machine import Effect, Observation
+from rhythmid.proof.machines.designs import DESIGNS
+from rhythmid.proof.machines.rig import Design, Rig, log_uniform
+from rhythmid.proof.noise import NOISES, Log, Noise, draw_log, draw_noise
+from rhythmid.proof.nominal import free_attributes, nominal_model, wrong
+from rhythmid.proof.protocol import Run
 from rhythmid.proof.sizes import EQUIVALENT, SIZES, Motion, motion_of
-from rhythmid.proof.sizing import mismatch, strength_for
 
-Array = NDArray[np.float64]
 Kind = Literal["single", "pairs", "null", "left-out"]
-NoiseKind = Literal["white", "coloured", "quantised"]
-NOISES: tuple[NoiseKind, ...] = ("white", "coloured", "quantised")
 KINDS: tuple[Kind, ...] = ("single", "null", "pairs", "left-out")
-FAINTEST, STRONGEST = 0.3, 10.0  # mismatch in units of the noise
-LONGEST_DELAY = {"input": 0.080, "measurement": 0.100}  # [s]
 ATTEMPTS = 20
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Measurement noise of rms `std` [m]: white, coloured (first-order autoregressive), or with rounding to `step` [m]."""
-
-    kind: NoiseKind
-    std: float
-    correlation: float = 0.0
-    step: float = 0.0
-
-    def corrupt(self, clean: Array, rng: np.random.Generator) -> Array:
-        """The samples with noise."""
-        white = rng.standard_normal(len(clean))
-        if self.kind == "quantised":
-            spread = math.sqrt(self.std**2 - self.step**2 / 12.0)
-            return self.step * np.round((clean + spread * white) / self.step)
-        if self.kind == "coloured":
-            coloured = np.empty(len(clean))
-            level = white[0]
-            innovation = math.sqrt(1.0 - self.correlation**2)
-            for k, draw in enumerate(white):
-                level = self.correlation * level + innovation * draw if k else draw
-                coloured[k] = level
-            return clean + self.std * coloured
-        return clean + self.std * white
-
-
-@dataclass(frozen=True)
-class Concealed:
-    """An effect with the mismatch that it alone leaves, in units of the noise."""
-
-    effect: Effect
-    ratio: float
+BEYOND = 1.2  # factor by which an effect may come out beyond the strongest that is asked for
+LACKED = (
+    "pendulum_gravity"  # part of a machine, not an effect that is added to it: a nominal model may lack it
+)
 
 
 @dataclass(frozen=True)
 class Case:
-    """All that is to know of a case. `absent` names what the catalogue is robbed of before diagnosis."""
+    """All that is to know of a case. `absent` names what the catalogue is robbed of before diagnosis.
+
+    `concealed` are the effects that have to be named, `clutter` small ones beside them. `ratio` is the joint mismatch of all in
+    units of the noise, `nominal_error` the largest relative error of the nominal parameters, `nominal` the model that diagnosis
+    is given (YAML).
+    """
 
     name: str
     kind: Kind
-    machine: Machine
-    forcing: Forcing
-    runs: tuple[Run, ...]
-    unseen: tuple[Run, ...]
-    input_delay: float
-    measurement_delay: float
+    design: str
+    cluttered: bool
+    rig: Rig
     noise: Noise
+    log: Log
     concealed: tuple[Concealed, ...]
+    clutter: tuple[Concealed, ...]
     absent: tuple[str, ...]
-    ratio: float  # joint mismatch of all effects, in units of the noise
-    nominal_error: float  # how wrong the nominal parameters are, largest relative error
-    nominal: str  # the model that diagnosis is given, YAML
+    ratio: float
+    nominal_error: float
+    nominal: str
     start_ns: int
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        return tuple(one.effect for one in self.concealed)
+        """Everything that acts, clutter too."""
+        return tuple(one.effect for one in (*self.concealed, *self.clutter))
+
+    @property
+    def true_parameters(self) -> dict[str, float]:
+        """True values of what the nominal model estimates, by its names; delays too."""
+        design = DESIGNS[self.design]
+        values = {
+            name: float(getattr(self.rig.machine, attribute))
+            for name, attribute in design.unknown.items()
+            if getattr(self.rig.believed, attribute) or attribute == "rest_length"
+        }
+        delays = {"input": self.rig.input_delay, "measurement": self.rig.measurement_delay}
+        return values | {f"{which}_delay.delay": delays[which] for which in design.delays}
 
     def observe(self, run: Run) -> Observation | None:
         """The noise-free record of one run."""
-        return observe_run(
-            self.machine, self.effects, self.forcing, run, self.input_delay, self.measurement_delay
-        )
+        return self.rig.observe(self.effects, run)
 
 
-def observe_run(
-    machine: Machine,
-    effects: Sequence[Effect],
-    forcing: Forcing,
-    run: Run,
-    input_delay: float,
-    measurement_delay: float,
-) -> Observation | None:
-    """The noise-free record of one run; None where the machine diverges."""
-    scaled = replace(forcing, amplitude=forcing.amplitude * run.forcing)
-    return observe(machine, effects, scaled, run.time, run.command, input_delay, measurement_delay)
-
-
-def nominal_model(
-    machine: Machine, delays: tuple[float, float] = (0.0, 0.0), known: Sequence[str] = ()
-) -> str:
-    """YAML of the nominal model: mass and gravity are known, all else is to be estimated but for what is `known`."""
-
-    def parameter(name: str, value: float, unit: str) -> dict:
-        return {"value": float(value), "unit": unit} | ({"fixed": True} if name in known else {})
-
-    force: list[dict] = []
-    if machine.gravity:
-        force.append(
-            {"gravity": {"acceleration": {"value": machine.gravity, "unit": "m/s^2", "fixed": True}}}
-        )
-    force.append(
-        {
-            "linear_spring": {
-                "stiffness": parameter("stiffness", machine.stiffness, "N/m"),
-                "rest_length": parameter("rest_length", machine.rest_length, "m"),
-            }
-        }
-    )
-    force.append(
-        {
-            "switched_damper": {
-                "stance": parameter("damping", machine.damping, "N*s/m"),
-                "flight": {"value": 0.0, "unit": "N*s/m", "fixed": True},
-            }
-        }
-    )
-    model = {
-        "inertia": {"mass": {"value": machine.mass, "unit": "kg", "fixed": True}},
-        "command": [{"input_delay": {"delay": {"value": delays[0], "unit": "s"}}}],
-        "force": force,
-        "sensor": [{"measurement_delay": {"delay": {"value": delays[1], "unit": "s"}}}],
-    }
-    return yaml.safe_dump(model, sort_keys=False)
-
-
-def _draw_machine(rng: np.random.Generator) -> tuple[Machine, Forcing, float]:
-    """A machine, its forcing, and the amplitude [m] of the limit cycle that was aimed at."""
-    stiffness = math.exp(rng.uniform(math.log(50.0), math.log(800.0)))
-    natural = rng.uniform(1.2, 3.5)
-    mass = float(np.clip(stiffness / (2.0 * math.pi * natural) ** 2, 0.5, 3.0))
-    natural = math.sqrt(stiffness / mass) / (2.0 * math.pi)
-    damping = 2.0 * math.exp(rng.uniform(math.log(0.03), math.log(0.15))) * math.sqrt(stiffness * mass)
-    gravity = 9.81 if rng.random() < 0.8 else 0.0
-    machine = Machine(mass, stiffness, damping, rng.uniform(0.1, 0.4), gravity)
-    away = [f for f in PUMPING if abs(f / natural - 1.0) > 0.25]
-    pumping = float(rng.choice(away))
-    cycle = math.exp(rng.uniform(math.log(0.003), math.log(0.010)))
-    amplitude = cycle * stiffness * abs(1.0 - (pumping / natural) ** 2)
-    return machine, Forcing(amplitude, pumping, rng.uniform(-math.pi, math.pi)), cycle
-
-
-def draw_noise(rng: np.random.Generator, size: float, kind: NoiseKind | None = None) -> Noise:
-    """Noise of 0.8 to 3 % of `size` [m]."""
-    std = size * math.exp(rng.uniform(math.log(0.008), math.log(0.03)))
-    kind = kind or NOISES[int(rng.choice(len(NOISES), p=[0.5, 0.3, 0.2]))]
-    if kind == "coloured":
-        return Noise("coloured", std, correlation=rng.uniform(0.5, 0.9))
-    if kind == "quantised":
-        return Noise("quantised", std, step=std * rng.uniform(1.0, 3.0))
-    return Noise("white", std)
-
-
-def wrong(machine: Machine, rng: np.random.Generator, known: Sequence[str]) -> tuple[Machine, float]:
-    """The machine as somebody believes it to be: parameters that are not known are 5 to 50 % off."""
-    level = math.exp(rng.uniform(math.log(0.05), math.log(0.5)))
-    values, worst = {}, 0.0
-    for name in ("stiffness", "damping", "rest_length"):
-        if name in known:
-            continue
-        error = float(rng.choice([-1.0, 1.0])) * level * rng.uniform(0.5, 1.0)
-        values[name] = getattr(machine, name) * (1.0 + error)
-        worst = max(worst, abs(error))
-    return replace(machine, **values), worst
-
-
-def candidates(catalogue: Catalogue) -> list[tuple[str, ...]]:
-    """Classes of effects that can be concealed: the catalogue's candidates for which there is an equation here; effects
+def candidates(catalogue: Catalogue, design: Design) -> list[tuple[str, ...]]:
+    """Classes of effects that a machine can conceal: the catalogue's candidates for which there is an equation here; effects
     that make one and the same model form one class."""
-    names = [name for name in SIZES if name in catalogue and catalogue[name].candidate]
+    names = [
+        name
+        for name in (*SIZES, LACKED)
+        if name in design.effects and name in catalogue and catalogue[name].candidate
+    ]
     classes: list[tuple[str, ...]] = []
     for name in names:
         twins = next((group for group in EQUIVALENT if name in group), frozenset({name}))
@@ -212,29 +116,44 @@ def absent_with(catalogue: Catalogue, name: str) -> tuple[str, ...]:
     return tuple(sorted(gone & set(catalogue)))
 
 
-def draw_case(seed: int, kind: Kind, index: int, catalogue: Catalogue | None = None) -> Case:
-    """The case number `index` of a kind: always the same for the same seed.
+def draw_case(
+    seed: int,
+    kind: Kind,
+    index: int,
+    catalogue: Catalogue | None = None,
+    design: str = "hopper",
+    cluttered: bool = False,
+) -> Case:
+    """The case number `index` of a kind on one sort of machine: always the same for the same seed.
 
     Effects take turns in an order shuffled by the seed. Machines and experiments in which the effect would not show are
     drawn anew.
     """
     known = catalogue or load_catalogue()
+    made = DESIGNS[design]
+    label = f"{kind}{'-cluttered' if cluttered else ''}-{design}-{index:04d}"
+    stream = [seed, KINDS.index(kind), index]
+    # what tells one campaign from another comes last, so that a clean hopper is the one that it has always been
+    apart = [list(DESIGNS).index(design), int(cluttered)] if design != "hopper" or cluttered else []
     names: list[str] = []
     for attempt in range(ATTEMPTS):
-        rng = np.random.default_rng([seed, KINDS.index(kind), index, attempt])
-        names = _names(seed, kind, index, known, rng)
-        case = _draw(f"{kind}-{index:04d}", kind, names, index, known, rng)
+        rng = np.random.default_rng([*stream, attempt, *apart])
+        names = _names([seed, KINDS.index(kind)], kind, index, known, made, apart, rng)
+        case = _draw(label, kind, names, index, known, made, cluttered, rng)
         if case is not None:
             return case
-    raise RuntimeError(f"no machine shows {' and '.join(names)} in {ATTEMPTS} attempts")
+    raise RuntimeError(f"no {design} shows {' and '.join(names) or 'nothing'} in {ATTEMPTS} attempts")
 
 
-def _names(seed: int, kind: Kind, index: int, catalogue: Catalogue, rng: np.random.Generator) -> list[str]:
+def _names(
+    stream: list[int], kind: Kind, index: int, catalogue: Catalogue, design: Design, apart: list[int],
+    rng: np.random.Generator,
+) -> list[str]:  # fmt: skip
     if kind == "null":
         return []
-    classes = candidates(catalogue)
+    classes = candidates(catalogue, design)
     turn, place = divmod(index, len(classes))
-    order = np.random.default_rng([seed, KINDS.index(kind), 1_000_000 + turn]).permutation(len(classes))
+    order = np.random.default_rng([*stream, 1_000_000 + turn, *apart]).permutation(len(classes))
     first = str(rng.choice(classes[order[place]]))
     if kind != "pairs":
         return [first]
@@ -243,51 +162,81 @@ def _names(seed: int, kind: Kind, index: int, catalogue: Catalogue, rng: np.rand
 
 
 def _draw(
-    label: str, kind: Kind, names: Sequence[str], index: int, catalogue: Catalogue, rng: np.random.Generator
-) -> Case | None:
-    machine, forcing, cycle = _draw_machine(rng)
-    natural = math.sqrt(machine.stiffness / machine.mass) / (2.0 * math.pi)
-    runs, unseen = draw_runs(rng, forcing.amplitude, natural, forcing.frequency)
-    delays = rng.uniform(0.0, LONGEST_DELAY["input"]), rng.uniform(0.0, LONGEST_DELAY["measurement"])
-    noise = draw_noise(rng, cycle, NOISES[index % len(NOISES)] if kind == "null" else None)
-    # friction that differs by direction shows its level only where the rest length has been measured
-    fixed = ("rest_length",) if "asymmetric_coulomb_friction" in names else ()
-    believed, error = wrong(machine, rng, fixed)
-    exact = Model.from_text(nominal_model(machine, delays, fixed), catalogue=catalogue)
-    times, commands = [run.time for run in runs], [run.command for run in runs]
-    forcings = [run.forcing * forcing(run.time) for run in runs]
-
-    def seen(effects: Sequence[Effect]) -> list[Observation] | None:
-        found = [observe_run(machine, effects, forcing, run, *delays) for run in runs]
-        return [one for one in found if one is not None] if None not in found else None
-
-    def ratio(effects: Sequence[Effect], nominal: Model = exact) -> float:
-        return mismatch(nominal, times, commands, forcings, seen(effects), noise.std) / noise.std
-
-    plain = seen([])
+    label: str, kind: Kind, names: Sequence[str], index: int, catalogue: Catalogue, design: Design, cluttered: bool,
+    rng: np.random.Generator,
+) -> Case | None:  # fmt: skip
+    rig = design.draw(rng, names)
+    fixed = design.known(names)
+    free = free_attributes(design, fixed)
+    if cluttered:
+        noise = draw_noise(rng, rig.scale, "coloured", design.noise)
+        rig = replace(rig, lag=rng.normal(0.0, 0.5) / rig.runs[0].rate) if rig.recorded == "effort" else rig
+    else:
+        noise = draw_noise(
+            rng, rig.scale, NOISES[index % len(NOISES)] if kind == "null" else None, design.noise
+        )
+    believed, error = wrong(rig.believed, rng, [name for name in free if getattr(rig.believed, name)])
+    delays = (rig.input_delay, rig.measurement_delay)
+    complete = replace(rig, believed=rig.machine, lacks=None)
+    exact = Model.from_text(nominal_model(complete, design, rig.machine, fixed, delays), catalogue=catalogue)
+    plain = complete.observe_all([])
     if plain is None:
         return None
-    motion: Motion = motion_of(machine, forcing, runs, plain)
-    concealed: list[Concealed] = []
-    for name in names:
-        sized = SIZES[name](rng, motion)
-        target = math.exp(rng.uniform(math.log(FAINTEST), math.log(STRONGEST)))
-        strength, reached = strength_for(target, lambda s: ratio([Effect(name, sized(s))]))  # noqa: B023
-        if not FAINTEST <= reached <= 1.2 * STRONGEST:
-            return None
-        concealed.append(Concealed(Effect(name, sized(strength)), reached))
-    effects = [one.effect for one in concealed]
-    for effect in effects if len(effects) > 1 else ():  # one may hide the other: each must show beside it
-        beside = next(other for other in effects if other is not effect)
-        if ratio(effects, exact.with_element(catalogue[beside.name], beside.parameters)) < FAINTEST:
-            return None
-    joint = concealed[0].ratio if len(concealed) == 1 else ratio(effects)
+    motion = motion_of(rig.machine, rig.forcing, rig.runs, plain)
+    stick = Yardstick.of(complete, exact, free, noise, design.by_effort, plain)
+    concealed = _conceal(names, rig, stick, motion, catalogue, rng)
+    if concealed is None:
+        return None
+    clutter: tuple[Concealed, ...] | None = ()
+    if cluttered:
+        pool = [name for name in design.effects if name != LACKED and name in catalogue]
+        pool = [name for name in pool if not any(related(catalogue, name, other) for other in names)]
+        clutter = put_clutter(rng, stick, motion, pool, min((one.share for one in concealed), default=None))
+    if clutter is None:
+        return None
+    added = [one.effect for one in concealed if one.effect != rig.lacks]
+    every = [*added, *(one.effect for one in clutter)]
+    joint = concealed[0].ratio if len(concealed) == 1 and not clutter else stick.joint(rig, every)
     if not math.isfinite(joint):
         return None
     start_ns = 0 if rng.random() < 0.5 else int(rng.integers(1_500_000_000, 1_900_000_000)) * 1_000_000_000
+    nominal = nominal_model(rig, design, believed, fixed)
+    gone = absent_with(catalogue, names[0]) if kind == "left-out" else ()
+    used = {term.element.name for term in Model.from_text(nominal, catalogue=catalogue).terms}
     case = Case(
-        label, kind, machine, forcing, runs, unseen, *delays, noise, tuple(concealed),
-        absent_with(catalogue, names[0]) if kind == "left-out" else (), joint, error,
-        nominal_model(believed, known=fixed), start_ns,
+        label, kind, design.name, cluttered, rig, noise, draw_log(rng, noise) if cluttered else Log(), concealed,
+        clutter, tuple(name for name in gone if name not in used), joint, error, nominal, start_ns,
     )  # fmt: skip
-    return case if all(case.observe(run) is not None for run in unseen) else None
+    return case if all(case.observe(run) is not None for run in (*rig.runs, *rig.unseen)) else None
+
+
+def _conceal(
+    names: Sequence[str],
+    rig: Rig,
+    stick: Yardstick,
+    motion: Motion,
+    catalogue: Catalogue,
+    rng: np.random.Generator,
+) -> tuple[Concealed, ...] | None:
+    """The effects to be named, each of a size that shows; None where that cannot be had on this rig."""
+    least, most = faintest(stick), MOST_EFFORT / stick.noise if stick.by_effort else STRONGEST
+    if least > most:
+        return None
+    concealed: list[Concealed] = []
+    for name in names:
+        if rig.lacks is not None and name == rig.lacks.name:
+            share = stick.lacking(rig)
+            found = Concealed(rig.lacks, share / stick.noise, share) if share >= stick.least else None
+        else:
+            target = log_uniform(rng, least, most)
+            found = sized_effect(stick, name, SIZES[name](rng, motion), target, least, BEYOND * most)
+        if found is None:
+            return None
+        concealed.append(found)
+    added = [one.effect for one in concealed if one.effect != rig.lacks]
+    for effect in added if len(added) > 1 and not stick.by_effort else ():  # one may hide the other
+        beside = next(other for other in added if other is not effect)
+        known = stick.exact.with_element(catalogue[beside.name], beside.parameters)
+        if stick.ratio(added, known) < FAINTEST:
+            return None
+    return tuple(concealed)

@@ -1,7 +1,7 @@
 """The effects that the proof conceals, as plain equations: one entry an effect, written without the catalogue.
 
-Nothing here is shared with the model that is fitted: dry friction turns its sign over a tenth of a millimetre a second by
-an algebraic sigmoid, play and rate limit are exact operators with a memory that moves between accepted steps, jumps stay
+Nothing here is shared with the model that is fitted: dry friction turns its sign over a tenth of a millimetre a second (of
+a hopper; about a thousandth of the usual speed of other machines) by an algebraic sigmoid, play and rate limit are exact operators with a memory that moves between accepted steps, jumps stay
 jumps and are left to the step-size control. Every function changes the value of a signal at its place on the path
 
     command u -> [command] -> + forcing -> [actuator] -> f,   spring and damper -> [leg] -> [contact],   f + leg -> [body]
@@ -9,7 +9,8 @@ jumps and are left to the step-size control. Every function changes the value of
 
 and has the arguments (value, t, x, v, f, m, p, s, ds, held, accepted): time [s], position [m], velocity [m/s], actuator
 force [N], the machine's constants, the effect's parameters in the order declared, its states and (to be written) their
-rates, and memory that may be written only where a step has been `accepted`.
+rates, and memory that may be written only where a step has been `accepted`. On a base that is moved, x and v of what acts in
+the leg and its contact are relative to the base. Under a controller the command is its reference.
 """
 
 import math
@@ -19,11 +20,12 @@ from typing import Any
 
 from numba import njit
 
-MASS, STIFFNESS, DAMPING, REST_LENGTH, GRAVITY, AMPLITUDE, FREQUENCY, PHASE = range(
-    8
-)  # places in the constants m
+# places in the constants m, see rhythmid.proof.machine.Machine
+(
+    MASS, STIFFNESS, DAMPING, REST_LENGTH, GRAVITY, AMPLITUDE, FREQUENCY, PHASE,
+    RETURN, MOMENT, HANGING, PROPORTIONAL, DERIVATIVE, INTEGRAL, SLIDING, SENSED,
+) = range(16)  # fmt: skip
 PLACES = ("command", "actuator", "leg", "contact", "body", "sensor")
-SLIDING = 1e-4  # [m/s] speed over which dry friction turns
 SWITCHING = 2e-4  # [m/s] half the speed over which a late damper sets in
 
 
@@ -53,8 +55,8 @@ def equation(place: str, *parameters: str, states: tuple[float, ...] = (), held:
 
 
 @njit(cache=True)
-def sgn(v):
-    return v / math.sqrt(v * v + SLIDING * SLIDING)
+def sgn(v, m):
+    return v / math.sqrt(v * v + m[SLIDING] * m[SLIDING])
 
 
 @njit(cache=True)
@@ -69,6 +71,16 @@ def clip(value, low, high):
 def command_lag(value, t, x, v, f, m, p, s, ds, held, accepted):
     ds[0] = (value - s[0]) / p[0]
     return s[0]
+
+
+@equation("command", "rate", held=2)
+def reference_rate_limit(value, t, x, v, f, m, p, s, ds, held, accepted):
+    reach = p[0] * max(t - held[1], 0.0)
+    reached = clip(value, held[0] - reach, held[0] + reach)
+    if accepted:
+        held[0] = reached
+        held[1] = t
+    return reached
 
 
 # actuator: forcing and command
@@ -127,23 +139,36 @@ def actuator_rate_limit(value, t, x, v, f, m, p, s, ds, held, accepted):
 
 @equation("leg", "force")
 def coulomb_friction(value, t, x, v, f, m, p, s, ds, held, accepted):
-    return value - p[0] * sgn(v)
+    return value - p[0] * sgn(v, m)
 
 
 @equation("leg", "force", "asymmetry")
 def asymmetric_coulomb_friction(value, t, x, v, f, m, p, s, ds, held, accepted):
-    return value - p[0] * (1.0 + p[1] * sgn(v)) * sgn(v)
+    return value - p[0] * (1.0 + p[1] * sgn(v, m)) * sgn(v, m)
 
 
 @equation("leg", "force", "static_ratio", "stribeck_speed")
 def stribeck_friction(value, t, x, v, f, m, p, s, ds, held, accepted):
     rise = p[0] * (p[1] - 1.0)
-    return value - (p[0] + rise * math.exp(-((v / p[2]) ** 2))) * sgn(v)
+    return value - (p[0] + rise * math.exp(-((v / p[2]) ** 2))) * sgn(v, m)
 
 
 @equation("leg", "coefficient")
 def load_dependent_friction(value, t, x, v, f, m, p, s, ds, held, accepted):
-    return value - p[0] * abs(f) * sgn(v)
+    return value - p[0] * abs(f) * sgn(v, m)
+
+
+@equation("leg", "coefficient", "external_ratio")
+def transmitted_load_friction(value, t, x, v, f, m, p, s, ds, held, accepted):
+    load = -m[STIFFNESS] * (x - m[REST_LENGTH]) - m[MASS] * m[GRAVITY] - m[MOMENT] * math.sin(x - m[HANGING])
+    return value - p[0] * abs(f - p[1] * load) * sgn(v, m)
+
+
+@equation("leg", "stiffness", "yield_displacement", "shape", states=(0.0,))
+def bouc_wen_hysteresis(value, t, x, v, f, m, p, s, ds, held, accepted):
+    z = s[0]
+    ds[0] = v * (1.0 - (abs(z) + p[2] * (math.copysign(abs(z), v * z) - abs(z))) / p[1])
+    return value - p[0] * z
 
 
 @equation("leg", "stiffness", "yield_displacement", states=(0.0,))
@@ -173,6 +198,20 @@ def switching_threshold(value, t, x, v, f, m, p, s, ds, held, accepted):
 @equation("leg", "coefficient", "reference", "exponent")
 def position_dependent_damping(value, t, x, v, f, m, p, s, ds, held, accepted):
     return value - p[0] * (x - p[1]) ** int(p[2]) * v
+
+
+@equation("leg", "coefficient")
+def quadratic_damping(value, t, x, v, f, m, p, s, ds, held, accepted):
+    return value - p[0] * v * abs(v)
+
+
+@equation("leg", "stiffness", "damping_ratio", "position", "side")
+def travel_stop(value, t, x, v, f, m, p, s, ds, held, accepted):
+    depth = p[3] * (x - p[2])
+    if depth <= 0.0:
+        return value
+    damping = 2.0 * p[1] * math.sqrt(p[0] * m[MASS])
+    return value - p[3] * max(0.0, p[0] * depth + damping * p[3] * v)
 
 
 @equation("leg", "coefficient")
@@ -233,6 +272,11 @@ def end_stop_contact(value, t, x, v, f, m, p, s, ds, held, accepted):
     return value - p[3] * max(0.0, p[0] * depth + damping * p[3] * v)
 
 
+@equation("body", "force")
+def constant_force(value, t, x, v, f, m, p, s, ds, held, accepted):
+    return value + p[0]
+
+
 @equation("body", "coefficient")
 def quadratic_drag(value, t, x, v, f, m, p, s, ds, held, accepted):
     return value - p[0] * v * abs(v)
@@ -275,3 +319,32 @@ def sensor_lag(value, t, x, v, f, m, p, s, ds, held, accepted):
 @equation("sensor", "coefficient", "reference")
 def sensor_nonlinearity(value, t, x, v, f, m, p, s, ds, held, accepted):
     return value + p[0] * (value - p[1]) ** 2
+
+
+# outside the catalogue: nobody who looks for them knows their names
+
+
+@equation("body", "amplitude", "wavelength", "phase", "second", "second_phase")
+def two_harmonic_cogging(value, t, x, v, f, m, p, s, ds, held, accepted):
+    turn = 2.0 * math.pi * x / p[1]
+    return value + p[0] * (math.sin(turn + p[2]) + p[3] * math.sin(2.0 * turn + p[4]))
+
+
+@equation("body", "force", "place", "width")
+def magnet(value, t, x, v, f, m, p, s, ds, held, accepted):
+    away = (x - p[1]) / p[2]
+    return value - p[0] * away * math.exp(0.5 - 0.5 * away * away)
+
+
+@equation("leg", "force", "distance", "ageing", states=(0.0,))
+def relaxing_friction(value, t, x, v, f, m, p, s, ds, held, accepted):
+    ds[0] = (1.0 - s[0]) / p[2] - s[0] * abs(v) / p[1]
+    return value - p[0] * (0.5 + s[0]) * sgn(v, m)
+
+
+@equation("body", "coefficient")
+def three_halves_drag(value, t, x, v, f, m, p, s, ds, held, accepted):
+    return value - p[0] * v * math.sqrt(abs(v))
+
+
+FOREIGN = ("two_harmonic_cogging", "magnet", "relaxing_friction", "three_halves_drag")

@@ -1,4 +1,4 @@
-"""Diagnosis of a case from what lies in its folder, the bags and the nominal model, and from nothing else."""
+"""Diagnosis of a case from what lies in its folder, the records and the nominal model, and from nothing else."""
 
 import resource
 import time
@@ -20,8 +20,13 @@ def _processor_time() -> float:
     return sum(one.ru_utime + one.ru_stime for one in used)
 
 
-def examine(folder: Path, catalogue: Catalogue) -> dict[str, Any]:
-    """The diagnosis as plain data, with `seconds`, `processor_seconds`, `phases` (seconds since the start, what began)
+def _records(folder: Path) -> list[Path]:
+    """Bags, and signals files that name tables."""
+    return sorted(path for path in folder.iterdir() if path.is_dir() or path.suffix == ".yaml")
+
+
+def examine(folder: Path, catalogue: Catalogue, budget: float | None = None) -> dict[str, Any]:
+    """The diagnosis, within a `budget` of seconds if one is given, as plain data, with `seconds`, `processor_seconds`, `phases` (seconds since the start, what began)
     and the length of the held-out records' block averages. A failure is an answer too: `failure` holds its message."""
     began, used = time.monotonic(), _processor_time()
     phases: list[tuple[float, str]] = []
@@ -31,12 +36,12 @@ def examine(folder: Path, catalogue: Catalogue) -> dict[str, Any]:
 
     answer: dict[str, Any] = {}
     try:
-        tell("reading the bags")
+        tell("reading the records")
         nominal = Model.load(folder / NOMINAL, catalogue)
-        learn = load_records(sorted((folder / LEARN).iterdir()))
-        judge = load_records(sorted((folder / JUDGE).iterdir()))
-        found = diagnose(learn, nominal, judge, catalogue, tell)
-        answer = found.diagnosis.to_dict() | {"block": found.result.unseen[0].block}
+        learn = load_records(_records(folder / LEARN))
+        judge = load_records(_records(folder / JUDGE))
+        found = diagnose(learn, nominal, judge, catalogue, tell, budget)
+        answer = found.diagnosis.to_dict() | {"block": found.block, "evidence": found.ledger()}
     except InputError as error:
         answer = {"failure": f"refused: {error}"}
     except Exception:  # a fault of ours is an answer, too, and a wrong one

@@ -1,60 +1,67 @@
-"""The concealed machine: a mass on a spring with a direction-switched damper, and up to two further effects.
-
-Integrated by the embedded Runge-Kutta pair of J. R. Dormand and P. J. Prince (J. Comput. Appl. Math. 6 (1980) 19) with
-step-size control, restarted wherever the held command jumps. It shares no code with the simulator that is fitted.
-"""
+"""The concealed machine: a mass or a joint with spring, damper and weight, perhaps under a controller or on a base that is
+moved, and up to five further effects. Its integrator is in `rhythmid.proof.integrator`."""
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
+from dataclasses import astuple, dataclass
+from typing import Literal
 
 import numpy as np
-from numba import boolean, float64, int64, njit, types
 from numba.core.errors import NumbaExperimentalFeatureWarning
 from numpy.typing import NDArray
 
-from rhythmid.proof.equations import (
-    AMPLITUDE,
-    DAMPING,
-    EQUATIONS,
-    FREQUENCY,
-    GRAVITY,
-    MASS,
-    PHASE,
-    PLACES,
-    REST_LENGTH,
-    STIFFNESS,
+from rhythmid.proof.equations import EQUATIONS, PLACES
+from rhythmid.proof.integrator import (
+    BASE,
+    COLUMNS,
+    CONTINUOUS,
+    FORCE,
+    MOST,
+    NOWHERE,
+    SAMPLED_POSITION,
+    SAMPLED_VELOCITY,
+    compiled,
+    integrate,
 )
 
 Array = NDArray[np.float64]
-MOST = 2  # effects at once
-WARM_UP = 10.0  # [s] that the machine has run before a record begins
-RELATIVE, ABSOLUTE = 1e-8, 1e-11  # error allowed in a step
-SHORTEST = 1e-8  # [s] step below which no accuracy is asked for: inside a jump
-FAR = 1e3  # [m] beyond which the machine has diverged
-
-COMMAND, ACTUATOR, LEG, CONTACT, BODY, SENSOR = range(len(PLACES))
-NOWHERE = -1
-numbers = float64[::1]
-SIGNATURE = float64(
-    float64, float64, float64, float64, float64, numbers, numbers, numbers, numbers, numbers, boolean
-)
-EFFECTS = types.UniTuple(types.FunctionType(SIGNATURE), MOST)
-whole = int64[::1]
-table = int64[:, ::1]
+Mode = Literal["force", "base", "continuous", "sampled_position", "sampled_velocity"]
+MODES: dict[Mode, int] = {
+    "force": FORCE, "base": BASE, "continuous": CONTINUOUS, "sampled_position": SAMPLED_POSITION,
+    "sampled_velocity": SAMPLED_VELOCITY,
+}  # fmt: skip
+WARM_UP = 10.0  # [s] that a machine on its limit cycle has run before a record begins
+NO_SLOPES = np.empty(0)
 
 
 @dataclass(frozen=True)
 class Machine:
-    """Mass [kg], stiffness [N/m], damping while v > 0 [N s/m], rest length [m], gravity [m/s²] (0: it lies flat)."""
+    """The machine without effects, in SI units, linear or rotational, or in any that agree with each other.
+
+    Mass [kg], stiffness [N/m], damping while v > 0 [N s/m], rest length [m], gravity [m/s²] (0: it lies flat), damping while
+    v < 0 [N s/m] (a hopper has none in flight), moment of a pendulum's gravity [N m] and the angle at which it hangs [rad];
+    gains of the controller if there is one, on the error [N/m] (of a velocity controller [N s/m]), on the speed [N s/m] and
+    on the error's integral; `sliding` [m/s] is the speed over which dry friction turns, and `mode` says what the command is.
+    """
 
     mass: float
     stiffness: float
     damping: float
     rest_length: float
     gravity: float
+    return_damping: float = 0.0
+    moment: float = 0.0
+    hanging: float = 0.0
+    proportional: float = 0.0
+    derivative: float = 0.0
+    integral: float = 0.0
+    sliding: float = 1e-4
+    mode: Mode = "force"
+
+    @property
+    def rest(self) -> float:
+        """Where a machine with a spring rests [m]; 0 for one without."""
+        return self.rest_length - self.mass * self.gravity / self.stiffness if self.stiffness else 0.0
 
 
 @dataclass(frozen=True)
@@ -69,6 +76,9 @@ class Forcing:
         return self.amplitude * np.cos(2.0 * np.pi * self.frequency * time + self.phase)
 
 
+UNFORCED = Forcing(0.0, 1.0, 0.0)
+
+
 @dataclass(frozen=True)
 class Effect:
     """One concealed effect: its name and its parameters by name."""
@@ -79,142 +89,22 @@ class Effect:
 
 @dataclass(frozen=True)
 class Observation:
-    """What a record holds, before noise: stamps [s] and values of the measurement; the motion itself for reference."""
+    """What a record holds, before noise: stamps [s] and values of the measurement, the force [N] that a sampled controller
+    gave out; for reference the motion itself and the force [N] that all effects together added."""
 
     stamps: Array
     measured: Array
     position: Array
     velocity: Array
+    acceleration: Array
+    added: Array
+    effort: Array
 
 
-def _nothing(value, t, x, v, f, m, p, s, ds, held, accepted):
-    return value
-
-
-@njit(
-    float64(int64, float64, float64, float64, float64, float64, EFFECTS, whole, table, numbers, numbers, numbers,
-            numbers, numbers, boolean),
-    cache=True,
-)  # fmt: skip
-def through(place, value, t, x, v, f, effects, places, layout, m, p, s, ds, held, accepted):
-    """The signal `value` after all effects at its place."""
-    for i in range(MOST):
-        if places[i] == place:
-            value = effects[i](
-                value, t, x, v, f, m, p[layout[i, 0] : layout[i + 1, 0]],
-                s[layout[i, 1] : layout[i + 1, 1]], ds[layout[i, 1] : layout[i + 1, 1]],
-                held[layout[i, 2] : layout[i + 1, 2]], accepted,
-            )  # fmt: skip
-    return value
-
-
-@njit(
-    float64(float64, numbers, float64, EFFECTS, whole, table, numbers, numbers, numbers, boolean, numbers),
-    cache=True,
-)
-def rates(t, z, u, effects, places, layout, m, p, held, accepted, dz):
-    """Write the rates of the states z = (x, v, …) and return the measured position; u is the command in force."""
-    x, v, s, ds = z[0], z[1], z[2:], dz[2:]
-    f = through(COMMAND, u, t, x, v, 0.0, effects, places, layout, m, p, s, ds, held, accepted)
-    f += m[AMPLITUDE] * np.cos(2.0 * np.pi * m[FREQUENCY] * t + m[PHASE])
-    f = through(ACTUATOR, f, t, x, v, 0.0, effects, places, layout, m, p, s, ds, held, accepted)
-    leg = -m[STIFFNESS] * (x - m[REST_LENGTH])
-    if v > 0.0:
-        leg -= m[DAMPING] * v
-    leg = through(LEG, leg, t, x, v, f, effects, places, layout, m, p, s, ds, held, accepted)
-    leg = through(CONTACT, leg, t, x, v, f, effects, places, layout, m, p, s, ds, held, accepted)
-    total = f + leg - m[MASS] * m[GRAVITY]
-    total = through(BODY, total, t, x, v, f, effects, places, layout, m, p, s, ds, held, accepted)
-    dz[0] = v
-    dz[1] = total / m[MASS]
-    return through(SENSOR, x, t, x, v, f, effects, places, layout, m, p, s, ds, held, accepted)
-
-
-@njit(
-    int64(EFFECTS, whole, table, numbers, numbers, numbers, numbers, float64, numbers, numbers, numbers,
-          float64[:, ::1]),
-    cache=True,
-)  # fmt: skip
-def integrate(effects, places, layout, m, p, held, z, begin, knots, values, samples, out):
-    """Integrate from `begin` through all `samples`; rows of `out` become x, v, measured position.
-
-    The command is 0 before the first of its `knots` and `values[j]` from knots[j] on. Returns how many rows are good.
-    """
-    n = len(z)
-    k1, k2, k3, k4 = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
-    k5, k6, k7, trial = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
-    t, u, j = begin, 0.0, 0
-    h = 1e-4
-    for i in range(len(samples)):
-        while t < samples[i]:
-            while j < len(knots) and knots[j] <= t:
-                u = values[j]
-                j += 1
-            stop = samples[i]
-            if j < len(knots) and knots[j] < stop:
-                stop = knots[j]
-            # the command may just have jumped: what remembers has to see it
-            rates(t, z, u, effects, places, layout, m, p, held, True, k1)
-            while t < stop:
-                last = h >= stop - t
-                step = stop - t if last else h
-                for q in range(n):
-                    trial[q] = z[q] + step * k1[q] / 5.0
-                rates(t + step / 5.0, trial, u, effects, places, layout, m, p, held, False, k2)
-                for q in range(n):
-                    trial[q] = z[q] + step * (3.0 * k1[q] + 9.0 * k2[q]) / 40.0
-                rates(t + 0.3 * step, trial, u, effects, places, layout, m, p, held, False, k3)
-                for q in range(n):
-                    trial[q] = z[q] + step * (44.0 / 45.0 * k1[q] - 56.0 / 15.0 * k2[q] + 32.0 / 9.0 * k3[q])
-                rates(t + 0.8 * step, trial, u, effects, places, layout, m, p, held, False, k4)
-                for q in range(n):
-                    trial[q] = z[q] + step * (
-                        19372.0 / 6561.0 * k1[q] - 25360.0 / 2187.0 * k2[q] + 64448.0 / 6561.0 * k3[q]
-                        - 212.0 / 729.0 * k4[q]
-                    )  # fmt: skip
-                rates(t + 8.0 / 9.0 * step, trial, u, effects, places, layout, m, p, held, False, k5)
-                for q in range(n):
-                    trial[q] = z[q] + step * (
-                        9017.0 / 3168.0 * k1[q] - 355.0 / 33.0 * k2[q] + 46732.0 / 5247.0 * k3[q]
-                        + 49.0 / 176.0 * k4[q] - 5103.0 / 18656.0 * k5[q]
-                    )  # fmt: skip
-                rates(t + step, trial, u, effects, places, layout, m, p, held, False, k6)
-                for q in range(n):
-                    trial[q] = z[q] + step * (
-                        35.0 / 384.0 * k1[q] + 500.0 / 1113.0 * k3[q] + 125.0 / 192.0 * k4[q]
-                        - 2187.0 / 6784.0 * k5[q] + 11.0 / 84.0 * k6[q]
-                    )  # fmt: skip
-                rates(t + step, trial, u, effects, places, layout, m, p, held, False, k7)
-                worst = 0.0
-                for q in range(n):
-                    error = step * (
-                        71.0 / 57600.0 * k1[q] - 71.0 / 16695.0 * k3[q] + 71.0 / 1920.0 * k4[q]
-                        - 17253.0 / 339200.0 * k5[q] + 22.0 / 525.0 * k6[q] - k7[q] / 40.0
-                    )  # fmt: skip
-                    allowed = ABSOLUTE + RELATIVE * max(abs(z[q]), abs(trial[q]))
-                    worst = max(worst, abs(error) / allowed)
-                if not np.isfinite(worst):
-                    return i
-                growth = 5.0 if worst == 0.0 else min(5.0, max(0.2, 0.9 * worst**-0.2))
-                if worst > 1.0 and step > SHORTEST:
-                    h = max(step * growth, SHORTEST)
-                    continue
-                t = stop if last else t + step
-                z[:] = trial
-                rates(t, z, u, effects, places, layout, m, p, held, True, k1)
-                h = max(h, step * growth) if last else max(step * growth, SHORTEST)
-            if abs(z[0]) > FAR:
-                return i
-        out[i, 0], out[i, 1] = z[0], z[1]
-        out[i, 2] = rates(t, z, u, effects, places, layout, m, p, held, False, k1)
-    return len(samples)
-
-
-@lru_cache(maxsize=64)
-def _compiled(name: str) -> Any:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
-        return njit(SIGNATURE, cache=True)(EQUATIONS[name].function if name else _nothing)
+def constants(machine: Machine, forcing: Forcing, velocity: bool = False) -> Array:
+    """The constants m of the equations; `velocity`: it is the velocity that is measured."""
+    values = astuple(machine)
+    return np.array([*values[:5], *astuple(forcing), *values[5:12], float(velocity)])
 
 
 def held_command(arrival: Array, value: Array, period: float) -> tuple[Array, Array]:
@@ -246,11 +136,21 @@ def observe(
     command: Array,
     input_delay: float = 0.0,
     measurement_delay: float = 0.0,
+    *,
+    slopes: Array | None = None,
+    start: tuple[float, float] | None = None,
+    velocity: bool = False,
+    samples: Array | None = None,
+    lag: float = 0.0,
 ) -> Observation | None:
     """Run the machine through one record.
 
-    `time` (n,) [s] are the instants at which commands (n,) [N] are sent and measurements taken. None if it diverges.
+    `time` (n,) [s] are the instants at which commands (n,) [N] are sent and, but for other `samples`, measurements taken.
+    The command is held, or with `slopes` (n,) smooth. With a `start`, position [m] and velocity [m/s], the machine is let go there at the first instant;
+    else it has run before. `velocity`: it is the velocity that is measured. Measurements are taken `lag` [s] before they are
+    said to be. None if it diverges.
     """
+    taken = np.ascontiguousarray(time if samples is None else samples, dtype=float)
     arrival, value = time + input_delay, np.ascontiguousarray(command, dtype=float)
     for effect in effects:
         if effect.name == "input_delay_drift":
@@ -261,26 +161,44 @@ def observe(
     inside = [effect for effect in effects if effect.name not in TIMING]
     known = [EQUATIONS[effect.name] for effect in inside]
     spare = MOST - len(known)
-    functions = tuple(_compiled(effect.name) for effect in inside) + (_compiled(""),) * spare
+    functions = tuple(compiled(effect.name) for effect in inside) + (compiled(""),) * spare
     places = np.array([PLACES.index(one.place) for one in known] + [NOWHERE] * spare)
     widths = [(len(one.parameters), len(one.states), one.held) for one in known] + [(0, 0, 0)] * spare
     layout = np.vstack([np.zeros((1, 3), int), np.cumsum(widths, axis=0)]).astype(np.int64)
     parameters = [effect.parameters[name] for effect, one in zip(inside, known) for name in one.parameters]
-    rest = machine.rest_length - machine.mass * machine.gravity / machine.stiffness
-    start = np.array([rest, 0.0, *(share * rest for one in known for share in one.states)])
-    held = np.zeros(sum(one.held for one in known))
-    constants = np.array(
-        [machine.mass, machine.stiffness, machine.damping, machine.rest_length, machine.gravity,
-         forcing.amplitude, forcing.frequency, forcing.phase]
-    )  # fmt: skip
-    out = np.empty((len(time), 3))
+    begin, (position, speed) = (time[0] - WARM_UP, (machine.rest, 0.0)) if start is None else (time[0], start)
+    before = (
+        value[0] if machine.mode == "continuous" and start is not None else 0.0
+    )  # it stands where it was sent
+    first = np.array([position, speed, *(share * position for one in known for share in one.states)])
+    held = _memory(machine, inside, position, float(begin))
+    out, efforts = np.empty((len(taken), COLUMNS)), np.zeros(len(arrival))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NumbaExperimentalFeatureWarning)
         done = integrate(
-            functions, places, layout, constants, np.array(parameters, dtype=float), held, start,
-            float(time[0] - WARM_UP), np.ascontiguousarray(arrival, dtype=float), value,
-            np.ascontiguousarray(time, dtype=float), out,
+            functions, places, layout, constants(machine, forcing, velocity), np.array(parameters, dtype=float), held,
+            first, float(begin), np.ascontiguousarray(arrival, dtype=float), value,
+            NO_SLOPES if slopes is None else np.ascontiguousarray(slopes, dtype=float), MODES[machine.mode],
+            taken - lag, out, efforts, before,
         )  # fmt: skip
-    if done < len(time) or not np.isfinite(out).all():
+    if done < len(taken) or not np.isfinite(out).all():
         return None
-    return Observation(stamp(time, measurement_delay, effects), out[:, 2], out[:, 0], out[:, 1])
+    efforts[-1:] = efforts[-2:-1]  # what is given out at the last sample acts after it
+    return Observation(
+        stamp(taken, measurement_delay, effects),
+        out[:, 2],
+        out[:, 0],
+        out[:, 1],
+        out[:, 4],
+        out[:, 3],
+        efforts,
+    )
+
+
+def _memory(machine: Machine, effects: Sequence[Effect], position: float, begin: float) -> Array:
+    """What effects remember at first: nothing, but for a ramp of the reference, which begins where the machine is."""
+    held: list[float] = []
+    for effect in effects:
+        ramp = effect.name == "reference_rate_limit"
+        held += [position, begin] if ramp else [0.0] * EQUATIONS[effect.name].held
+    return np.array(held, dtype=float)

@@ -4,7 +4,7 @@ Amplitudes are in units of the forcing's. Every set holds a multisine that repea
 alone; the rest is drawn.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,28 +12,41 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 RATE = 1000  # [Hz]
+NEARBY = 1e-5  # [s] over which the rate of a smooth command is taken
 PUMPING = (0.7, 0.8, 1.0, 1.25, 1.5, 1.6, 2.0)  # [Hz] at which a multisine can repeat with the forcing
 
 
 @dataclass(frozen=True)
 class Run:
-    """One record to be made: its name, duration [s], the forcing's scale, and the command's shape with its numbers."""
+    """One record to be made: its name, duration [s], the forcing's scale, and the command's shape with its numbers.
+
+    `rate` [Hz] is that of commands and measurements; `start`, position [m] and velocity [m/s], is where the machine is let go,
+    None where it has run before.
+    """
 
     name: str
     duration: float
     forcing: float
     shape: str
     numbers: dict[str, Any]
+    rate: int = RATE
+    start: tuple[float, float] | None = None
 
     @property
     def time(self) -> Array:
         """Instants [s] at which commands are sent and measurements taken."""
-        return np.arange(round(self.duration * RATE)) / RATE
+        return np.arange(round(self.duration * self.rate)) / self.rate
 
     @property
     def command(self) -> Array:
         """Commands [N] at those instants."""
         return SHAPES[self.shape](self.time, **self.numbers)
+
+    @property
+    def slopes(self) -> Array:
+        """Rates [N/s] of a smooth command at those instants."""
+        ahead, behind = (SHAPES[self.shape](self.time + side, **self.numbers) for side in (NEARBY, -NEARBY))
+        return (ahead - behind) / (2.0 * NEARBY)
 
 
 def _silence(time: Array) -> Array:
@@ -54,7 +67,83 @@ def _steps(time: Array, level: float, begin: float, end: float) -> Array:
     return np.where((time >= begin) & (time < end), level, np.where(time >= end, -level, 0.0))
 
 
-SHAPES = {"silence": _silence, "chirp": _chirp, "multisine": _multisine, "steps": _steps}
+def _tones(time: Array, sizes: list[float], frequencies: list[float], phases: list[float]) -> Array:
+    waves = [a * np.sin(2.0 * np.pi * f * time + phase) for a, f, phase in zip(sizes, frequencies, phases)]
+    return np.sum(waves, axis=0)
+
+
+def _moves(time: Array, times: list[float], places: list[float]) -> Array:
+    """From place to place with quintic profiles; equal neighbours are pauses."""
+    knots, values = np.array(times), np.array(places)
+    i = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
+    s = np.clip((time - knots[i]) / (knots[i + 1] - knots[i]), 0.0, 1.0)
+    return values[i] + (values[i + 1] - values[i]) * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+
+
+def _speeds(time: Array, times: list[float], places: list[float]) -> Array:
+    """Speeds of such moves."""
+    knots, values = np.array(times), np.array(places)
+    i = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
+    span = knots[i + 1] - knots[i]
+    s = np.clip((time - knots[i]) / span, 0.0, 1.0)
+    return (values[i + 1] - values[i]) / span * 30.0 * (s * (1.0 - s)) ** 2
+
+
+SHAPES = {
+    "silence": _silence, "chirp": _chirp, "multisine": _multisine, "steps": _steps, "tones": _tones, "moves": _moves,
+    "speeds": _speeds,
+}  # fmt: skip
+Start = tuple[float, float]
+
+
+def draw_tones(
+    rng: np.random.Generator, name: str, rms: float, low: float, high: float, duration: float, rate: int,
+    count: int = 12, falls: float = 0.0, start: Start | None = (0.0, 0.0),
+) -> Run:  # fmt: skip
+    """Sines between two frequencies [Hz], together of `rms` [N], single ones falling with the power `falls` of frequency."""
+    frequencies = np.geomspace(low, high, count) * rng.uniform(0.94, 1.06, count)
+    sizes = frequencies**-falls
+    sizes *= rms / np.sqrt(0.5 * np.sum(sizes**2))
+    phases = rng.uniform(0.0, 2.0 * np.pi, count)
+    numbers = {"sizes": sizes.tolist(), "frequencies": frequencies.tolist(), "phases": phases.tolist()}
+    return Run(name, duration, 1.0, "tones", numbers, rate, start)
+
+
+def draw_moves(
+    rng: np.random.Generator, name: str, places: tuple[float, float], duration: float, rate: int,
+    quickest: float = 0.4, slowest: float = 1.5, pause: float = 0.5, speeds: bool = False,
+) -> Run:  # fmt: skip
+    """Moves between random places [m], each of `quickest` to `slowest` [s], with pauses of up to `pause` [s]; or their speeds.
+
+    They begin where the machine rests, at the middle of the places.
+    """
+    times, stops = [0.0], [0.5 * (places[0] + places[1])]
+    while times[-1] < duration:
+        times.append(times[-1] + pause * rng.uniform(0.3, 1.0))
+        times.append(times[-1] + rng.uniform(quickest, slowest))
+        stops += [stops[-1], float(rng.uniform(*places))]
+    shape = "speeds" if speeds else "moves"
+    return Run(name, duration, 1.0, shape, {"times": times, "places": stops}, rate, (stops[0], 0.0))
+
+
+def draw_sweep(
+    rng: np.random.Generator, name: str, amplitude: float, low: float, high: float, duration: float, rate: int,
+    start: Start | None = (0.0, 0.0),
+) -> Run:  # fmt: skip
+    """One sweep up or down between two frequencies [Hz]."""
+    ends = (low, high) if rng.random() < 0.6 else (high, low)
+    numbers = {"amplitude": amplitude, "low": ends[0], "high": ends[1], "sweep": duration, "phase": 0.0}
+    return Run(name, duration, 1.0, "chirp", numbers, rate, start)
+
+
+def from_reference(run: Run) -> Run:
+    """The same record, begun where its command, a position, begins."""
+    return replace(run, start=(float(run.command[0]), 0.0))
+
+
+def draw_release(name: str, start: Start, duration: float, rate: int) -> Run:
+    """Let go at `start`, and nothing else."""
+    return Run(name, duration, 1.0, "silence", {}, rate, start)
 
 
 def _draw_chirp(

@@ -9,12 +9,7 @@ from rhythmid.elements.catalogue import Catalogue
 Outcome = Literal["exact", "family", "wrong", "unknown", "undecided", "consistent", "failed"]
 FAMILY = 2  # members that a declared family may have
 ANGLES = ("phase",)
-MACHINE = {
-    "linear_spring.stiffness": "stiffness",
-    "linear_spring.rest_length": "rest_length",
-    "switched_damper.stance": "damping",
-}
-DELAYS = {"input_delay.delay": "input_delay", "measurement_delay.delay": "measurement_delay"}
+SURE = 0.8  # probability from which on an answer stands by a name
 NO_SINGLE_DELAY = {"command_hold", "input_delay_drift", "delay_drift", "clock_skew"}
 
 
@@ -37,18 +32,34 @@ class Estimated:
 
 
 @dataclass(frozen=True)
+class Stated:
+    """A name that an answer states, with its probability, and whether it is right: concealed, or clutter that is really there,
+    or declared indistinguishable from one of these in a family of two."""
+
+    name: str
+    probability: float
+    right: bool
+
+
+@dataclass(frozen=True)
 class Score:
     """How one case came out.
 
-    `outcome` exact: named just what was concealed; family: named, or declared indistinguishable from what was named in a
-    family of two; wrong: something else named. `heldout` is the held-out error over the noise floor.
+    `outcome` exact: named what was concealed, and nothing but perhaps clutter that is really there; family: named, or declared
+    indistinguishable from what was named in a family of two; wrong: something else named. `dominant_first`: what explains most
+    was concealed. `heldout` is the held-out error over the noise floor, where motion was compared.
     """
 
     case: str
     kind: str
+    design: str
+    cluttered: bool
     true: tuple[str, ...]
+    clutter: tuple[str, ...]
     named: tuple[str, ...]
     families: tuple[tuple[str, ...], ...]
+    stated: tuple[Stated, ...]
+    dominant_first: bool
     verdict: str
     outcome: Outcome
     slot_right: bool
@@ -63,6 +74,16 @@ class Score:
     processor_seconds: float
     absent: tuple[str, ...]
     failure: str
+
+    @property
+    def stated_wrong(self) -> tuple[str, ...]:
+        """Names that the answer stands by and that are wrong."""
+        return tuple(one.name for one in self.stated if one.probability >= SURE and not one.right)
+
+    @property
+    def group(self) -> str:
+        """The line of the card that the case belongs to."""
+        return f"{self.kind}, cluttered" if self.cluttered else self.kind
 
     @property
     def honest(self) -> bool:
@@ -87,7 +108,10 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
     true = tuple(sorted(one["effect"]["name"] for one in concealed))
     named = tuple(sorted(effect["element"] for effect in answer.get("missing", ())))
     families = tuple(tuple(group) for group in answer.get("indistinguishable", ()))
-    outcome = _outcome(true, named, families, answer)
+    clutter = tuple(sorted(one["effect"]["name"] for one in truth["clutter"]))
+    outcome = _outcome(true, clutter, named, families, answer)
+    ranked = _ranked(answer)
+    there = {*true, *clutter}
     slots = {catalogue[name].slot for name in true}
     if len(true) == 1:
         said = {(answer.get("location") or {}).get("slot")}
@@ -96,9 +120,20 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
     return Score(
         case=truth["name"],
         kind=truth["kind"],
+        design=truth["design"],
+        cluttered=truth["cluttered"],
         true=true,
+        clutter=clutter,
         named=named,
         families=families,
+        stated=tuple(
+            Stated(
+                effect["element"], float(effect["probability"]), _right(effect["element"], there, families)
+            )
+            for effect in ranked
+            if effect.get("probability") is not None
+        ),
+        dominant_first=bool(ranked) and _right(ranked[0]["element"], set(true), families),
         verdict=answer.get("verdict", "failed"),
         outcome=outcome,
         slot_right=bool(true) and said == slots,
@@ -116,8 +151,25 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
     )
 
 
+def _ranked(answer: dict[str, Any]) -> list[dict[str, Any]]:
+    """What is said to be missing, by the share that it explains where shares are told."""
+    missing = list(answer.get("missing", ()))
+    if all(effect.get("share") is not None for effect in missing):
+        missing.sort(key=lambda effect: -effect["share"])
+    return missing
+
+
+def _small(families: tuple[tuple[str, ...], ...]) -> list[set[str]]:
+    return [set(group) for group in families if len(group) <= FAMILY]
+
+
+def _right(name: str, there: set[str], families: tuple[tuple[str, ...], ...]) -> bool:
+    return name in there or any(name in group and group & there for group in _small(families))
+
+
 def _outcome(
     true: tuple[str, ...],
+    clutter: tuple[str, ...],
     named: tuple[str, ...],
     families: tuple[tuple[str, ...], ...],
     answer: dict[str, Any],
@@ -129,21 +181,29 @@ def _outcome(
     }  # fmt: skip
     if answer["verdict"] in plain:
         return plain[answer["verdict"]]
-    if named == true:
+    beside = [name for name in named if name not in clutter]
+    if beside == list(true) and true:
         return "exact"
-    small = [set(group) for group in families if len(group) <= FAMILY]
-    open_names = list(named)
     for name in true:
-        match = next((n for n in open_names if n == name), None) or next(
-            (n for n in open_names if any({n, name} <= group for group in small)), None
+        match = next((n for n in beside if n == name), None) or next(
+            (n for n in beside if any({n, name} <= group for group in _small(families))), None
         )
         if match is None:
             return "wrong"
-        open_names.remove(match)
-    return "wrong" if open_names else "family"
+        beside.remove(match)
+    strangers = [name for name in beside if not _right(name, set(clutter), families)]
+    return "wrong" if strangers or not true else "family"
+
+
+def by_effort(answer: dict[str, Any]) -> bool:
+    """Whether the answer was reached by comparing forces."""
+    scoring = answer.get("scoring") or ""
+    return scoring.get("kind") == "effort" if isinstance(scoring, dict) else "balance of forces" in scoring
 
 
 def _heldout(truth: dict[str, Any], answer: dict[str, Any]) -> float | None:
+    if by_effort(answer):
+        return None
     error = ((answer.get("fit") or {}).get("augmented") or {}).get("heldout_nrmse")
     floor = truth["floors"].get(str(answer.get("block")))
     return error / floor if error is not None and floor else None
@@ -158,11 +218,11 @@ def _estimated(name: str, true: float, given: dict[str, Any] | None) -> list[Est
 def _effect_estimates(truth: dict[str, Any], answer: dict[str, Any]) -> tuple[Estimated, ...]:
     """Parameters that both descriptions of an effect have; how sharply a friction turns is nobody's parameter."""
     found: list[Estimated] = []
-    for one in truth["concealed"]:
+    given = {effect["element"]: effect["parameters"] for effect in answer["missing"]}
+    for one in (*truth["concealed"], *truth["clutter"]):
         name = one["effect"]["name"]
-        given = next(effect["parameters"] for effect in answer["missing"] if effect["element"] == name)
         for parameter, value in one["effect"]["parameters"].items():
-            found += _estimated(f"{name}.{parameter}", value, given.get(parameter))
+            found += _estimated(f"{name}.{parameter}", value, given.get(name, {}).get(parameter))
     return tuple(found)
 
 
@@ -171,9 +231,7 @@ def _machine_estimates(
 ) -> tuple[Estimated, ...]:
     given = answer.get("parameters", {})
     found: list[Estimated] = []
-    for name, attribute in MACHINE.items():
-        found += _estimated(name, truth["machine"][attribute], given.get(name))
-    if not NO_SINGLE_DELAY & set(true):
-        for name, attribute in DELAYS.items():
-            found += _estimated(name, truth[attribute], given.get(name))
+    for name, value in truth["parameters"].items():
+        if not (name.endswith("_delay.delay") and NO_SINGLE_DELAY & set(true)):
+            found += _estimated(name, value, given.get(name))
     return tuple(found)

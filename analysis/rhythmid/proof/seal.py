@@ -12,8 +12,12 @@ from rhythmid.proof.draw import Case
 
 
 def truth_of(case: Case, floors: dict[int, float]) -> dict[str, Any]:
-    """Everything about a case as plain data; `floors` is the held-out records' noise as nrmse, by block length."""
-    return asdict(case) | {"floors": {str(block): floor for block, floor in floors.items()}}
+    """Everything about a case as plain data; `floors` is the held-out records' noise as nrmse, by block length, and
+    `parameters` the true values of the nominal model's."""
+    return asdict(case) | {
+        "floors": {str(block): floor for block, floor in floors.items()},
+        "parameters": case.true_parameters,
+    }
 
 
 def seal(path: Path, truth: dict[str, Any]) -> str:

@@ -1,6 +1,8 @@
 """The mismatch that a concealed effect leaves once the nominal model is refitted, and the strength that leaves a given one.
 
-The one place where the proof uses the estimator: to know the size of what it conceals, before anything is sealed.
+The one place where the proof uses the estimator: to know the size of what it conceals, before anything is sealed. Where a
+free run means little, the mismatch is a force: what the effects add to the truth's motion, less what the nominal model's
+free parameters absorb of it, by plain linear least squares.
 """
 
 import math
@@ -13,45 +15,47 @@ from rhythmid.errors import InputError
 from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import minimise
-from rhythmid.identify.series import Series, prepare
+from rhythmid.identify.series import prepare
 from rhythmid.model import Model
-from rhythmid.proof.machine import Observation
+from rhythmid.proof.machine import Machine, Observation
+from rhythmid.proof.machines.rig import Rig
+from rhythmid.proof.protocol import Run
+from rhythmid.proof.sizes import drive_of
 from rhythmid.record.record import Channel, Record
 
 Array = NDArray[np.float64]
-BLOCK = 5  # samples averaged
+AVERAGED = 200  # [Hz] to which samples are averaged
 STEP = 6.25e-4  # [s] of the fit's integrator: its error must not pass for a mismatch
 CLOSE = 1.25  # factor within which a mismatch is the one asked for
 TRIES = 7
 
 
-def _series(
-    times: Sequence[Array], commands: Sequence[Array], forcings: Sequence[Array], seen: Sequence[Observation]
-) -> list[Series]:
-    records = [
-        Record(
-            f"record {index}", Channel(one.stamps, one.measured, "m"), Channel(time, command, "N"),
-            forcing=Channel(time, forcing, "N"),
-        )
-        for index, (time, command, forcing, one) in enumerate(zip(times, commands, forcings, seen))
-    ]  # fmt: skip
-    return prepare(records, BLOCK)
+def record_of(rig: Rig, run: Run, seen: Observation) -> Record:
+    """The noise-free record of one run."""
+    force, position = rig.units
+    drive = {"command": run.command, "effort": seen.effort, "base": run.command, "reference": run.command}
+    value = drive.get(rig.recorded)
+    forcing = run.forcing * rig.forcing(run.time)
+    moved = rig.recorded == "base"
+    return Record(
+        run.name,
+        Channel(seen.stamps, seen.measured, f"{position}/s" if rig.velocity else position),
+        None if value is None else Channel(run.time, value, force if rig.recorded in ("command", "effort") else position),
+        forcing=Channel(run.time, forcing, force) if rig.forcing.amplitude else None,
+        hold="band_limited" if moved else "zero",
+        input_kind="base_displacement" if moved else "reference" if rig.recorded == "reference" else "force",
+        output_kind="velocity" if rig.velocity else "position",
+    )  # fmt: skip
 
 
-def mismatch(
-    nominal: Model,
-    times: Sequence[Array],
-    commands: Sequence[Array],
-    forcings: Sequence[Array],
-    seen: Sequence[Observation] | None,
-    scale: float,
-) -> float:
-    """Rms [m] that the nominal model leaves of noise-free records after a refit from its own values; infinite where it
-    cannot follow them. `scale` [m] is what counts as small."""
+def mismatch(nominal: Model, rig: Rig, seen: Sequence[Observation] | None, scale: float) -> float:
+    """Rms [m] that the nominal model leaves of the noise-free learning records `seen` after a refit from its own values;
+    infinite where it cannot follow them. `scale` [m] is what counts as small."""
     if seen is None:
         return math.inf
+    records = [record_of(rig, run, one) for run, one in zip(rig.runs, seen)]
     try:
-        series = _series(times, commands, forcings, seen)
+        series = prepare(records, max(1, round(rig.runs[0].rate / AVERAGED)))
         run = prepare_run(nominal, series, STEP)
         samples = sum(one.blocks for one in series)
         fit = minimise(
@@ -68,7 +72,36 @@ def mismatch(
     return math.sqrt(fit.chi2 / fit.samples) * scale
 
 
-def strength_for(target: float, ratio_at: Callable[[float], float]) -> tuple[float, float]:
+def plain_force(machine: Machine, x: Array, v: Array) -> Array:
+    """Force [N] of spring, damper and a pendulum's gravity at positions and velocities (n,)."""
+    damping = np.where(v > 0.0, machine.damping, machine.return_damping)
+    spring = machine.stiffness * (x - machine.rest_length)
+    return -spring - damping * v - machine.moment * np.sin(x - machine.hanging)
+
+
+def force_share(rig: Rig, seen: Sequence[Observation] | None, free: Sequence[str]) -> float:
+    """Rms of the force that the nominal model lacks in the learning records `seen`, in proportion to that of the force that
+    drives the machine; what the model's `free` attributes can absorb of it is left out."""
+    if seen is None:
+        return math.inf
+    x = np.concatenate([one.position for one in seen])
+    v = np.concatenate([one.velocity for one in seen])
+    a = np.concatenate([one.acceleration for one in seen])
+    drive = np.concatenate([drive_of(rig.machine, rig.forcing, run, one) for run, one in zip(rig.runs, seen)])
+    lacking = np.concatenate([one.added for one in seen])
+    lacking = lacking + plain_force(rig.machine, x, v) - plain_force(rig.believed, x, v)
+    columns = {
+        "mass": a, "damping": v, "stiffness": x, "rest_length": np.ones(len(x)),
+        "moment": np.sin(x - rig.believed.hanging),
+    }  # fmt: skip
+    absorbed = np.column_stack([columns[name] for name in free if getattr(rig.believed, name)])
+    left = lacking - absorbed @ np.linalg.lstsq(absorbed, lacking, rcond=None)[0]
+    return float(np.sqrt(np.mean(left**2) / np.mean(drive**2)))
+
+
+def strength_for(
+    target: float, ratio_at: Callable[[float], float], close: float = CLOSE, tries: int = TRIES
+) -> tuple[float, float]:
     """Strength in (0, 1] at which `ratio_at` comes close to `target`, and the ratio there.
 
     Effects grow with a power of their strength, so the search goes by secants in logarithms, within the bracket that it has
@@ -77,12 +110,12 @@ def strength_for(target: float, ratio_at: Callable[[float], float]) -> tuple[flo
     low, high = math.log(1e-7), 0.0
     place, power = math.log(0.05), 1.0
     points: list[tuple[float, float]] = []  # logarithms of strength and ratio
-    for _ in range(TRIES):
+    for _ in range(tries):
         ratio = ratio_at(math.exp(place))
         usable = 0.0 < ratio < math.inf
         if usable:
             points.append((place, math.log(ratio)))
-            if abs(math.log(ratio / target)) < math.log(CLOSE):
+            if abs(math.log(ratio / target)) < math.log(close):
                 break
         if ratio > target:
             high = place

@@ -18,7 +18,8 @@ from rhythmid.identify.descent import Descent, descend
 from rhythmid.identify.free_run import FreeRun, prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, minimise
-from rhythmid.identify.sample_clock.tick_scan import HOLD, scanned
+from rhythmid.identify.sample_clock.clock import has_clock
+from rhythmid.identify.sample_clock.tick_scan import scanned
 from rhythmid.identify.series import Series, scales
 from rhythmid.identify.start_cost import start_cost
 from rhythmid.model import Model
@@ -165,7 +166,7 @@ def _fit_proposal(
     best: Descent | None = None
     failure: InputError | None = None
     ticks: list[dict[str, float]] = []
-    if proposal.added[-1:] == (HOLD,):
+    if proposal.added and has_clock(proposal.model, proposal.added[-1]):
         begin = [_extended(proposal.model, run, i, start, known) for i, start in enumerate(starts)]
         ticks = scanned(proposal.model, series, begin, noise)
     for guess in (*ticks, *proposal.guesses, *proposal.faint):

@@ -16,9 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 
+from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales
 from rhythmid.errors import InputError
+from rhythmid.identify.declared import own_model
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.free_run import FreeRun, prepare_run, with_series
 from rhythmid.identify.noise import NoiseModel, runs
@@ -103,15 +105,16 @@ def trajectories(fit: Fit) -> Trajectories:
         rows = disturbed.rows(fit.model, index, start)
         if rows is None:
             raise InputError(f"{one.name}: the fitted model diverges")
+        model = own_model(fit.model, one)
         # the machine was there when the measurement was taken, not when it was stamped
-        time = one.centres - float(np.mean(one.centres - physical_times(fit.model, one.centres)))
+        time = one.centres - float(np.mean(one.centres - physical_times(model, one.centres)))
         acceleration = np.gradient(rows[:, 1], time)
-        body = _body_force(fit.model, time, rows[:, 0], rows[:, 1], rows[:, q + 1])
-        command = delayed_command(fit.model, one.command)
+        body = _body_force(model, time, rows[:, 0], rows[:, 1], rows[:, q + 1])
+        command = delayed_command(model, one.command)
         signal = np.zeros(one.blocks) if command is None else _evaluate(command, time)
         if one.kind == "base_acceleration":
             acceleration = acceleration + signal
-        leg = fit.model.mass.value * acceleration - rows[:, q + 1] - body
+        leg = model.mass.value * acceleration - rows[:, q + 1] - body
         paths.append(Path(time, rows[:, 0], rows[:, 1], rows[:, q + 1], leg, rows[:, q]))
         legs.append(paths[-1])
         if one.kind == "base_displacement" and command is not None:
@@ -159,9 +162,10 @@ def change_of_output(
             return None
         return [new - one.of_block(old) for new, one, old in zip(outputs, run.series, known.outputs)]
     for index, (one, path) in enumerate(zip(run.series, known.paths)):
+        model = own_model(fit.model, one)
         if element.slot == "sensor":
             path = replace(path, signal=known.outputs[index])
-            changes.append(one.of_block(effect_along(element, values, fit.model, path)))
+            changes.append(one.of_block(effect_along(element, values, model, path)))
             continue
         if element.slot == "actuator":
             path = replace(path, signal=path.effort)
@@ -171,14 +175,14 @@ def change_of_output(
                 continue
             path = replace(path, signal=known.commands[index])
             if controlled(fit.model):
-                change = _change_of_reference(known, index, effect_along(element, values, fit.model, path))
+                change = _change_of_reference(known, index, effect_along(element, values, model, path))
                 if change is None:
                     return None
                 changes.append(change)
                 continue
         elif element.acts != "body":
             path = known.legs[index]
-        force = effect_along(element, values, fit.model, path)
+        force = effect_along(element, values, model, path)
         if not np.isfinite(force).all():
             return None
         if not np.any(force):
@@ -231,9 +235,7 @@ def sizes_along(known: Trajectories) -> Scales:
     """Yardstick for first guesses at a fit: the records' scales, and what only the fitted run tells."""
     fit = known.fit
     sizes = replace(scales(fit.run.series, fit.model), residual_frequency=residual_line(fit))
-    if not controlled(fit.model):
-        return sizes
-    efforts = [path.effort for path in known.paths]  # the controller's force
+    efforts = [path.effort for path in known.paths]  # the controller's or the motor's force
     return replace(
         sizes,
         effort=max(float(np.std(effort)) for effort in efforts) or sizes.effort,
@@ -243,23 +245,7 @@ def sizes_along(known: Trajectories) -> Scales:
 
 def guesses(catalogue: Catalogue, model: Model, sizes: Scales) -> list[tuple[Element, dict[str, float]]]:
     """First guesses of every element that could be missing from the model."""
-    found: list[tuple[Element, dict[str, float]]] = []
-    present = {term.element.name for term in model.terms}
-    for element in catalogue.values():
-        if not element.candidate or element.starts is None or element.name in present:
-            continue
-        if present & set(element.needless_with):
-            continue
-        if element.rotational and model.units.position != "rad":
-            continue
-        if element.controlled and not controlled(model):
-            continue
-        if element.displaced_base and not sizes.displaced_base:
-            continue
-        if any(model.borrowed(source, default) is None for source, default in element.borrows.values()):
-            continue
-        found += [(element, dict(start)) for start in element.starts(sizes)]
-    return found
+    return list(candidates(catalogue, model.setting, sizes).tried)
 
 
 def changes_of(

@@ -1,0 +1,148 @@
+"""How much of an effect is concealed: enough to show in the records and to be of practical size, or, as clutter, hardly."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rhythmid.model import Model
+from rhythmid.proof.equations import FOREIGN
+from rhythmid.proof.machine import Effect, Observation
+from rhythmid.proof.machines.rig import Rig, log_uniform
+from rhythmid.proof.noise import Noise
+from rhythmid.proof.sizes import SIZES, Motion, Sized
+from rhythmid.proof.sizing import force_share, mismatch, strength_for
+
+FAINTEST, STRONGEST = 0.3, 10.0  # mismatch in units of the noise
+# A diagnosis calls what is below 0.3 % of the motion of no practical size; what is concealed has to be clearly above that.
+LEAST_MOTION = 0.005  # of the motion, rms
+LEAST_EFFORT, MOST_EFFORT = 0.01, 0.5  # of the effort, rms, where the mismatch is a force
+CLUTTER = 3  # small effects beside the main one
+CLUTTER_SHARE = (0.005, 0.1)  # of the main one's mismatch
+NULL_CLUTTER = (3e-4, 1.5e-3)  # of the motion, each of the small effects where there is no main one
+NULL_CLUTTER_MOST = 3e-3  # of the motion, all together
+CLUTTER_CLOSE, CLUTTER_TRIES = 1.6, 4  # a small effect's size has to be met only roughly
+
+
+@dataclass(frozen=True)
+class Concealed:
+    """An effect with the mismatch that it alone leaves: `ratio` in units of the noise, `share` of the motion or effort."""
+
+    effect: Effect
+    ratio: float
+    share: float = 0.0
+
+
+@dataclass(frozen=True)
+class Yardstick:
+    """Measures mismatches on a rig that lacks nothing, whose exact nominal model is `exact` with the free attributes `free`.
+
+    `motion` is the rms of the measured motion [m], `noise` that of the noise in proportion to the motion, or to the effort
+    where mismatches are measured there (`by_effort`); `least` the share below which an effect is of no practical size.
+    """
+
+    rig: Rig
+    exact: Model
+    free: tuple[str, ...]
+    motion: float
+    noise: float
+    by_effort: bool
+    least: float
+
+    @classmethod
+    def of(
+        cls,
+        rig: Rig,
+        exact: Model,
+        free: Sequence[str],
+        noise: Noise,
+        by_effort: bool,
+        plain: Sequence[Observation],
+    ) -> "Yardstick":
+        """The yardstick of a rig that does what `plain` says when it conceals nothing."""
+        measured = [one.measured for one in plain]
+        if rig.recorded == "base":
+            measured = [y - run.command for y, run in zip(measured, rig.runs)]
+        motion = float(np.std(np.concatenate(measured)))
+        share = rig.effort_noise if by_effort and rig.effort_noise else noise.std / motion
+        least = LEAST_EFFORT if by_effort else LEAST_MOTION
+        return cls(rig, exact, tuple(free), motion, share, by_effort, least)
+
+    def share(self, effects: Sequence[Effect], nominal: Model | None = None, small: float = 1.0) -> float:
+        """The mismatch that these effects leave, of the motion or the effort; `small`: units of the noise that matter."""
+        seen = self.rig.observe_all(effects)
+        if self.by_effort:
+            return force_share(self.rig, seen, self.free)
+        scale = self.noise * self.motion * min(1.0, small)
+        return mismatch(nominal or self.exact, self.rig, seen, scale) / self.motion
+
+    def ratio(self, effects: Sequence[Effect], nominal: Model | None = None) -> float:
+        """The same in units of the noise."""
+        return self.share(effects, nominal) / self.noise
+
+    def lacking(self, rig: Rig, effects: Sequence[Effect] = ()) -> float:
+        """Share of the driving force that the believed machine of `rig` lacks of the real one with these effects."""
+        return force_share(rig, rig.observe_all(effects), self.free)
+
+    def joint(self, rig: Rig, effects: Sequence[Effect]) -> float:
+        """The mismatch of everything, in units of the noise, beside what the believed machine of `rig` lacks."""
+        if rig.lacks is not None:
+            return self.lacking(rig, effects) / self.noise
+        return self.ratio(effects) if effects else 0.0
+
+
+def faintest(stick: Yardstick) -> float:
+    """The least mismatch, in units of the noise, that counts as concealed: it shows, and it is of practical size."""
+    return max(FAINTEST, stick.least / stick.noise)
+
+
+def sized_effect(
+    stick: Yardstick, name: str, sized: Sized, target: float, least: float, most: float
+) -> Concealed | None:
+    """The effect at the strength that leaves the `target` in units of the noise; None where it comes out of bounds."""
+    strength, reached = strength_for(target, lambda s: stick.ratio([Effect(name, sized(s))]))
+    if not least <= reached <= most:
+        return None
+    return Concealed(Effect(name, sized(strength)), reached, reached * stick.noise)
+
+
+def put_clutter(
+    rng: np.random.Generator, stick: Yardstick, motion: Motion, pool: Sequence[str], main: float | None
+) -> tuple[Concealed, ...] | None:
+    """Three small effects beside one that leaves the share `main`, or beside none; one or two are not in the catalogue.
+
+    None where they do not come out small.
+    """
+    foreign = list(rng.permutation(FOREIGN))
+    ordinary = list(rng.permutation(list(pool)))
+    count = int(rng.integers(1, 3))
+    found: list[Concealed] = []
+    for group, wanted in ((foreign, count), (ordinary, CLUTTER - count)):
+        taken = 0
+        for name in group:
+            if taken == wanted:
+                break
+            low, high = CLUTTER_SHARE if main is not None else NULL_CLUTTER
+            target = log_uniform(rng, low, high) * (main if main is not None else 1.0)
+            made = _small(stick, str(name), SIZES[name](rng, motion), target)
+            if made is not None:
+                found.append(made)
+                taken += 1
+    if len(found) < CLUTTER:
+        return None
+    if main is None and not stick.share([one.effect for one in found]) <= NULL_CLUTTER_MOST:
+        return None
+    return tuple(found)
+
+
+def _small(stick: Yardstick, name: str, sized: Sized, target: float) -> Concealed | None:
+    small = target / stick.noise
+
+    def share(strength: float) -> float:
+        return stick.share([Effect(name, sized(strength))], small=small)
+
+    strength, reached = strength_for(target, share, CLUTTER_CLOSE, CLUTTER_TRIES)
+    if not strength or not math.isfinite(reached) or abs(math.log(reached / target)) > math.log(2.0):
+        return None
+    return Concealed(Effect(name, sized(strength)), reached / stick.noise, reached)

@@ -1,0 +1,90 @@
+"""A machine with its experiments, and what is known of it: all of a case but effects and noise."""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.proof.machine import UNFORCED, Effect, Forcing, Machine, Observation, observe
+from rhythmid.proof.protocol import Run
+
+Array = NDArray[np.float64]
+Rng = np.random.Generator
+FINER = 8  # knots a sample of a smooth command
+Recorded = Literal["command", "effort", "base", "reference", "nothing"]  # what drives it, as recorded
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Everything of a case but effects and noise.
+
+    `believed` is the machine as its nominal model describes it, were all its values right; `lacks` the effect that is part of
+    the machine but not of that description. `recorded` says which signal is logged beside the motion. `scale` [m] or [m/s] is
+    what the measurement's noise is in proportion to, `effort_noise` the rms of the effort's in proportion to the effort's own; `lag` [s] by how much the motion that is logged beside it is older.
+    """
+
+    machine: Machine
+    believed: Machine
+    runs: tuple[Run, ...]
+    unseen: tuple[Run, ...]
+    scale: float
+    recorded: Recorded
+    forcing: Forcing = UNFORCED
+    input_delay: float = 0.0
+    measurement_delay: float = 0.0
+    velocity: bool = False
+    effort_noise: float = 0.0
+    lacks: Effect | None = None
+    units: tuple[str, str] = ("N", "m")
+    lag: float = 0.0
+
+    def observe(self, effects: Sequence[Effect], run: Run) -> Observation | None:
+        """The noise-free record of one run; None where the machine diverges."""
+        scaled = replace(self.forcing, amplitude=self.forcing.amplitude * run.forcing)
+        inside = [effect for effect in effects if effect != self.lacks]
+        moved = self.recorded == "base"
+        sent = (
+            replace(run, rate=FINER * run.rate) if moved else run
+        )  # what moves a base is smooth between samples, too
+        return observe(
+            self.machine, inside, scaled, sent.time, sent.command, self.input_delay, self.measurement_delay,
+            slopes=sent.slopes if moved else None, start=run.start, velocity=self.velocity, samples=run.time, lag=self.lag,
+        )  # fmt: skip
+
+    def observe_all(self, effects: Sequence[Effect]) -> list[Observation] | None:
+        """The records to learn from; None where the machine diverges in one of them."""
+        found = [self.observe(effects, run) for run in self.runs]
+        kept = [one for one in found if one is not None]
+        return kept if len(kept) == len(found) else None
+
+
+@dataclass(frozen=True)
+class Design:
+    """A kind of machine.
+
+    `effects` are the catalogue's that it may conceal; `draw` makes one of it that shows them; `unknown` tells which attribute
+    of the machine each parameter of the nominal model is that has to be estimated. `by_effort`: a mismatch is measured in the
+    effort, for a free run of such a machine means little. `noise` is the range of the measurement's noise in proportion to the
+    rig's scale; `delays`: nominal delays are part of the model.
+    """
+
+    name: str
+    effects: tuple[str, ...]
+    draw: Callable[[Rng, Sequence[str]], Rig]
+    unknown: Mapping[str, str]
+    noise: tuple[float, float]
+    by_effort: bool = False
+    delays: Collection[str] = ()
+    bags: bool = False
+    known_with: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def known(self, effects: Sequence[str]) -> tuple[str, ...]:
+        """Attributes that have been measured beforehand when these effects are concealed."""
+        return tuple(name for effect in effects for name in self.known_with.get(effect, ()))
+
+
+def log_uniform(rng: Rng, low: float, high: float) -> float:
+    """Drawn evenly in the logarithm."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))

@@ -1,0 +1,151 @@
+"""What lies in a case's folder: records that `rhythmid` reads, a nominal model, and answers that can be scored again."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from rhythmid.commands.proof import Machines
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.errors import InputError
+from rhythmid.identify.drive import driven
+from rhythmid.model import Model
+from rhythmid.proof.campaign import ALL, Campaign, begin
+from rhythmid.proof.draw import draw_case
+from rhythmid.proof.examine import _records
+from rhythmid.proof.machines.designs import DESIGNS
+from rhythmid.proof.perform import JUDGE, LEARN, NOMINAL, perform
+from rhythmid.proof.replay import redecider, replay, replay_campaign, told_hashes
+from rhythmid.proof.seal import seal, truth_of
+from rhythmid.record.read import load_records
+
+INPUT = {
+    "hopper": "force", "axis": "force", "joint": "force", "shaken": "base_displacement", "servo": "reference",
+    "motor": "force",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def catalogue():
+    return load_catalogue()
+
+
+TIDY = [(design, False) for design in DESIGNS if design != "hopper"]
+
+
+@pytest.mark.parametrize(("design", "cluttered"), [*TIDY, ("hopper", True), ("axis", True), ("servo", True)])
+def test_records_of_every_machine_can_be_read_and_drive_its_nominal_model(
+    design, cluttered, catalogue, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(
+        "rhythmid.proof.draw.put_clutter", lambda *_: ()
+    )  # what clutter there is does not matter here
+    case = draw_case(4, "null", 0, catalogue, design, cluttered)
+    perform(case, tmp_path, [1])
+    model = Model.load(tmp_path / NOMINAL, catalogue)
+    for part, runs in ((LEARN, case.rig.runs), (JUDGE, case.rig.unseen)):
+        records = load_records(_records(tmp_path / part))
+        assert len(records) == len(runs)
+        for record in records:
+            used = driven(record, model)
+            assert used.input is None if design in ("decay", "pendulum") and not case.rig.runs[0].command.any() else (
+                used.input is not None and used.input_kind == INPUT.get(design, "force")
+            )  # fmt: skip
+            assert record.output_kind == ("velocity" if design == "motor" else "position")
+            run = next(run for run in runs if run.name in (record.name, Path(record.name).stem))
+            seen = case.observe(run)
+            assert seen is not None and len(record.output) == len(run.time)
+            error = np.abs(record.output.value - seen.measured)
+            assert np.median(error) < 3.0 * case.noise.std
+            steps = np.diff(record.output.time)
+            assert (np.std(steps) * run.rate > 1e-3) == cluttered
+
+
+def test_the_effort_that_is_logged_has_the_noise_that_the_case_says(catalogue, tmp_path):
+    case = draw_case(4, "null", 0, catalogue, "axis")
+    perform(case, tmp_path, [1])
+    (record, *_) = load_records(_records(tmp_path / LEARN))
+    run = next(run for run in case.rig.runs if run.name in (record.name, Path(record.name).stem))
+    seen = case.observe(run)
+    assert seen is not None and record.input is not None
+    noise = record.input.value - seen.effort
+    assert np.std(noise) == pytest.approx(case.rig.effort_noise * np.sqrt(np.mean(seen.effort**2)), rel=0.05)
+
+
+def test_the_command_line_knows_every_machine():
+    assert set(get_args(Machines)) == {*DESIGNS, ALL}
+
+
+@pytest.fixture
+def kept(catalogue, tmp_path) -> tuple[Path, Campaign]:
+    """A campaign of one case that is done, its answer made up."""
+    campaign = Campaign(4, "null", 1, "decay")
+    (task,) = campaign.tasks
+    out = tmp_path / "out"
+    begin(out, campaign, resume=False)
+    case = draw_case(4, "null", 0, catalogue, "decay")
+    told = seal(out / "sealed" / f"{task.name}.json", truth_of(case, {1: 0.01}))
+    (out / "seals.txt").write_text(f"2026-01-01T00:00:00  {told}  {task.name}\n")
+    folder = out / "cases" / task.name
+    folder.mkdir(parents=True)
+    answer = {
+        "verdict": "missing_physics", "indistinguishable": [], "block": 1, "seconds": 2.0, "processor_seconds": 3.0,
+        "missing": [{"element": "quadratic_drag", "slot": "force", "probability": 0.9, "parameters": {}}],
+        "evidence": {"scores": [1.0]},
+    }  # fmt: skip
+    (folder / "answer.json").write_text(json.dumps(answer))
+    return out, campaign
+
+
+def test_kept_answers_are_scored_again_without_touching_the_campaign(kept):
+    out, campaign = kept
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    (one,), _ = replay_campaign(out, campaign, campaign.tasks)
+    assert one.false_alarm and one.stated_wrong == ("quadratic_drag",)
+    assert "--replay" in (out / "replay.md").read_text()
+    assert json.loads((out / "replay.json").read_text())["cases"][0]["case"] == one.case
+    assert {path: path.read_bytes() for path in before} == before
+
+
+def test_a_verdict_is_reached_anew_from_the_evidence_that_an_answer_holds():
+    asked = []
+
+    def redecide(answer):
+        asked.append(answer["evidence"])
+        return {"verdict": "consistent", "missing": []}
+
+    plain = {"verdict": "undecided", "seconds": 1.0, "processor_seconds": 2.0}
+    assert (
+        replay(plain, redecide) is plain and replay({**plain, "evidence": {}}, None)["verdict"] == "undecided"
+    )
+    anew = replay({**plain, "evidence": {"scores": []}}, redecide)
+    assert anew["verdict"] == "consistent" and anew["processor_seconds"] == 2.0
+    assert asked == [{"scores": []}]
+
+
+def test_replay_does_without_a_diagnosis_that_decides_anew(monkeypatch):
+    monkeypatch.setattr("rhythmid.proof.replay.REDECIDES", "rhythmid.diagnose.not_there")
+    assert redecider() is None
+
+
+def test_a_folder_without_answers_cannot_be_replayed(tmp_path):
+    campaign = Campaign(4, "null", 1, "decay")
+    with pytest.raises(InputError, match="no answer"):
+        replay_campaign(tmp_path, campaign, campaign.tasks)
+    assert told_hashes(tmp_path) == {}
+
+
+def test_a_truth_that_was_changed_since_is_not_scored(kept):
+    out, campaign = kept
+    path = out / "sealed" / f"{campaign.tasks[0].name}.json"
+    path.write_text(path.read_text().replace('"null"', '"single"'))
+    with pytest.raises(InputError, match="seal is broken"):
+        replay_campaign(out, campaign, campaign.tasks)
+
+
+def test_a_campaign_is_described_by_the_file_that_it_leaves(kept):
+    out, campaign = kept
+    assert json.loads((out / "campaign.json").read_text()) == asdict(campaign)
