@@ -188,7 +188,7 @@ force:
 """
 ARM = """
 units: {force: N*m, position: rad}
-inertia: {mass: {value: 0.8, unit: kg*m^2, prior: {mean: 0.8, std: 0.1}}}
+inertia: {mass: {value: 0.8, unit: N*m*s^2/rad, prior: {mean: 0.8, std: 0.1}}}
 force:
   - pendulum_gravity: {moment: {value: 14.0, unit: N*m, prior: {mean: 14.0, std: 1.5}}, reference: {value: 0.0, unit: rad, fixed: true}}
   - viscous_damper: {damping: {value: 1.0, unit: N*m*s/rad}}

@@ -86,7 +86,7 @@ def row_of(case: Case, found: dict[str, Any] | None, cpu: float, failure: str = 
     if share is None and names and before and after is not None:
         share = 1.0 - (after / before) ** 2
     scoring = found.get("scoring", "")
-    kind = scoring.get("kind", "") if isinstance(scoring, dict) else str(scoring).split(":")[0][:14]
+    kind = scoring["kind"] if isinstance(scoring, dict) else str(scoring).split(",")[0].split(":")[0]
     return Row(
         case.name, records, case.nominal, found["verdict"], names, before, after, share, kind, cpu, judged(case, found, names)
     )  # fmt: skip
@@ -132,6 +132,35 @@ def table(rows: Iterable[Row], markdown: bool = False) -> str:
     )
 
 
+def mirrored(rows: Sequence[Row]) -> list[str]:
+    """Whether the left and right joints of a quadruped get the same dominant name."""
+    first = {
+        row.case.removeprefix("go2 "): row.names[0][0] if row.names else row.verdict
+        for row in rows
+        if row.case.startswith("go2 ")
+    }
+    lines: list[str] = []
+    for left, name in first.items():
+        right = left.replace("L_", "R_", 1)
+        if "L_" in left and right in first:
+            verb = "agree" if name == first[right] else "differ"
+            lines.append(f"{left} and {right} {verb}: {name}, {first[right]}")
+    return lines
+
+
+def by_set(rows: Sequence[Row]) -> list[str]:
+    """Right answers and processor time by set."""
+    sets = dict.fromkeys(row.case.split()[0] for row in rows)
+    lines: list[str] = []
+    for name in sets:
+        own = [row for row in rows if row.case.split()[0] == name]
+        known = [row for row in own if row.right]
+        lines.append(
+            f"{name}: {sum(row.right == 'first' for row in known)} of {len(known)} right, {sum(row.cpu for row in own):.0f} s CPU"
+        )
+    return lines
+
+
 def _children() -> float:
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
@@ -175,6 +204,8 @@ def main() -> None:
             rows.append(diagnosed(case, folder, chosen.budget, chosen.limit))
             print("  ".join(cells(rows[-1])), file=sys.stderr, flush=True)
     print(table(rows, chosen.markdown))
+    for line in (*mirrored(rows), *by_set(rows)):
+        print(line)
     known = [row for row in rows if row.right]
     print(
         f"\n{sum(row.right == 'first' for row in known)} of {len(known)} right; {sum(row.cpu for row in rows):.0f} s CPU"

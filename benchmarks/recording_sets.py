@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from bench_case import COULOMB_FAMILY, LAGS, Array, Case, write_model, write_signals, write_table
+from bench_case import COULOMB_FAMILY, Array, Case, write_model, write_signals, write_table
 from leg_inertia import JOINTS, LEGS, joint_models
 
 
@@ -70,7 +70,7 @@ UNTOUCHED = {  # s: windows in which no hand pushes the pendulum (docs/real.md)
 # 0.6755 kg at 0.5 m are the values in the owners' own controller files (data/parameters/sp_parameters_energy.yaml)
 PENDULUM_MODEL = """
 units: {force: N*m, position: rad}
-inertia: {mass: {value: 0.169, unit: kg*m^2, prior: {mean: 0.169, std: 0.05}}}
+inertia: {mass: {value: 0.169, unit: N*m*s^2/rad, prior: {mean: 0.169, std: 0.05}}}
 force:
   - pendulum_gravity: {moment: {value: 3.3, unit: N*m}, reference: {value: 0.0, unit: rad, fixed: true}}
 """
@@ -99,7 +99,7 @@ def pendulum_cases(data: Path, folder: Path) -> list[Case]:
 # --- XL330: a hobby servo that lifts a pendulum, four firmware gains ---
 FULL_DUTY = 885.0  # counts of `load` at full pulse width: the XL330's PWM limit in its e-manual
 SUPPLY = 7.4  # V
-XL330_HELD_OUT = "sin_time_square"  # one of the four trajectories, at every gain
+XL330_HELD_OUT = "sin_sin"  # one of the four trajectories, at every gain
 # Forces in volts, that is, torques divided by kt/R: neither constant has to be known, and back-EMF is viscous. 0.49 kg at 0.1 m.
 XL330_MODEL = """
 units: {force: V, position: rad}
@@ -168,7 +168,7 @@ COULOMB = "  - coulomb_friction: {force: {value: 0.1, unit: V}}"
 GO2_RATE, GO2_CUT = 200.0, (0.0, 16.0, 23.5)  # Hz; s, learnt from and held out
 GO2_MODEL = """
 units: {{force: N*m, position: rad}}
-inertia: {{mass: {{value: {inertia:.5f}, unit: kg*m^2, prior: {{mean: {inertia:.5f}, std: {spread:.5f}}}}}}}
+inertia: {{mass: {{value: {inertia:.5f}, unit: N*m*s^2/rad, prior: {{mean: {inertia:.5f}, std: {spread:.5f}}}}}}}
 command:
   - position_control: {{proportional: {{value: 20.0, unit: N*m/rad, fixed: true}}, derivative: {{value: 1.5, unit: N*m*s/rad, fixed: true}}}}
 force:
@@ -197,9 +197,7 @@ def go2_cases(data: Path, folder: Path) -> list[Case]:
             folder, f"go2_{name}",
             GO2_MODEL.format(inertia=one.inertia, spread=SPREAD * one.inertia, moment=one.moment, reference=one.reference),
         )  # fmt: skip
-        cases.append(
-            Case(f"go2 {name}", "servo, viscous", (seen,), (unseen,), model, LAGS | COULOMB_FAMILY, {})
-        )
+        cases.append(Case(f"go2 {name}", "servo, viscous", (seen,), (unseen,), model, None, {}))
     return cases
 
 
