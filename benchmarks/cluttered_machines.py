@@ -217,7 +217,7 @@ SERVO = """
 units: {force: rad/s^2, position: rad}
 inertia: {mass: {value: 1.0, fixed: true}}
 command:
-  - position_control: {proportional: {value: 400.0, fixed: true}, derivative: {value: 25.0, fixed: true}}
+  - position_control: {proportional: {value: 400.0, fixed: true}, derivative: {value: 24.0}}
 """
 HOPPER = """
 inertia: {mass: {value: 1.0, unit: kg, fixed: true}}
