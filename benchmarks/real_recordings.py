@@ -1,6 +1,7 @@
 """The diagnosis on recordings of real machines and on simulated machines with clutter, in one table.
 
     python benchmarks/real_recordings.py [--only pendulum,xl330] [--budget S] [--limit S] [--folder DIR] [--markdown] [--json FILE] [--list]
+    python benchmarks/real_recordings.py --rows FILE [FILE ...] [--markdown]
 
 Every case is diagnosed by the command `rhythmid diagnose` in a process of its own, so that its processor time is its own. Printed for
 each: number of records learnt from + held out; verdict; names with probability, the dominant one first; error on held-out records of the
@@ -11,7 +12,7 @@ the verdict does not stand by it; `no` otherwise.
 
 The recordings are looked for in $RHYTHMID_DATA, else in ../shared/data beside the checkout (docs/real.md); without them the simulated
 machines alone are run. `--folder` keeps signals.yaml, model.yaml, tables and answers; `--limit` ends a case after so many seconds of
-wall time; `--budget` is passed on to the diagnosis.
+wall time; `--budget` is passed on to the diagnosis. `--rows` prints the rows of earlier runs again.
 """
 
 import argparse
@@ -161,6 +162,27 @@ def by_set(rows: Sequence[Row]) -> list[str]:
     return lines
 
 
+def saved_rows(paths: Iterable[Path]) -> list[Row]:
+    """Rows that `--json` wrote; a case that was run again counts as it was run last."""
+    found: dict[str, Row] = {}
+    for path in paths:
+        for one in json.loads(path.read_text()):
+            names = tuple((str(name), float(probability)) for name, probability in one.pop("names"))
+            found[one["case"]] = Row(**one, names=names)
+    return list(found.values())
+
+
+def told(rows: Sequence[Row], markdown: bool) -> None:
+    """Print all rows and what they come to."""
+    print(table(rows, markdown), end="\n\n")
+    for line in (*mirrored(rows), *by_set(rows)):
+        print(line)
+    known = [row for row in rows if row.right]
+    print(
+        f"{sum(row.right == 'first' for row in known)} of {len(known)} right; {sum(row.cpu for row in rows):.0f} s CPU"
+    )
+
+
 def _children() -> float:
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
@@ -182,9 +204,13 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=1800.0, help="wall time a case may take [s]")
     parser.add_argument("--folder", type=Path, help="where files and answers are kept")
     parser.add_argument("--markdown", action="store_true", help="print the table for a document")
-    parser.add_argument("--json", type=Path, help="write the rows there, too")
+    parser.add_argument("--json", type=Path, help="write the rows there, after every case")
     parser.add_argument("--list", action="store_true", help="name the cases and end")
+    parser.add_argument("--rows", type=Path, nargs="+", help="print the rows in these files of earlier runs")
     chosen = parser.parse_args()
+    if chosen.rows:
+        told(saved_rows(chosen.rows), chosen.markdown)
+        return
     wanted = [word.strip() for word in chosen.only.split(",") if word.strip()]
 
     def is_wanted(name: str) -> bool:
@@ -203,15 +229,9 @@ def main() -> None:
         for case in cases:
             rows.append(diagnosed(case, folder, chosen.budget, chosen.limit))
             print("  ".join(cells(rows[-1])), file=sys.stderr, flush=True)
-    print(table(rows, chosen.markdown))
-    for line in (*mirrored(rows), *by_set(rows)):
-        print(line)
-    known = [row for row in rows if row.right]
-    print(
-        f"\n{sum(row.right == 'first' for row in known)} of {len(known)} right; {sum(row.cpu for row in rows):.0f} s CPU"
-    )
-    if chosen.json:
-        chosen.json.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
+            if chosen.json:  # after every case, so that a run that is ended early is not lost
+                chosen.json.write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
+    told(rows, chosen.markdown)
 
 
 if __name__ == "__main__":
