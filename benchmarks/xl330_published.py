@@ -113,8 +113,8 @@ def logs(folder: Path) -> list[Log]:
     return [Log(int(told["kp"]), str(told["trajectory"]), columns) for told, columns in found]
 
 
-def moving(log: Log) -> tuple[Array, Array, Array, Array]:
-    """Angle, speed, acceleration and duty [n] of a record's samples that count, all low-passed alike."""
+def moving(log: Log, on: bool = True) -> tuple[Array, Array, Array, Array]:
+    """Angle, speed, acceleration and duty [n] of a record's samples that count, all low-passed alike; with the motor `on` or off."""
     columns = log.columns
     grid = np.arange(columns["t"][0] + 0.01, columns["t"][-1] - 0.01, 1 / RATE)
     raw = {name: np.interp(grid, columns["t"], columns[name]) for name in ("position", "duty", "on")}
@@ -122,10 +122,20 @@ def moving(log: Log) -> tuple[Array, Array, Array, Array]:
     q, duty = sosfiltfilt(low, raw["position"]), sosfiltfilt(low, raw["duty"])
     v = np.gradient(q, 1 / RATE)
     a = np.gradient(v, 1 / RATE)
-    out = (np.abs(v) < REST) | (raw["on"] < 1.0) | (np.abs(raw["duty"]) > 0.99)
+    switched = raw["on"] if on else 1.0 - raw["on"]
+    out = (np.abs(v) < REST) | (switched < 1.0) | (np.abs(raw["duty"]) > 0.99)
     kept = ~(np.convolve(out, np.ones(5), "same") > 0)
     kept[:8] = kept[-8:] = False
     return q[kept], v[kept], a[kept], duty[kept]
+
+
+def damping_switched_off(log: Log) -> float:
+    """Viscous damping [N m s/rad] while the motor is off, beside a friction by the transmitted torque: least squares of the motion's balance."""
+    q, v, a, _ = moving(log, on=False)
+    rotor, offset = 0.0020, 0.0207  # kg m^2, rad: published (m6) and fitted alike
+    load = INERTIA * a + MOMENT * np.sin(q + offset)
+    columns = np.stack([v, np.sign(v) * np.abs(load)], axis=1)
+    return float(np.linalg.lstsq(columns, -(load + rotor * a), rcond=None)[0][0])
 
 
 def effort_error(servo: Servo, log: Log) -> tuple[float, float, int]:

@@ -134,6 +134,15 @@ def test_friction_by_the_transmitted_torque_predicts_the_voltage_as_the_publishe
     assert error(by_load) == pytest.approx(error(servo.published(DATA / "xl330", "m6")), rel=0.15)
 
 
+@present("xl330")
+def test_a_motor_that_is_switched_off_does_not_brake(servo_logs):
+    """The arm swings with less viscous damping than a seventh of what a short circuit would give, k_t^2 / R of the published m6."""
+    shorted = 0.3036**2 / 2.445
+    for log in servo_logs:
+        if log.trajectory == "lift_and_drop":
+            assert servo.damping_switched_off(log) < 0.15 * shorted
+
+
 # --- the Go2's joints ---
 
 
