@@ -25,7 +25,7 @@ class Case:
     train, holdout : signals.yaml files; without `holdout` the diagnosis keeps the last fifth of every record.
     model : the nominal model's file.
     first : any of these elements is right as the dominant effect; empty where nothing is missing, None where no answer is accepted.
-    truth : parameters that are known, `element.parameter` -> value in the model's units, within `tolerance`.
+    truth : parameters that are known, `element.parameter` -> value in the model's units, which the bench compares.
     """
 
     name: str
@@ -35,7 +35,6 @@ class Case:
     model: Path
     first: frozenset[str] | None
     truth: Mapping[str, float]
-    tolerance: float = 0.15
 
 
 def write_table(path: Path, columns: Mapping[str, Array]) -> Path:

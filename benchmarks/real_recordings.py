@@ -6,8 +6,8 @@
 Every case is diagnosed by the command `rhythmid diagnose` in a process of its own, so that its processor time is its own. Printed for
 each: number of records learnt from + held out; verdict; names with probability, the dominant one first; error on held-out records of the
 refitted nominal and of the augmented model, in % of the motion or, where the effort is predicted, of the effort; share, the part of the
-mismatch's power that all names together explain; kind of scoring; processor seconds; and, where the answer is known, whether it is
-right: `first`, the accepted effect comes first and is stated (or nothing is named where nothing is missing); `listed`, it comes first but
+mismatch's power that all names together explain; kind of scoring; processor seconds; the largest relative error of the known parameters
+that were found; and, where the answer is known, whether it is right: `first`, the accepted effect comes first and is stated (or nothing is named where nothing is missing); `listed`, it comes first but
 the verdict does not stand by it; `no` otherwise.
 
 The recordings are looked for in $RHYTHMID_DATA, else in ../shared/data beside the checkout (docs/real.md); without them the simulated
@@ -30,8 +30,20 @@ from bench_case import Case
 from cluttered_machines import cluttered_cases
 from recording_sets import real_cases
 
-HEADS = ("set", "records", "nominal", "verdict", "names", "held out, %", "share", "scoring", "CPU s", "right")
-STATED = 0.8  # joint probability from which a verdict stands by its names
+HEADS = (
+    "set",
+    "records",
+    "nominal",
+    "verdict",
+    "names",
+    "held out, %",
+    "share",
+    "scoring",
+    "CPU s",
+    "off, %",
+    "right",
+)
+SAID = 120  # characters of a refusal that the table shows
 
 
 @dataclass(frozen=True)
@@ -49,6 +61,7 @@ class Row:
     scoring: str
     cpu: float
     right: str
+    off: float | None = None  # largest relative error of the parameters that are known and were found
 
 
 def diagnosed(case: Case, folder: Path, budget: float | None, limit: float) -> Row:
@@ -66,7 +79,8 @@ def diagnosed(case: Case, folder: Path, budget: float | None, limit: float) -> R
     before = _children()
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=limit)
-        failure = f"exit {done.returncode}: {_last_line(done.stderr)}" if done.returncode else ""
+        said = _last_line(done.stderr).replace(f"{folder}/", "")
+        failure = f"exit {done.returncode}: {said[:SAID]}" if done.returncode else ""
     except subprocess.TimeoutExpired:
         failure = f"stopped after {limit:g} s"
     cpu = _children() - before
@@ -89,8 +103,16 @@ def row_of(case: Case, found: dict[str, Any] | None, cpu: float, failure: str = 
     scoring = found.get("scoring", "")
     kind = scoring["kind"] if isinstance(scoring, dict) else str(scoring).split(",")[0].split(":")[0]
     return Row(
-        case.name, records, case.nominal, found["verdict"], names, before, after, share, kind, cpu, judged(case, found, names)
+        case.name, records, case.nominal, found["verdict"], names, before, after, share, kind, cpu, judged(case, found, names), known_error(case, found),
     )  # fmt: skip
+
+
+def known_error(case: Case, found: dict[str, Any]) -> float | None:
+    """Largest relative error of the parameters that are known and were found; None where there is none."""
+    values = {name: one["value"] for name, one in found.get("parameters", {}).items()}
+    return max(
+        (abs(values[name] / true - 1.0) for name, true in case.truth.items() if name in values), default=None
+    )
 
 
 def judged(case: Case, found: dict[str, Any], names: Sequence[tuple[str, float]]) -> str:
@@ -117,7 +139,8 @@ def cells(row: Row) -> tuple[str, ...]:
     )
     share = "-" if row.share is None else f"{row.share:.2f}"
     return (
-        row.case, row.records, row.nominal, row.verdict, names, errors, share, row.scoring, f"{row.cpu:.0f}", row.right,
+        row.case, row.records, row.nominal, row.verdict, names, errors, share, row.scoring, f"{row.cpu:.0f}",
+        "-" if row.off is None else f"{100 * row.off:.0f}", row.right,
     )  # fmt: skip
 
 
@@ -190,7 +213,7 @@ def _children() -> float:
 
 def _last_line(text: str) -> str:
     lines = [line for line in text.splitlines() if line.strip()]
-    return lines[-1][:120] if lines else ""
+    return lines[-1] if lines else ""
 
 
 def main() -> None:

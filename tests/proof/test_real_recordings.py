@@ -28,7 +28,7 @@ PUBLISHED = {
     "inertia": 0.06259,
     "gravity": 0.1022 * 9.81,
     "viscous": 0.04707,
-    "coulomb": 0.1839,
+    "coulomb": 0.1839 * np.pi / 2,
     "offset": -0.0759,
 }
 MEASURED = {"inertia": 0.1805, "gravity": 0.360 * 9.81, "viscous": 0.0139, "coulomb": 0.159, "offset": 0.0076}

@@ -60,6 +60,21 @@ def test_the_kind_of_scoring_is_told_in_a_word_or_two(scoring, kind):
     assert row_of(FRICTION, answer(scoring=scoring), 1.0).scoring == kind
 
 
+def test_known_parameters_that_were_found_are_compared():
+    case = Case(
+        "axis",
+        "mass",
+        (PLACE,),
+        (),
+        PLACE,
+        COULOMB_FAMILY,
+        {"inertia.mass": 2.0, "coulomb_friction.force": 1.0},
+    )
+    found = answer(parameters={"inertia.mass": {"value": 2.2}})
+    assert row_of(case, found, 1.0).off == pytest.approx(0.1)
+    assert row_of(case, answer(), 1.0).off is None
+
+
 def test_a_case_that_fails_has_a_row_with_the_reason():
     row = row_of(FRICTION, None, 3.0, "exit 2: too short")
     assert row.verdict == "exit 2: too short" and row.right == "no"
