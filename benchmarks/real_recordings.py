@@ -65,17 +65,19 @@ class Row:
 
 
 def diagnosed(case: Case, folder: Path, budget: float | None, limit: float) -> Row:
-    """The answer of `rhythmid diagnose` to `case`; its JSON stays in `folder`."""
-    answer = folder / f"{case.name.replace(' ', '_')}.json"
+    """The answer of `rhythmid diagnose` to `case`; its JSON and the augmented model stay in `folder`."""
+    stem = case.name.replace(" ", "_")
+    answer, augmented = folder / f"{stem}.json", folder / f"{stem}-augmented.yaml"
     command = [
         sys.executable, "-m", "rhythmid.cli", "diagnose", *map(str, case.train), "--model", str(case.model),
-        "--json", str(answer),
+        "--json", str(answer), "--save-model", str(augmented),
     ]  # fmt: skip
     for path in case.holdout:
         command += ["--holdout", str(path)]
     if budget is not None:
         command += ["--budget", str(budget)]
-    answer.unlink(missing_ok=True)
+    for path in (answer, augmented):
+        path.unlink(missing_ok=True)
     before = _children()
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=limit)

@@ -1,6 +1,6 @@
 """The published models of the XL330 servo (M. Duclusaud et al., ICRA 2025) on the recordings, by firmware gain.
 
-    python benchmarks/xl330_published.py [--markdown]
+    python benchmarks/xl330_published.py [--model SAVED.yaml ...] [--markdown]
 
 Two errors of each model, in % (rms of the error / standard deviation of what was recorded):
 
@@ -10,6 +10,9 @@ Two errors of each model, in % (rms of the error / standard deviation of what wa
 
 Beside them a friction that is proportional to the torque that the joint transmits, mu |m l^2 a + m g l sin q| sgn v, fitted to three
 trajectories at all gains and judged, as all others, by the held-out one, and the same fit with viscous or Coulomb friction instead.
+
+`--model` runs models that `rhythmid diagnose --save-model` wrote in the same way; effects other than friction and the motor are left out, and
+said so.
 
 The firmware's law, duty = gain (goal - position) clipped to 1, was read off the recordings: `load` counts 885 at full duty, gain = 2.545/885
 per unit of the firmware's gain and rad. The published constants belong to the authors' 0.00246, found with an oscilloscope on another servo, and
@@ -27,6 +30,8 @@ from bench_case import Array
 from recording_sets import FULL_DUTY, SUPPLY, XL330_HELD_OUT, data_folder, xl330_log
 from scipy.signal import butter, sosfiltfilt
 
+from rhythmid.model import Model
+
 MASS, LENGTH, GRAVITY = 0.49, 0.1, 9.80665  # kg, m of the logs; m/s^2
 INERTIA, MOMENT = MASS * LENGTH**2, MASS * GRAVITY * LENGTH  # kg m^2, N m
 RATE, CUT = 180.0, 12.0  # Hz: of the resampled logs; of the low-pass
@@ -34,6 +39,7 @@ REST = 0.12  # rad/s; slower, friction takes any value below its level
 STEP = 1e-3  # s, of the closed-loop run
 COUNTS = 2.545  # of load, per unit of the firmware's gain and rad
 AUTHORS_GAIN = 0.00246  # duty per unit of the firmware's gain and rad, in the authors' code
+NEGLIGIBLE = 1e-6  # N m/A, a torque constant whose back-EMF does not count
 
 
 @dataclass(frozen=True)
@@ -218,45 +224,96 @@ def published(folder: Path, name: str) -> Servo:
     )
 
 
+def of_model(model: Model) -> tuple[Servo, tuple[str, ...]]:
+    """The servo that a saved model describes, in volts or in N m with a `dc_motor`, and the elements that are not counted here.
+
+    In volts all torques are k_t/R times what they were, known from gravity's, and back-EMF is part of the damping: a torque constant next to
+    nothing leaves it there.
+    """
+    values = {name: value.value for name, value in model.parameters.items()}
+    counted = {
+        "pendulum_gravity", "viscous_damper", "coulomb_friction", "load_dependent_friction", "transmitted_load_friction", "dc_motor",
+    }  # fmt: skip
+    if "dc_motor.resistance" in values:
+        scale, kt = 1.0, values["dc_motor.torque_constant"]
+        resistance = values["dc_motor.resistance"] / values["dc_motor.supply"]
+    else:
+        scale, kt = values["pendulum_gravity.moment"] / MOMENT, NEGLIGIBLE
+        resistance = scale * kt
+    by_motor = values.get("load_dependent_friction.coefficient", 0.0)
+    both = values.get("transmitted_load_friction.coefficient", 0.0)
+    found = Servo(
+        COUNTS / FULL_DUTY, kt, resistance, values["inertia.mass"] / scale - INERTIA,
+        -values.get("pendulum_gravity.reference", 0.0),
+        friction_base=values.get("coulomb_friction.force", 0.0) / scale,
+        friction_viscous=values.get("viscous_damper.damping", 0.0) / scale,
+        load_friction_motor=by_motor + both,
+        load_friction_external=both * values.get("transmitted_load_friction.external_ratio", 1.0),
+    )  # fmt: skip
+    return found, tuple(term.label for term in model.terms if term.label not in counted)
+
+
+def errors(servo: Servo, everything: Sequence[Log]) -> list[tuple[str, ...]]:
+    """Kind of error, then the errors [%] on the held-out records by gain, on all of them, and on all records."""
+    unseen = [log for log in everything if log.trajectory == XL330_HELD_OUT]
+    lines: list[tuple[str, ...]] = []
+    for kind, measure in (("effort", effort_error), ("motion", motion_error)):
+        parts = {id(log): measure(servo, log) for log in everything}
+
+        def relative(chosen: Sequence[Log], parts: dict[int, tuple[float, float, int]] = parts) -> str:
+            error, spread = (sum(parts[id(log)][i] for log in chosen) for i in (0, 1))
+            return f"{100 * np.sqrt(error / spread):.1f}"
+
+        by_gain = [relative([log for log in unseen if log.gain == gain]) for gain in gains_of(everything)]
+        lines.append((kind, *by_gain, relative(unseen), relative(everything)))
+    return lines
+
+
+def gains_of(everything: Sequence[Log]) -> list[int]:
+    return sorted({log.gain for log in everything})
+
+
+def constants(servo: Servo) -> str:
+    """What a servo comes to; R/kt in the volts of the recorded duty, whatever gain its constants belong to."""
+    volts = servo.error_gain * FULL_DUTY / COUNTS
+    return (
+        f"R/kt {servo.R / servo.kt / volts:.2f} V/(N m), mu {servo.transmitted:.3f}, armature {servo.armature:.5f} kg m^2, "
+        f"offset {servo.q_offset:.4f} rad, base {servo.friction_base:.4f} N m, viscous {servo.friction_viscous:.4f} N m s/rad"
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    parser.add_argument(
+        "--model",
+        type=Path,
+        nargs="*",
+        default=[],
+        help="models saved by a diagnosis, to be run the same way",
+    )
     parser.add_argument("--markdown", action="store_true", help="print the table for a document")
-    markdown = parser.parse_args().markdown
+    chosen = parser.parse_args()
     folder = data_folder() / "xl330"
     everything = logs(folder)
     seen = [log for log in everything if log.trajectory != XL330_HELD_OUT]
-    unseen = [log for log in everything if log.trajectory == XL330_HELD_OUT]
     servos = {f"published {name}": published(folder, name) for name in ("m1", "m2", "m6")}
     servos |= {f"fitted, {law}": fitted(seen, law) for law in ("viscous", "coulomb", "transmitted")}
-    gains = sorted({log.gain for log in everything})
-    lines = [("model", "error of", *(f"gain {gain}" for gain in gains), "all", "all records")]
-    for name, servo in servos.items():
-        for kind, measure in (("effort", effort_error), ("motion", motion_error)):
-            parts = {id(log): measure(servo, log) for log in everything}
-
-            def relative(chosen: Sequence[Log], parts: dict[int, tuple[float, float, int]] = parts) -> str:
-                error, spread = (sum(parts[id(log)][i] for log in chosen) for i in (0, 1))
-                return f"{100 * np.sqrt(error / spread):.1f}"
-
-            lines.append(
-                (name, kind, *(relative([log for log in unseen if log.gain == gain]) for gain in gains), relative(unseen), relative(everything))
-            )  # fmt: skip
-    if markdown:
+    notes: list[str] = []
+    for path in chosen.model:
+        servos[path.stem], left_out = of_model(Model.load(path))
+        notes += [f"{path.stem}: without {', '.join(left_out)}"] if left_out else []
+    lines = [("model", "error of", *(f"gain {gain}" for gain in gains_of(everything)), "all", "all records")]
+    lines += [(name, *line) for name, servo in servos.items() for line in errors(servo, everything)]
+    if chosen.markdown:
         head, *rest = ["| " + " | ".join(line) + " |" for line in lines]
         print("\n".join([head, "|" + " --- |" * len(lines[0]), *rest]))
     else:
-        print(
-            "\n".join(
-                "  ".join(cell.ljust(22 if not i else 11) for i, cell in enumerate(line)).rstrip()
-                for line in lines
-            )
-        )
-    for name, servo in servos.items():
-        print(
-            f"{name}: R/kt {servo.R / servo.kt * (servo.error_gain * FULL_DUTY / COUNTS) ** -1:.2f} V/(N m) in recorded volts, mu {servo.transmitted:.3f}, armature {servo.armature:.5f}, offset {servo.q_offset:.4f}, base {servo.friction_base:.4f}, viscous {servo.friction_viscous:.4f}"
-        )
+        widths = [max(len(line[index]) for line in lines) + 2 for index in range(len(lines[0]))]
+        for line in lines:
+            print("".join(cell.ljust(width) for cell, width in zip(line, widths)).rstrip())
+    print("\n" + "\n".join([*(f"{name}: {constants(servo)}" for name, servo in servos.items()), *notes]))
 
 
 if __name__ == "__main__":
