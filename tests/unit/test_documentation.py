@@ -52,7 +52,7 @@ def test_the_files_of_other_machines_are_read_and_fit_together(machine, tmp_path
     assert model.units.position == signals.channels["output"].unit.removesuffix("/s")
 
 
-@pytest.mark.parametrize("document", ["README.md", "docs/files.md", "docs/machines.md"])
+@pytest.mark.parametrize("document", ["README.md", "docs/files.md", "docs/machines.md", "docs/real.md"])
 def test_links_lead_to_files_that_exist(document):
     text = (ROOT / document).read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)#]+)\)", text):

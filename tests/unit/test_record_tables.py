@@ -1,5 +1,6 @@
 """Tables as records: every kind of file and separator, and one line for every fault."""
 
+import gzip
 import os
 from pathlib import Path
 
@@ -80,6 +81,24 @@ def test_numpy_and_matlab_files_are_read(tmp_path):
         check(read_record(signals(tmp_path, file)))
 
 
+@pytest.mark.parametrize("file", ["run.csv.gz", "run.txt.gz", "run.CSV.GZ"])
+def test_a_compressed_text_table_is_read_in_place(tmp_path, file):
+    (tmp_path / file).write_bytes(gzip.compress(text().encode()))
+    check(read_record(signals(tmp_path, file)))
+    named = signals(tmp_path, "", COLUMNS)
+    (record,) = load_records([tmp_path / file], named)
+    check(record)
+    assert record.name == "run"
+
+
+def test_one_column_of_an_array_is_a_signal(tmp_path):
+    np.savez(
+        tmp_path / "run.npz", t=TIME, y=np.stack([0 * Y, Y], axis=1), u=np.stack([U, 0 * U, 0 * U], axis=1)
+    )
+    content = SIGNALS.replace("column: u", 'column: "u[0]"').replace("column: y", 'column: "y[1]"')
+    check(read_record(signals(tmp_path, "run.npz", content)))
+
+
 def test_scale_offset_rate_and_use_are_applied(tmp_path):
     np.savez(tmp_path / "run.npz", u=1000 * U, y=100 * Y + 5)
     record = read_record(signals(
@@ -154,6 +173,9 @@ def test_a_spoilt_text_table_is_refused_with_one_line(tmp_path, fault):
         ("run.npz", b"PK\x03\x04 broken", "run.npz: cannot be read as a table"),
         ("run.mat", b"MATLAB 5.0 MAT-file, or not", "run.mat: cannot be read as a table"),
         ("run.mat", b"MATLAB 7.3 MAT-file" + bytes(105) + b"\x00\x02IM" + bytes(400), "save it with"),
+        ("run.csv.gz", b"t,u,y, but not compressed", "run.csv.gz: cannot be read"),
+        ("run.csv.gz", gzip.compress(text().encode())[:400], "run.csv.gz: cannot be read as a table"),
+        ("run.gz", gzip.compress(text().encode()), "is not a table"),
         ("run.parquet", b"PAR1", "is not a table; .mat, .npz and .csv, .tsv, .txt, .dat can be read"),
         ("run.xlsx", b"PK", "is not a table"),
     ],
@@ -177,6 +199,7 @@ def test_a_pickle_within_a_numpy_file_is_not_opened(tmp_path):
         ({"t": TIME, "u": U, "y": Y.reshape(20, 10)}, r"has shape \(20, 10\); a vector is expected"),
         ({"t": TIME, "u": U, "y": Y + 1j}, "does not hold real numbers"),
         ({"t": TIME, "u": U, "y": np.array(["a"] * N)}, "does not hold real numbers"),
+        ({"t": TIME, "u": U, "y": Y.reshape(20, 10)}, r"such as y\[0\]"),
         ({"t": TIME[:-1], "u": U, "y": Y}, "has 200 rows, its time column 199"),
         ({"t": TIME, "u": U}, "has no column 'y'"),
     ],
@@ -185,6 +208,21 @@ def test_a_column_that_is_no_signal_is_refused(tmp_path, columns, words):
     np.savez(tmp_path / "run.npz", **columns)
     with pytest.raises(InputError, match=words):
         read_record(signals(tmp_path, "run.npz"))
+
+
+@pytest.mark.parametrize(
+    ("column", "words"),
+    [
+        ("y[2]", "'y' has 2 columns, counted from 0, but not column 2"),
+        ("u[0]", r"column 'u' has shape \(200,\): no columns to choose from"),
+        ("x[0]", r"has no column 'x\[0\]'"),
+    ],
+)
+def test_a_column_that_an_array_does_not_have_is_refused(tmp_path, column, words):
+    np.savez(tmp_path / "run.npz", t=TIME, u=U, y=np.stack([Y, Y], axis=1))
+    content = SIGNALS.replace("column: y", f'column: "{column}"')
+    with pytest.raises(InputError, match=words):
+        read_record(signals(tmp_path, "run.npz", content))
 
 
 def test_a_missing_file_and_a_wrong_number_are_refused(tmp_path):

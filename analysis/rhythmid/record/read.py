@@ -16,7 +16,7 @@ from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.quality import ChannelQuality, Quality, clipped
 from rhythmid.record.record import SHORTEST, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
-from rhythmid.record.table import SUFFIXES, Table
+from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
 from rhythmid.record.timing import Timing, put_in_order
 from rhythmid.simulation.signal import Hold
 
@@ -71,7 +71,7 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
         return read_tables(given)
     if not source.exists():
         raise InputError(f"{source}: no such file or directory")
-    if signals is not None and source.suffix.lower() in SUFFIXES:
+    if signals is not None and table_suffix(source) in SUFFIXES:
         return read_tables(signals.of_table(source))
     if not is_bag(source):
         raise InputError(
@@ -140,9 +140,9 @@ def read_tables(signals: Signals) -> Record:
             )
         made[role] = Samples(source, time, value * source.scale + source.offset)
     assert signals.path is not None
-    name = (
-        signals.path.stem if signals.path.stem != "signals" else signals.path.resolve().parent.name
-    )  # tells more
+    name = table_name(signals.path)
+    if name == "signals":
+        name = signals.path.resolve().parent.name  # tells more
     record = _record(name, made, signals, "sort or split the table", Quality({}))
     return _finish(replace(record, hold=signals.hold or _measured_hold(record)), signals)
 
