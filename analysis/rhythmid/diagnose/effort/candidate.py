@@ -1,0 +1,185 @@
+"""What may be added to a model to explain an effort: elements of the catalogue, fixed values set free, a longer delay."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.diagnose.hypothesis import Kind
+from rhythmid.diagnose.search.score_tests import guesses
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.elements.element import Element, Scales
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.estimate import Alignment, EffortFit, size_of
+from rhythmid.identify.student import weights_of
+from rhythmid.model import INERTIA, Model
+
+Array = NDArray[np.float64]
+SEEN = ("force", "actuator")  # slots whose elements the balance of effort sees
+LARGEST = 30.0  # times its first guess that an effect is started at, at most
+LEAST = 0.05  # of its first guess, at least: at nothing a shape has no derivative
+QUARTER = 0.25  # of the motion's dominant period that a delay is looked for: half a turn looks like another sign
+DELAY = "input_delay.delay"  # the name that a longer delay goes by
+
+
+@dataclass(frozen=True)
+class Start:
+    """One first guess of an addition: `values` of an element, or of the one parameter that is set free."""
+
+    kind: Kind
+    name: str
+    element: Element | None
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Screened:
+    """A first guess, by how much it would lower the cost of its parent if nothing but its size were fitted, and that size."""
+
+    start: Start
+    gain: float
+    factor: float
+
+
+def starts_of(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balance) -> list[Start]:
+    """All first guesses of what may be missing from the model and can be seen in the effort."""
+    found: list[Start] = []
+    driven = any(motion.driven_by_base for motion in balance.motions)
+    for element, values in guesses(catalogue.within(sizes), model, sizes):
+        if element.slot not in SEEN or element.kernel is None or element.acts == "feedback":
+            continue
+        if driven and (element.slot == "actuator" or element.acts == "drive"):
+            continue
+        found.append(Start("effects", element.name, element, values))
+    found += [Start("freed_value", name, None, {name: model.value(name)}) for name in fixed_values(balance, model)]
+    if not driven:
+        found.append(Start("delay", DELAY, None, {}))
+    return found
+
+
+def unseen(catalogue: Catalogue) -> tuple[str, ...]:
+    """Candidates that the balance of effort cannot see: what commands, sensors and clocks do."""
+    return tuple(e.name for e in catalogue.values() if e.candidate and e.slot not in SEEN)
+
+
+def fixed_values(balance: Balance, model: Model) -> list[str]:
+    """Fixed values of the model that the effort could tell of, but for choices of form (an exponent, a side) and for zeros,
+    which the file need not have meant."""
+    freed = {n for n, value in model.parameters.items() if value.fixed and value.value != 0.0 and n != INERTIA}
+    forms = {f"{t.label}.{p.name}" for t in model.terms for p in t.element.parameters if p.fixed}
+    open_model = with_freed(model, freed - forms)
+    names = [name for name in balance.estimated(open_model) if name in freed - forms]
+    if model.mass.fixed and not any(motion.driven_by_base for motion in balance.motions):
+        names.insert(0, INERTIA)
+    return names
+
+
+def with_freed(model: Model, names: set[str] | Sequence[str]) -> Model:
+    """The model with these parameters free."""
+    parameters = model.parameters
+    return model.with_parameters({name: replace(parameters[name], fixed=False) for name in names})
+
+
+def extended(model: Model, start: Start, factor: float = 1.0) -> tuple[Model, str]:
+    """The model with the addition, its effect `factor` times the guess, and the label by which the addition goes."""
+    if start.element is None:
+        return (with_freed(model, [start.name]) if start.kind == "freed_value" else model), start.name
+    element, values = start.element, dict(start.values)
+    if element.size and math.isfinite(element.absent):
+        name = element.size
+        low, high = element.parameter(name).bounds
+        if abs(factor) < LEAST:
+            factor = math.copysign(LEAST, factor)
+        value = element.absent + float(np.clip(factor, -LARGEST, LARGEST)) * (values[name] - element.absent)
+        margin = LEAST * abs(values[name] - element.absent)
+        values[name] = float(np.clip(value, low + margin if low > -math.inf else low, high))
+    grown = model.with_element(element, values)
+    return grown, grown.terms[-1].label
+
+
+def screen(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> list[Screened]:
+    """The best first guess of every addition to a fitted model, best addition first: a score test in the effort's own terms."""
+    weight = weights_of(parent.residual, parent.scale) / parent.scale**2
+    root = np.sqrt(weight)
+    # priors are rows of their own
+    basis = _basis(np.vstack([parent.jacobian * root[:, None], np.diag(np.sqrt(parent.precision))]))
+    target = np.concatenate([parent.residual * root, np.sqrt(parent.precision) * parent.departure])
+    left = target - basis @ (basis.T @ target)
+    base = balance.predicted(parent.model, parent.alignment)
+    best: dict[tuple[str, str], Screened] = {}
+    for start in starts:
+        if start.kind == "delay":
+            best[start.kind, start.name] = Screened(start, math.inf, 1.0)  # has its own scan
+            continue
+        column = _column(balance, parent, start, base)
+        if column is None or not np.isfinite(column).all() or not column.any():
+            continue
+        change = np.concatenate([column * root, np.zeros(len(parent.precision))])
+        raw = float(change @ change)
+        change = change - basis @ (basis.T @ change)
+        strength = float(change @ change)
+        if strength < 1e-8 * raw:
+            continue
+        factor = -float(change @ left) / strength
+        gain = 0.5 * factor**2 * strength
+        if start.element is not None and _impossible(start.element, start.values, factor):
+            gain = 0.0
+        one = Screened(start, gain, factor)
+        key = (start.kind, start.name)
+        if key not in best or best[key].gain < gain:
+            best[key] = one
+    return sorted(best.values(), key=lambda one: -one.gain)
+
+
+def _column(balance: Balance, parent: EffortFit, start: Start, base: Array) -> Array | None:
+    """Change (n,) of the predicted effort that an addition makes."""
+    if start.element is None:
+        value = parent.model.value(start.name)
+        step = 1e-3 * (abs(value) or 1.0)
+        moved = parent.model.with_values({start.name: value + step})
+        return (balance.predicted(moved, parent.alignment) - base) / step
+    grown, _ = extended(parent.model, start)
+    return balance.predicted(grown, parent.alignment) - base
+
+
+def _basis(columns: Array) -> Array:
+    norms = np.linalg.norm(columns, axis=0)
+    left, singular, _ = np.linalg.svd(columns[:, norms > 0.0] / norms[norms > 0.0], full_matrices=False)
+    return left[:, singular > 1e-9 * singular[0]]
+
+
+def _impossible(element: Element, values: Mapping[str, float], factor: float) -> bool:
+    """Whether `factor` times the guessed effect has a sign that physics forbids."""
+    if not element.size:
+        return False
+    if math.isinf(element.absent):
+        return factor < 0.0
+    low, high = element.parameter(element.size).bounds
+    size = element.absent + factor * (values[element.size] - element.absent)
+    return (size < low <= element.absent) or (size > high >= element.absent)
+
+
+def late_start(balance: Balance, parent: EffortFit) -> tuple[Alignment, float]:
+    """What a longer delay may be, and the one [s] that fits best beside the parent's parameters as they stand to first order."""
+    most = max(QUARTER / balance.bandwidth.dominant, 2.0 * balance.period)
+    usual = Alignment.of(balance)
+    required = balance.required(parent.model)
+    shift = balance.shift(parent.model)
+    weight = weights_of(parent.residual, parent.scale) / parent.scale**2
+    root = np.sqrt(weight)
+    basis = _basis(parent.jacobian[:, 1:] * root[:, None]) if parent.names else np.zeros((len(root), 0))
+    best, place = math.inf, parent.alignment
+    for late in np.linspace(0.0, most, 1 + min(60, math.ceil(2.0 * most / balance.period))):
+        error = root * (balance.rows(required, shift + float(late)) - balance.measured)
+        error = error - basis @ (basis.T @ error)
+        if float(error @ error) < best:
+            best, place = float(error @ error), float(late)
+    return Alignment(most, usual.low, most), place
+
+
+def widest(balance: Balance, column: Array) -> float:
+    """Change of a parameter that moves the effort by its own size; `column` (n,) is the effect for each unit."""
+    strength = float(np.sqrt(np.mean(column**2)))
+    return size_of(balance) / strength if strength > 0.0 else math.inf

@@ -1,0 +1,58 @@
+"""Unknown physics as a competitor: a model with a free map of the motion beside its own elements."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.evidence import Blocks, Linearised, predict
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.estimate import size_of
+from rhythmid.identify.inverse_dynamics.free_map import FreeMap
+from rhythmid.identify.student import scale_of, weights_of
+
+Array = NDArray[np.float64]
+# standard deviations of a map's coefficients, of which cross-validation chooses: shares of the effort's size
+RIDGES = (3.0, 1.0, 0.3, 0.1, 0.03)
+PASSES = 8  # of reweighted least squares
+
+
+def map_columns(balance: Balance, fitted: Fitted) -> Array:
+    """Columns (n, q) of the free map at the rows; its load is the effort that the model predicts, never the measured one."""
+    free = FreeMap(list(balance.motions))
+    loads = balance.required(fitted.fit.model)
+    made = [free.columns(motion, load) for motion, load in zip(balance.motions, loads, strict=True)]
+    shift = balance.shift(fitted.fit.model) + fitted.fit.alignment
+    columns = balance.rows(made, shift)
+    columns[:, -1] /= size_of(balance)  # a load counts as a share of the effort
+    return columns
+
+
+def with_map(balance: Balance, fitted: Fitted, ridge: float, columns: Array | None = None) -> Linearised:
+    """The fit with a free map beside its parameters; `ridge` is the standard deviation of the map's coefficients, as a share of
+    the effort's size."""
+    base = fitted.linearised
+    made = map_columns(balance, fitted) if columns is None else columns
+    jacobian = np.hstack([base.jacobian, made])
+    spread = ridge * size_of(balance)
+    precision = np.concatenate([base.precision, np.full(made.shape[1], spread**-2)])
+    departure = np.concatenate([base.departure, np.zeros(made.shape[1])])
+    residual = base.residual
+    for _ in range(PASSES):
+        scale = scale_of(residual)
+        weight = weights_of(residual, scale) / scale**2
+        normal = (jacobian * weight[:, None]).T @ jacobian + np.diag(precision)
+        scaling = 1.0 / np.sqrt(np.diag(normal))
+        slope = jacobian.T @ (weight * residual) + precision * departure
+        step = -scaling * np.linalg.lstsq(normal * np.outer(scaling, scaling), scaling * slope, rcond=1e-12)[0]
+        residual, departure = residual + jacobian @ step, departure + step
+    return Linearised(residual, jacobian, precision, departure)
+
+
+def reference_of(balance: Balance, fitted: Fitted, blocks: Blocks, others: Sequence[Linearised] = ()) -> Linearised:
+    """The map whose ridge predicts best what it has not seen; the autocorrelation is that of the best among these and `others`."""
+    columns = map_columns(balance, fitted)
+    made = [with_map(balance, fitted, ridge, columns) for ridge in RIDGES]
+    found = predict([*made, *others], blocks, balance.record)[: len(made)]
+    return made[int(np.argmax([one.score for one in found]))]

@@ -1,0 +1,38 @@
+"""What the measured motion and the effort tell of sizes: the yardstick for first guesses of elements' parameters."""
+
+import numpy as np
+
+from rhythmid.elements.element import Scales
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.series import FAINT, REST_LENGTH
+from rhythmid.model import Model
+
+
+def scales_of(balance: Balance, model: Model) -> Scales:
+    """Sizes in the model's units; of a leg on a moving base, of its motion relative to that."""
+    motions = balance.motions
+    position = np.concatenate([motion.leg_position for motion in motions])
+    effort = np.concatenate([motion.effort for motion in motions])
+    spread = max(max(float(np.std(motion.leg_position)) for motion in motions), 1e-12)
+    line = balance.bandwidth.dominant
+    inertial = model.mass.value * (2.0 * np.pi * line) ** 2
+    spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
+    size = max(float(np.std(motion.effort)) for motion in motions)
+    # where no spring sets the scale of force, the effort does: an axis moves slowly and yet against much friction
+    stiffness = spring if spring > FAINT * inertial else max(inertial, size / spread)
+    return Scales(
+        position=spread,
+        velocity=max(max(float(np.std(motion.leg_velocity)) for motion in motions), 1e-12),
+        effort=size or stiffness * spread,
+        centre=float(np.mean(position)),
+        low=float(position.min()),
+        high=float(position.max()),
+        mass=model.mass.value,
+        stiffness=float(stiffness),
+        frequency=line,
+        duration=max(float(motion.time[-1] - motion.time[0]) for motion in motions),
+        period=1.0 / (2.0 * balance.bandwidth.effort),  # what is faster than the bandwidth is not seen
+        peak_effort=float(np.abs(effort).max()),
+        rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
+        displaced_base=any(motion.driven_by_base for motion in motions),
+    )

@@ -1,0 +1,283 @@
+"""The search for what a model lacks, by the recorded effort: nominal, then the best further effect, and so on.
+
+All hypotheses predict the same rows of effort. Kin (one family, or one the other's special case) compete for one place: an
+addition takes the place of its kin instead of standing beside it.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student_t
+
+from rhythmid.diagnose.constants import EQUIVALENT, FALSE_ALARM, MISMATCH, PRACTICAL_EFFORT, REST
+from rhythmid.diagnose.effort.candidate import (
+    DELAY,
+    Screened,
+    Start,
+    extended,
+    late_start,
+    screen,
+    starts_of,
+    unseen,
+    widest,
+)
+from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.effort.reference import reference_of
+from rhythmid.diagnose.effort.scales import scales_of
+from rhythmid.diagnose.evidence import Blocks, Linearised, difference, predict
+from rhythmid.diagnose.hypothesis import Prediction
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.elements.element import Element
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.estimate import (
+    Alignment,
+    condition_of,
+    fit_effort,
+    linearise,
+    priors_of,
+    size_of,
+)
+from rhythmid.model import Model, Prior
+from rhythmid.progress import Tell
+from rhythmid.record.record import Record
+
+MOST = 4  # effects that are looked for: a fifth was never real on recordings that were tried
+REFINED = 10  # additions that are fitted in earnest in each round: the right one was among the first five of a score test always
+GAP = 3  # rows between blocks: as far as the filter of effort mixes neighbours (its impulse lasts about 1 / cut-off, 2.5 rows)
+
+
+@dataclass(frozen=True, eq=False)
+class EffortSearch:
+    """What was found.
+
+    Attributes
+    ----------
+    balance : rows and motions that all hypotheses share.
+    nominal : the nominal model, its free values fitted.
+    hypotheses : all that were fitted, the nominal among them, best prediction first.
+    predictions : of each of them.
+    reference, beyond : the nominal model, and the chosen one, with a free map beside them; and what they predict.
+    chosen : the hypothesis with which the search ended.
+    condition : of the nominal model's scaled columns.
+    unseen : candidates that the effort cannot show.
+    """
+
+    balance: Balance
+    blocks: Blocks
+    nominal: Fitted
+    hypotheses: tuple[Fitted, ...]
+    predictions: tuple[Prediction, ...]
+    chosen: Fitted
+    reference: Linearised
+    reference_prediction: Prediction
+    beyond: Linearised
+    beyond_prediction: Prediction
+    condition: float
+    unseen: tuple[str, ...]
+
+
+def kin(first: Element, second: Element) -> bool:
+    """Whether two elements are forms of one thing."""
+    return (
+        (first.family != "" and first.family == second.family)
+        or second.name in first.special_case_of
+        or first.name in second.special_case_of
+    )
+
+
+def search_effort(
+    records: Sequence[Record],
+    model: Model,
+    catalogue: Catalogue,
+    balance: Balance | None = None,
+    most: int = MOST,
+    tell: Tell = lambda _: None,
+) -> EffortSearch:
+    """Search for what the model lacks to predict the recorded effort.
+
+    Raises InputError where no effort was recorded or too little of motion.
+    """
+    balance = balance or Balance.of(records, model)
+    names = balance.estimated(model)
+    _, jacobian = linearise(balance, model, names, 0.0)
+    priors = priors_of(balance, model, names, jacobian[:, 1:])
+    nominal = Fitted.of((), "nominal", fit_effort(balance, model, names, priors), priors)
+    search = _Search(balance, catalogue, Blocks.of(balance.record, GAP), nominal, [nominal])
+    reference = reference_of(balance, nominal, search.blocks)
+    chosen = nominal
+    for number in range(most):
+        tell(f"effect {number + 1}")
+        better = search.further(chosen, reference)
+        if better is None:
+            break
+        chosen = better
+    for label in chosen.elements if len(chosen.elements) > 1 else ():
+        search.without(chosen, label)
+    fits = [*search.found, chosen]
+    beyond = reference_of(balance, chosen, search.blocks)
+    made = predict([one.linearised for one in search.found] + [reference, beyond], search.blocks, balance.record)
+    order = sorted(range(len(search.found)), key=lambda index: -made[index].score)
+    del fits
+    return EffortSearch(
+        balance, search.blocks, nominal, tuple(search.found[i] for i in order), tuple(made[i] for i in order), chosen,
+        reference, made[-2], beyond, made[-1], condition_of(nominal.fit), unseen(catalogue),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The state of a search: all that was fitted so far is in `found`."""
+
+    balance: Balance
+    catalogue: Catalogue
+    blocks: Blocks
+    nominal: Fitted
+    found: list[Fitted]
+
+    def further(self, parent: Fitted, reference: Linearised) -> Fitted | None:
+        """The best model with one effect more, or with a kin in the place of one; None where nothing is worth it."""
+        model = parent.fit.model
+        starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
+        screened = screen(self.balance, parent.fit, starts)
+        tried = len(screened)
+        new: list[Fitted] = []
+        for one in _shortlist(screened):
+            for base in self._bases(parent, one.start):
+                fitted = self.fitted(base, one)
+                if fitted is not None and not self._known(fitted):
+                    new.append(fitted)
+        self.found.extend(new)
+        if not new:
+            return None
+        made = predict(
+            [f.linearised for f in (*new, parent)] + [reference], self.blocks, self.balance.record
+        )
+        *others, before, free = made
+        order = sorted(range(len(new)), key=lambda index: -others[index].score)
+        best = order[0]
+        # of forms of one thing the simplest that predicts as well stands for all of them
+        for index in order[1:]:
+            if new[index].size >= new[best].size or not self._alike(new[index], new[best]):
+                continue
+            gain, error = difference(others[best], others[index])
+            rest = others[index].mean_square - free.mean_square
+            small = others[index].mean_square - others[best].mean_square < REST * max(rest, 0.0)
+            if gain < EQUIVALENT * error or small:
+                best = index
+        return new[best] if self._worth(others[best], before, free, tried) else None
+
+    def _worth(self, new: Prediction, old: Prediction, free: Prediction, tried: int) -> bool:
+        """Whether a further effect is more than chance and of practical size."""
+        gain, error = difference(new, old)
+        threshold = float(student_t.ppf(1.0 - FALSE_ALARM / max(tried, 1), self.blocks.count - 1))
+        removed = old.mean_square - new.mean_square
+        explainable = max(old.mean_square - free.mean_square, 0.0)
+        start = float(np.mean(self.nominal.fit.residual**2))
+        return bool(
+            gain > threshold * error
+            and removed > REST * explainable
+            and removed > MISMATCH * start
+            and removed > (PRACTICAL_EFFORT * size_of(self.balance)) ** 2
+        )
+
+    def _bases(self, parent: Fitted, start: Start) -> list[Fitted]:
+        """What an addition is put to: the parent, or where that holds its kin, the parent without it."""
+        if start.element is None:
+            return [] if start.name in parent.elements else [parent]
+        related = [
+            label
+            for label in parent.elements
+            if (term := parent.fit.model.term(label)) is not None and kin(term.element, start.element)
+        ]
+        base = parent
+        for label in related:
+            reduced = self.without(base, label)
+            if reduced is None:
+                return []
+            base = reduced
+        return [base]
+
+    def without(self, fitted: Fitted, label: str) -> Fitted | None:
+        """The hypothesis less one of its additions, fitted again; one that was fitted before is taken as it is."""
+        rest = tuple(one for one in fitted.elements if one != label)
+        known = next((f for f in self.found if set(f.elements) == set(rest)), None)
+        if known is not None:
+            return known
+        if fitted.fit.model.term(label) is None:
+            return None
+        model = fitted.fit.model.without(label)
+        priors = {name: prior for name, prior in fitted.priors.items() if not name.startswith(f"{label}.")}
+        return self._fit(rest, model, priors, self._aligned(rest), fitted.fit.alignment)
+
+    def fitted(self, base: Fitted, one: Screened) -> Fitted | None:
+        """The base with an addition, everything refitted from its first guess."""
+        start, balance = one.start, self.balance
+        alignment, aligned = base.fit.alignment, self._aligned(base.elements)
+        model, label = extended(base.fit.model, start, one.factor)
+        priors = dict(base.priors)
+        if start.kind == "delay":
+            aligned, alignment = late_start(balance, base.fit)
+        elif start.element is None:
+            _, columns = linearise(balance, base.fit.model, [start.name], alignment)
+            priors[start.name] = Prior(base.fit.model.value(start.name), widest(balance, columns[:, 1]))
+        else:
+            priors |= self._priors(model, label, start.element, alignment)
+        if any(not math.isfinite(prior.std) or prior.std <= 0.0 for prior in priors.values()):
+            return None
+        return self._fit((*base.elements, label), model, priors, aligned, alignment, start.kind)
+
+    def _priors(self, model: Model, label: str, element: Element, alignment: float) -> dict[str, Prior]:
+        """An addition's effect is below the effort; its shape may be anything that changes it by no more than that."""
+        names = [name for name in model.free if name.startswith(f"{label}.")]
+        _, columns = linearise(self.balance, model, names, alignment)
+        found: dict[str, Prior] = {}
+        for name, column in zip(names, columns[:, 1:].T, strict=True):
+            value = model.parameters[name]
+            own = name.split(".", 1)[1]
+            mean = value.value
+            if own == element.size and math.isfinite(element.absent):
+                mean = element.absent
+            spread = widest(self.balance, column)
+            width = value.bounds[1] - value.bounds[0]
+            found[name] = Prior(mean, min(spread, width if width > 0.0 else spread))
+        return found
+
+    def _fit(
+        self, elements: tuple[str, ...], model: Model, priors: dict[str, Prior], aligned: Alignment, at: float,
+        kind: str = "effects",
+    ) -> Fitted:  # fmt: skip
+        fit = fit_effort(self.balance, model, [n for n in model.free if n in priors], priors, aligned, at)
+        kinds = {"delay", "freed_value"} & {kind} or {"effects"}
+        return Fitted.of(elements, "nominal" if not elements else next(iter(kinds)), fit, priors)  # pyright: ignore[reportArgumentType]
+
+    def _aligned(self, elements: Sequence[str]) -> Alignment:
+        usual = Alignment.of(self.balance)
+        if DELAY not in elements:
+            return usual
+        most = late_start(self.balance, self.nominal.fit)[0]
+        return most
+
+    def _known(self, fitted: Fitted) -> bool:
+        return any(set(one.elements) == set(fitted.elements) for one in self.found)
+
+    def _alike(self, first: Fitted, second: Fitted) -> bool:
+        """Whether two hypotheses differ in forms of one thing only."""
+        one = set(first.elements) - set(second.elements)
+        other = set(second.elements) - set(first.elements)
+        if len(one) != 1 or len(other) != 1:
+            return False
+        terms = first.fit.model.term(one.pop()), second.fit.model.term(other.pop())
+        return terms[0] is not None and terms[1] is not None and kin(terms[0].element, terms[1].element)
+
+
+def _shortlist(screened: Sequence[Screened]) -> list[Screened]:
+    """The additions that are fitted in earnest: the best of the score test, all kin of the best, freed values and the delay."""
+    best = [one for one in screened if one.start.element is not None and one.gain > 0.0]
+    chosen = best[:REFINED]
+    if best:
+        first = best[0].start.element
+        assert first is not None
+        chosen += [one for one in best[REFINED:] if one.start.element and kin(one.start.element, first)]
+    return chosen + [one for one in screened if one.start.element is None]

@@ -1,0 +1,233 @@
+"""The balance of effort: what the motor must have given along the measured motion, if the model were right.
+
+u = m a − ΣF, with every element's force F computed along the motion that was measured, states included. The recorded effort is
+what is predicted and never stands among what predicts it: forces under load and the actuator see the effort that the model
+itself requires. One zero-phase filter acts on the recorded effort and on all that is compared with it.
+"""
+
+import math
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.errors import InputError
+from rhythmid.identify.drive import controlled
+from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
+from rhythmid.identify.inverse_dynamics.motion import Motion, low_pass, motion_of, stretches
+from rhythmid.model import INERTIA, Model, Term
+from rhythmid.record.record import Record
+from rhythmid.simulation.effect import Path, effect_along
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+STICK = 0.03  # of the fast speed, below which dry friction is set-valued: any force up to the friction (EVIDENCE: real machines)
+FAST = 0.95  # quantile of the speed that is called fast
+DECIMATED = 2.5  # rows a period of the cut-off: the Nyquist rate and a quarter for the filter's slope (Gautier et al.)
+MEMORY = 2e8  # bytes of forces that are kept, so that a refit computes again only what changed
+LEAST_ROWS = 40  # rows without which nothing is estimated
+NEIGHBOURS = np.arange(-2, 4)  # samples from which a value between two is interpolated (Lagrange)
+TESTED = 64  # samples on which it is found out whether an element's force depends on the effort
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """Efforts on common rows, for all models alike.
+
+    Attributes
+    ----------
+    motions : the stretches.
+    bandwidth : the cut-offs [Hz].
+    places : of each motion, the samples that are its rows.
+    record : (n,) the record of each row, numbered in order.
+    measured : (n,) the recorded effort at the rows, filtered.
+    stick_speed : below it [speed], samples are left out.
+    stuck : share of the rows that were.
+    period : sample period [s] of the records: the unit of the alignment.
+    """
+
+    motions: tuple[Motion, ...]
+    bandwidth: Bandwidth
+    places: tuple[NDArray[np.int64], ...]
+    record: NDArray[np.int64]
+    measured: Array
+    stick_speed: float
+    stuck: float
+    period: float
+    _forces: dict[Hashable, Array] = field(default_factory=dict, repr=False)
+    _sensitive: dict[str, bool] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, records: Sequence[Record], model: Model, bandwidth: Bandwidth | None = None) -> "Balance":
+        """The balance of these records. Raises InputError where no effort was recorded, or too little of motion."""
+        raw = stretches(records, model)
+        chosen = bandwidth or bandwidth_of(raw, model)
+        motions = [motion_of(one, model, chosen.motion) for one in raw]
+        speed = float(np.quantile(np.abs(np.concatenate([one.leg_velocity for one in motions])), FAST))
+        places, all_rows = [], 0
+        for motion in motions:
+            step = max(1, int(1.0 / (DECIMATED * chosen.effort * motion.period)))
+            margin = min(math.ceil(1.0 / (chosen.effort * motion.period)), len(motion.time) // 4)
+            rows = np.arange(margin, len(motion.time) - margin, step)
+            all_rows += len(rows)
+            places.append(rows[np.abs(motion.leg_velocity[rows]) > STICK * speed])
+        count = sum(map(len, places))
+        if count < LEAST_ROWS:
+            raise InputError(
+                f"only {count} rows of effort are left outside stick phases; at least {LEAST_ROWS} are needed"
+            )
+        numbers = np.concatenate([np.full(len(p), m.record) for p, m in zip(places, motions, strict=True)])
+        made = cls(
+            tuple(motions), chosen, tuple(places), np.unique(numbers, return_inverse=True)[1].astype(np.int64),
+            np.zeros(count), STICK * speed, 1.0 - count / max(all_rows, 1), max(one.period for one in raw),
+        )  # fmt: skip
+        measured = made.rows([one.effort for one in motions])
+        made.measured[:] = measured
+        return made
+
+    def rows(self, signals: Sequence[Array], shift: float = 0.0) -> Array:
+        """Signals, one (n,) or (n, p) for each motion, filtered, at the rows, `shift` [s] later; (rows,) or (rows, p)."""
+        return np.concatenate(
+            [
+                _sampled(low_pass(one, motion.period, self.bandwidth.effort), places, shift / motion.period)
+                for one, motion, places in zip(signals, self.motions, self.places, strict=True)
+            ]
+        )
+
+    @property
+    def mechanical(self) -> Array:
+        """(n, 3) of each row the leg's position, velocity and the acceleration, as they were measured."""
+        return np.concatenate(
+            [
+                np.column_stack([m.leg_position[p], m.leg_velocity[p], m.acceleration[p]])
+                for m, p in zip(self.motions, self.places, strict=True)
+            ]
+        )
+
+    def shift(self, model: Model) -> float:
+        """By how much later [s] than the stamps of the effort the motion shows it, as the model's delays say."""
+        late, stamps = 0.0, self.motions[0].time
+        for term in model.terms:
+            if term.element.delay is None or (term.element.slot == "command" and controlled(model)):
+                continue
+            values = {name: value.value for name, value in term.values.items()}
+            late += float(np.mean(term.element.delay(stamps, **values)))
+        return late
+
+    def required(self, model: Model) -> list[Array]:
+        """Effort (n,) that the model requires along each motion, unfiltered."""
+        return [self._required(index, model) for index in range(len(self.motions))]
+
+    def predicted(self, model: Model, alignment: float = 0.0) -> Array:
+        """The effort (rows,) that the model predicts, `alignment` [s] beyond the model's own delays."""
+        return self.rows(self.required(model), self.shift(model) + alignment)
+
+    def estimated(self, model: Model) -> list[str]:
+        """The free parameters that the effort can tell of: the inertia, forces, and the actuator."""
+        found = []
+        for name in model.free:
+            if name == INERTIA:
+                if not self.motions[0].driven_by_base:
+                    found.append(name)
+                continue
+            term = model.term(name.split(".")[0])
+            if term is not None and term.element.kernel is not None and self._counts(term, model):
+                found.append(name)
+        return found
+
+    def _counts(self, term: Term, model: Model) -> bool:
+        """Whether an element plays a part in the balance."""
+        slot = term.element.slot
+        if slot == "force":
+            return term.element.acts != "drive" or not self.motions[0].driven_by_base
+        if self.motions[0].driven_by_base or term.element.kernel is None:
+            return False
+        return slot == "actuator" or (
+            slot == "command" and term.element.acts != "feedback" and not controlled(model)
+        )
+
+    def _required(self, index: int, model: Model) -> Array:
+        motion = self.motions[index]
+        zero = np.zeros(len(motion.time))
+        forces = [t for t in model.terms if t.element.slot == "force" and self._counts(t, model)]
+        late = [t for t in forces if t.element.acts != "modifier" and self._sees_effort(t, model)]
+        leg, others = zero.copy(), zero.copy()
+        for term in forces:
+            if term.element.acts == "modifier" or term in late:
+                continue
+            force = self._force(index, term, model)
+            (leg if term.element.acts == "leg" else others)[:] += force
+        for term in forces:
+            if term.element.acts == "modifier":
+                leg += self._along(motion, term, model, zero, leg, zero)
+        inertial = zero if motion.driven_by_base else model.mass.value * motion.acceleration
+        required = inertial - leg - others
+        if late:
+            load = required if not motion.driven_by_base else zero
+            required = required - sum(self._along(motion, t, model, load, leg, zero) for t in late)
+        for slot in ("actuator", "command"):
+            for term in reversed([t for t in model.terms if t.element.slot == slot]):
+                if self._counts(term, model):
+                    # the inverse to first order: what went in is what has to come out less the change on the way
+                    required = required - self._along(motion, term, model, required, leg, required)
+        return required
+
+    def _along(
+        self, motion: Motion, term: Term, model: Model, effort: Array, leg: Array, signal: Array
+    ) -> Array:
+        values = {name: value.value for name, value in term.values.items()}
+        of_leg = term.element.slot == "force" and term.element.acts not in ("body", "drive")
+        return effect_along(term.element, values, model, motion.path(effort, leg, signal, of_leg))
+
+    def _force(self, index: int, term: Term, model: Model) -> Array:
+        """Force (n,) of an element that sees nothing but the motion; kept, for most refits change but one."""
+        borrowed = tuple(model.borrowed(source, default) for source, default in term.element.borrows.values())
+        key = (
+            index,
+            term.element.name,
+            tuple((name, v.value) for name, v in term.values.items()),
+            borrowed,
+        )
+        found = self._forces.get(key)
+        if found is None:
+            zero = np.zeros(len(self.motions[index].time))
+            found = self._along(self.motions[index], term, model, zero, zero, zero)
+            if len(self._forces) * found.nbytes > MEMORY:
+                self._forces.clear()
+            self._forces[key] = found
+        return found
+
+    def _sees_effort(self, term: Term, model: Model) -> bool:
+        """Whether an element's force depends on the actuator's."""
+        name = term.element.name
+        if name not in self._sensitive:
+            wave = np.sin(np.linspace(0.0, 20.0, TESTED))
+            values = {key: value.value for key, value in term.values.items()}
+            if term.element.size and math.isfinite(term.element.absent):
+                values[term.element.size] = term.element.absent + 0.5  # an absent effect depends on nothing
+            span = np.linspace(0.0, 1.0, TESTED)
+            two = [
+                effect_along(term.element, values, model, Path(span, wave, wave, load, 0.0 * wave, wave))
+                for load in (0.0 * wave, 1.0 + wave)
+            ]
+            self._sensitive[name] = bool(np.any(two[0] != two[1]))
+        return self._sensitive[name]
+
+
+def _sampled(signal: Array, places: NDArray[np.int64], shift: float) -> Array:
+    """Values of (n,) or (n, p) at places moved by `shift` samples."""
+    whole = math.floor(shift)
+    if shift == whole:
+        return signal[np.clip(places + whole, 0, len(signal) - 1)]
+    between = shift - whole
+    weights = [
+        math.prod(
+            (between - other) / (node - other) for other in NEIGHBOURS.tolist() if other != node
+        )
+        for node in NEIGHBOURS.tolist()
+    ]  # fmt: skip
+    total = np.zeros((len(places), *signal.shape[1:]))
+    for node, weight in zip(NEIGHBOURS.tolist(), weights, strict=True):
+        total += weight * signal[np.clip(places + whole + node, 0, len(signal) - 1)]
+    return total

@@ -1,0 +1,110 @@
+"""Up to which frequency the motion is measured, and up to which the effort is explained by any map of the motion at all."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from rhythmid.identify.inverse_dynamics.free_map import FreeMap
+from rhythmid.identify.inverse_dynamics.motion import Motion, Stretch, low_pass, motion_of
+from rhythmid.model import Model
+
+Array = NDArray[np.float64]
+ABOVE = 4.0  # times its floor that the spectrum of the motion is at least within the bandwidth (as the records' own `bandwidth`)
+HIGHEST = 0.2  # of the sample rate: derivatives of a spline err by 3 % there
+HALF = 0.5  # share of the effort's power that a free map has to explain in the highest half-octave
+SEGMENTS = 8  # of a record in Welch's spectra, at least
+RIDGE = 1e-6  # of the columns' power, against columns that the data do not tell apart
+LOWEST = 4.0  # times the strongest frequency of the motion: less would round off what a friction does at each reversal
+
+
+@dataclass(frozen=True)
+class Bandwidth:
+    """Cut-offs [Hz] of the motion's filter and of the parallel one on effort and columns; `explained` is the share of the
+    effort's power below `effort` that a free map explains, `dominant` [Hz] the motion's strongest frequency."""
+
+    motion: float
+    effort: float
+    explained: float
+    dominant: float
+
+
+def bandwidth_of(raw: Sequence[Stretch], model: Model) -> Bandwidth:
+    """The bandwidth at which the effort of these stretches is explained."""
+    limits, lines, weights = [], [], []
+    for one in raw:
+        limit, line = _of_motion(one)
+        limits.append(limit)
+        lines.append(line)
+        weights.append(len(one.time) * one.period)
+    motion = float(np.median(limits))
+    dominant = float(np.average(lines, weights=weights))
+    motion = max(motion, min(2.0 * LOWEST * dominant, HIGHEST / max(one.period for one in raw)))
+    motions = [motion_of(one, model, motion) for one in raw]
+    effort = _of_effort(motions, motion / 2.0, dominant)
+    effort = max(effort, min(LOWEST * dominant, motion / 2.0))
+    return Bandwidth(motion, effort, _explained(motions, effort), dominant)
+
+
+def _of_motion(raw: Stretch) -> tuple[float, float]:
+    """Highest frequency [Hz] at which the motion stands above its floor, and its strongest one."""
+    length = max(min(len(raw.output), 64), len(raw.output) // SEGMENTS)
+    rate = 1.0 / raw.period
+    frequency, power = welch(raw.output - raw.output.mean(), rate, nperseg=length, detrend="linear")
+    floor = float(np.median(power[len(power) // 2 :]))
+    strongest = 1 + int(np.argmax(power[1:]))
+    below = np.flatnonzero(power[strongest:] < ABOVE * floor)
+    last = strongest + int(below[0]) if len(below) else len(power) - 1
+    if not len(below) or floor < 1e-12 * float(power.max()):
+        last = len(power) - 1
+    return min(float(frequency[last]), HIGHEST * rate), float(frequency[strongest])
+
+
+def _residuals(motions: Sequence[Motion], frequency: float) -> tuple[list[Array], list[Array]]:
+    """Efforts below the frequency, and what a free map leaves of them."""
+    free = FreeMap(list(motions))
+    efforts, columns = [], []
+    for motion in motions:
+        made = [free.columns(motion, np.zeros(len(motion.time))), motion.leg_position, motion.leg_velocity]
+        if not motion.driven_by_base:
+            made.append(motion.acceleration)
+        made = np.column_stack(made)
+        both = low_pass(np.column_stack([motion.effort, made]), motion.period, frequency)
+        margin = min(math.ceil(1.0 / (frequency * motion.period)), len(both) // 4)  # the filter's start and end
+        efforts.append(both[margin : len(both) - margin, 0])
+        columns.append(both[margin : len(both) - margin, 1:])
+    matrix = np.vstack(columns)
+    norms = np.linalg.norm(matrix, axis=0)
+    norms[norms == 0.0] = 1.0
+    scaled = matrix / norms
+    normal = scaled.T @ scaled + RIDGE * np.eye(scaled.shape[1])
+    coefficients = np.linalg.solve(normal, scaled.T @ np.concatenate(efforts)) / norms
+    return efforts, [effort - made @ coefficients for effort, made in zip(efforts, columns, strict=True)]
+
+
+def _of_effort(motions: Sequence[Motion], most: float, dominant: float) -> float:
+    """Upper end [Hz] of the highest half-octave in which a free map explains half of the effort's power."""
+    efforts, left = _residuals(motions, most)
+    edges = most / np.sqrt(2.0) ** np.arange(64)
+    edges = edges[edges >= dominant]
+    total, remains = np.zeros(max(len(edges) - 1, 0)), np.zeros(max(len(edges) - 1, 0))
+    for motion, effort, residual in zip(motions, efforts, left, strict=True):
+        length = max(min(len(effort), 64), len(effort) // SEGMENTS)
+        frequency, power = welch(effort, 1.0 / motion.period, nperseg=length)
+        _, rest = welch(residual, 1.0 / motion.period, nperseg=length)
+        for index in range(len(total)):
+            inside = (frequency <= edges[index]) & (frequency > edges[index + 1])
+            total[index] += len(effort) * power[inside].sum()
+            remains[index] += len(effort) * rest[inside].sum()
+    explained = np.flatnonzero((total > 0.0) & (remains <= HALF * total))
+    return float(edges[explained[0]]) if len(explained) else float(edges[-1] if len(edges) else most)
+
+
+def _explained(motions: Sequence[Motion], frequency: float) -> float:
+    """Share of the effort's power below the frequency that a free map explains."""
+    efforts, left = _residuals(motions, frequency)
+    total = sum(float(np.sum((one - np.mean(one)) ** 2)) for one in efforts)
+    return 1.0 - sum(float(one @ one) for one in left) / total if total > 0.0 else 0.0

@@ -1,0 +1,195 @@
+"""The measured motion as inverse dynamics needs it: position, velocity and acceleration, and the effort that made it.
+
+This is the one place where irregular stamps are put on a uniform grid (a cubic spline through the samples, `Record.uniform`):
+zero-phase filters need one. Low-pass in both directions, then the derivatives of cubic splines, which unlike central
+differences keep a motion of a tenth of the sample rate to a few thousandths.
+M. Gautier, A. Janot, P. O. Vandanjon, IEEE Trans. Control Syst. Technol. 21 (2013) 428 (IDIM-LS and its filters).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
+
+from rhythmid.errors import InputError
+from rhythmid.identify.drive import controlled
+from rhythmid.model import Model
+from rhythmid.record.record import Channel, Record
+from rhythmid.simulation.effect import Path, effect_along
+
+Array = NDArray[np.float64]
+ORDER = 4  # of the Butterworth filter, run forwards and backwards (the order that Gautier et al. use)
+FINER = 10.0  # samples in a period of the motion's bandwidth that are kept: the switch of a friction is placed to a tenth of it
+SHORTEST = 32  # samples of a stretch without a gap, below which it says nothing
+BASES = ("base_displacement", "base_acceleration")
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """One stretch of a record without a gap, on a uniform grid; arrays (n,) in the model's units.
+
+    `record` numbers the record. `effort` is the total force that was recorded; of a machine that its base drives it is
+    d'Alembert's −m a, and `driven_by_base` says so. `leg_position`, `leg_velocity` are relative to the base where that
+    moves. `shift` [s] is by how much later than its stamp the effort acts, as the model's fixed delays say.
+    """
+
+    record: int
+    name: str
+    time: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    leg_position: Array
+    leg_velocity: Array
+    effort: Array
+    period: float
+    driven_by_base: bool = False
+
+    def path(self, effort: Array, leg: Array, signal: Array, of_leg: bool) -> Path:
+        """The trajectory along which an element's force is computed."""
+        position, velocity = (
+            (self.leg_position, self.leg_velocity) if of_leg else (self.position, self.velocity)
+        )
+        return Path(self.time, position, velocity, effort, leg, signal)
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Raw samples (n,) of one stretch: the measured output, the effort or base signal, and the forcing, on a grid."""
+
+    record: int
+    name: str
+    time: Array
+    output: Array
+    drive: Array
+    period: float
+    kind: str
+    measured: str
+
+
+def effort_channel(record: Record, model: Model) -> Channel | None:
+    """The channel that holds the effort: what was recorded of the motor, else the commanded force; None where there is none."""
+    if record.effort is not None:
+        return record.effort
+    if record.input is not None and record.input_kind == "force" and not controlled(model):
+        return record.input
+    return None
+
+
+def stretches(records: Sequence[Record], model: Model) -> list[Stretch]:
+    """The stretches without gaps of all records, on uniform grids at the rates of their outputs.
+
+    Raises InputError where a record has neither effort nor a moving base, or is too short.
+    """
+    found: list[Stretch] = []
+    for number, record in enumerate(records):
+        base = record.input is not None and record.input_kind in BASES
+        effort = effort_channel(record, model)
+        if effort is None and not base:
+            raise InputError(f"{record.name}: neither an effort nor the motion of its base was recorded")
+        grid = replace(record, reference=None).uniform()
+        if base:
+            assert record.input is not None
+            drive = _spline(record.input)(grid.time)
+        elif record.effort is not None:
+            assert grid.effort is not None
+            drive = grid.effort
+        else:
+            assert grid.input is not None
+            drive = grid.input if grid.forcing is None else grid.input + grid.forcing
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], grid.valid.astype(int), [0]])))
+        for first, end in zip(edges[::2], edges[1::2], strict=True):
+            if end - first < SHORTEST:
+                continue
+            part = slice(int(first), int(end))
+            kind = record.input_kind if base else "force"
+            found.append(
+                Stretch(
+                    number, record.name, grid.time[part], grid.output[part], drive[part], grid.period, kind,
+                    record.output_kind,
+                )
+            )  # fmt: skip
+    if not found:
+        raise InputError(f"no stretch without a gap has {SHORTEST} samples")
+    return found
+
+
+def low_pass(values: Array, period: float, frequency: float) -> Array:
+    """Values (n,) or (n, p) without what is above the frequency [Hz]: a Butterworth filter in both directions."""
+    if frequency * period >= 0.45:
+        return values
+    sections = butter(ORDER, 2.0 * frequency * period, output="sos")
+    padding = min(len(values) - 1, max(3 * (2 * len(sections) + 1), math.ceil(1.5 / (frequency * period))))
+    return sosfiltfilt(sections, values, axis=0, padlen=padding)
+
+
+def motion_of(stretch: Stretch, model: Model, frequency: float) -> Motion:
+    """The motion below `frequency` [Hz] of one stretch, on a grid as coarse as that allows.
+
+    What the model's sensor does to the measurement is taken back to first order. A velocity or an acceleration is integrated; what
+    that leaves open is a constant position and, of an acceleration, everything slower than the record shows.
+    """
+    time, period = stretch.time, stretch.period
+    coarser = max(1, int(1.0 / (FINER * frequency * period)))
+    output = _before_sensor(stretch, model)
+    drive = low_pass(stretch.drive, period, frequency)[::coarser]
+    smooth = low_pass(output, period, frequency)[::coarser]
+    time, period = time[::coarser], period * coarser
+    base = base_rate = base_acceleration = np.zeros(len(time))
+    if stretch.kind == "base_displacement":
+        base, base_rate, base_acceleration = _derivatives(time, drive)
+    elif stretch.kind == "base_acceleration":
+        base_acceleration = drive
+    relative = stretch.kind == "base_acceleration"  # then the motion is the leg's, and the mass moves with the base besides
+    if stretch.measured == "position":
+        position, velocity, acceleration = _derivatives(time, smooth)
+    elif stretch.measured == "velocity":
+        velocity = smooth
+        acceleration = CubicSpline(time, smooth).derivative()(time)
+        position = _integral(time, smooth)
+    else:
+        acceleration = smooth - base_acceleration if relative else smooth
+        velocity = _integral(time, acceleration)
+        position = _integral(time, velocity)
+    inertial = model.mass.value * (acceleration + (base_acceleration if relative else 0.0))
+    moved = stretch.kind == "base_displacement"
+    return Motion(
+        stretch.record, stretch.name, time, position, velocity, acceleration,
+        position - base if moved else position,
+        velocity - base_rate if moved else velocity,
+        drive if stretch.kind == "force" else -inertial,
+        period, stretch.kind in BASES,
+    )  # fmt: skip
+
+
+def _derivatives(time: Array, value: Array) -> tuple[Array, Array, Array]:
+    """A smooth signal (n,) with its first and second derivative."""
+    rate = CubicSpline(time, value).derivative()(time)
+    return value, rate, CubicSpline(time, rate).derivative()(time)
+
+
+def _integral(time: Array, value: Array) -> Array:
+    """Integral (n,) of a signal whose mean is taken for an offset, with mean zero."""
+    total = CubicSpline(time, value - value.mean()).antiderivative()(time)
+    return total - np.polyval(np.polyfit(time - time[0], total, 1), time - time[0])
+
+
+def _before_sensor(stretch: Stretch, model: Model) -> Array:
+    """The measured output with what the model's sensor elements add to it taken away, to first order."""
+    output = stretch.output
+    for term in model.terms:
+        if term.element.slot == "sensor" and term.element.kernel is not None:
+            zero = np.zeros(len(output))
+            path = Path(stretch.time, output, zero, zero, zero, output)
+            values = {name: value.value for name, value in term.values.items()}
+            output = output - effect_along(term.element, values, model, path)
+    return output
+
+
+def _spline(channel: Channel) -> CubicSpline:
+    apart = np.concatenate([[True], np.diff(channel.time) > 0.0])
+    return CubicSpline(channel.time[apart], channel.value[apart])
