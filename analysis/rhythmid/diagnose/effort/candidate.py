@@ -20,7 +20,9 @@ Array = NDArray[np.float64]
 SEEN = ("force", "actuator")  # slots whose elements the balance of effort sees
 LARGEST = 30.0  # times its first guess that an effect is started at, at most
 LEAST = 0.05  # of its first guess, at least: at nothing a shape has no derivative
-QUARTER = 0.25  # of the motion's dominant period that a delay is looked for: half a turn looks like another sign
+QUARTER = (
+    0.25  # of the motion's dominant period that a delay is looked for: half a turn looks like another sign
+)
 DELAY = "input_delay.delay"  # the name that a longer delay goes by
 
 
@@ -53,7 +55,9 @@ def starts_of(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
         if driven and (element.slot == "actuator" or element.acts == "drive"):
             continue
         found.append(Start("effects", element.name, element, values))
-    found += [Start("freed_value", name, None, {name: model.value(name)}) for name in fixed_values(balance, model)]
+    found += [
+        Start("freed_value", name, None, {name: model.value(name)}) for name in fixed_values(balance, model)
+    ]
     if not driven:
         found.append(Start("delay", DELAY, None, {}))
     return found
@@ -67,7 +71,9 @@ def unseen(catalogue: Catalogue) -> tuple[str, ...]:
 def fixed_values(balance: Balance, model: Model) -> list[str]:
     """Fixed values of the model that the effort could tell of, but for choices of form (an exponent, a side) and for zeros,
     which the file need not have meant."""
-    freed = {n for n, value in model.parameters.items() if value.fixed and value.value != 0.0 and n != INERTIA}
+    freed = {
+        n for n, value in model.parameters.items() if value.fixed and value.value != 0.0 and n != INERTIA
+    }
     forms = {f"{t.label}.{p.name}" for t in model.terms for p in t.element.parameters if p.fixed}
     open_model = with_freed(model, freed - forms)
     names = [name for name in balance.estimated(open_model) if name in freed - forms]

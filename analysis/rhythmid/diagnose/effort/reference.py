@@ -45,12 +45,16 @@ def with_map(balance: Balance, fitted: Fitted, ridge: float, columns: Array | No
         normal = (jacobian * weight[:, None]).T @ jacobian + np.diag(precision)
         scaling = 1.0 / np.sqrt(np.diag(normal))
         slope = jacobian.T @ (weight * residual) + precision * departure
-        step = -scaling * np.linalg.lstsq(normal * np.outer(scaling, scaling), scaling * slope, rcond=1e-12)[0]
+        step = (
+            -scaling * np.linalg.lstsq(normal * np.outer(scaling, scaling), scaling * slope, rcond=1e-12)[0]
+        )
         residual, departure = residual + jacobian @ step, departure + step
     return Linearised(residual, jacobian, precision, departure)
 
 
-def reference_of(balance: Balance, fitted: Fitted, blocks: Blocks, others: Sequence[Linearised] = ()) -> Linearised:
+def reference_of(
+    balance: Balance, fitted: Fitted, blocks: Blocks, others: Sequence[Linearised] = ()
+) -> Linearised:
     """The map whose ridge predicts best what it has not seen; the autocorrelation is that of the best among these and `others`."""
     columns = map_columns(balance, fitted)
     made = [with_map(balance, fitted, ridge, columns) for ridge in RIDGES]

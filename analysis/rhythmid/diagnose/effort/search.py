@@ -117,7 +117,9 @@ def search_effort(
         search.without(chosen, label)
     fits = [*search.found, chosen]
     beyond = reference_of(balance, chosen, search.blocks)
-    made = predict([one.linearised for one in search.found] + [reference, beyond], search.blocks, balance.record)
+    made = predict(
+        [one.linearised for one in search.found] + [reference, beyond], search.blocks, balance.record
+    )
     order = sorted(range(len(search.found)), key=lambda index: -made[index].score)
     del fits
     return EffortSearch(
@@ -151,9 +153,7 @@ class _Search:
         self.found.extend(new)
         if not new:
             return None
-        made = predict(
-            [f.linearised for f in (*new, parent)] + [reference], self.blocks, self.balance.record
-        )
+        made = predict([f.linearised for f in (*new, parent)] + [reference], self.blocks, self.balance.record)
         *others, before, free = made
         order = sorted(range(len(new)), key=lambda index: -others[index].score)
         best = order[0]

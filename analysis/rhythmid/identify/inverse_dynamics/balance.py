@@ -26,6 +26,7 @@ STICK = 0.03  # of the fast speed, below which dry friction is set-valued: any f
 FAST = 0.95  # quantile of the speed that is called fast
 DECIMATED = 2.5  # rows a period of the cut-off: the Nyquist rate and a quarter for the filter's slope (Gautier et al.)
 MEMORY = 2e8  # bytes of forces that are kept, so that a refit computes again only what changed
+MANY_ROWS = 200  # of a short record that are kept at least: their correlation is allowed for
 LEAST_ROWS = 40  # rows without which nothing is estimated
 NEIGHBOURS = np.arange(-2, 4)  # samples from which a value between two is interpolated (Lagrange)
 TESTED = 64  # samples on which it is found out whether an element's force depends on the effort
@@ -65,13 +66,18 @@ class Balance:
         chosen = bandwidth or bandwidth_of(raw, model)
         motions = [motion_of(one, model, chosen.motion) for one in raw]
         speed = float(np.quantile(np.abs(np.concatenate([one.leg_velocity for one in motions])), FAST))
+        length = sum(len(one.time) * one.period for one in motions)
+        often = max(DECIMATED * chosen.effort, MANY_ROWS / length)
         places, all_rows = [], 0
         for motion in motions:
-            step = max(1, int(1.0 / (DECIMATED * chosen.effort * motion.period)))
+            step = max(1, int(1.0 / (often * motion.period)))
             margin = min(math.ceil(1.0 / (chosen.effort * motion.period)), len(motion.time) // 4)
             rows = np.arange(margin, len(motion.time) - margin, step)
             all_rows += len(rows)
-            places.append(rows[np.abs(motion.leg_velocity[rows]) > STICK * speed])
+            sticks = stuck(
+                np.abs(motion.leg_velocity) <= STICK * speed, 1.0 / (chosen.effort * motion.period)
+            )
+            places.append(rows[~sticks[rows]])
         count = sum(map(len, places))
         if count < LEAST_ROWS:
             raise InputError(
@@ -213,6 +219,17 @@ class Balance:
             ]
             self._sensitive[name] = bool(np.any(two[0] != two[1]))
         return self._sensitive[name]
+
+
+def stuck(slow: Mask, memory: float) -> Mask:
+    """Samples (n,) to leave out: all `slow` ones, and within half the filter's `memory` [samples] of a rest as long as that, for
+    what the friction did meanwhile has come there through the filter."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], slow.astype(int), [0]])))
+    out, half = slow.copy(), math.ceil(0.5 * memory)
+    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if end - first >= memory:
+            out[max(first - half, 0) : end + half] = True
+    return out
 
 
 def _sampled(signal: Array, places: NDArray[np.int64], shift: float) -> Array:

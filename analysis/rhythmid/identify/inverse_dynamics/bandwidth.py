@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import welch
+from scipy.signal import detrend, welch
 
 from rhythmid.identify.inverse_dynamics.free_map import FreeMap
 from rhythmid.identify.inverse_dynamics.motion import Motion, Stretch, low_pass, motion_of
@@ -18,6 +18,7 @@ HIGHEST = 0.2  # of the sample rate: derivatives of a spline err by 3 % there
 HALF = 0.5  # share of the effort's power that a free map has to explain in the highest half-octave
 SEGMENTS = 8  # of a record in Welch's spectra, at least
 RIDGE = 1e-6  # of the columns' power, against columns that the data do not tell apart
+FLOORLESS = 1e-12  # of the strongest line, below which what looks like a floor is the window's leakage
 LOWEST = 4.0  # times the strongest frequency of the motion: less would round off what a friction does at each reversal
 
 
@@ -55,12 +56,13 @@ def _of_motion(raw: Stretch) -> tuple[float, float]:
     rate = 1.0 / raw.period
     frequency, power = welch(raw.output - raw.output.mean(), rate, nperseg=length, detrend="linear")
     floor = float(np.median(power[len(power) // 2 :]))
-    strongest = 1 + int(np.argmax(power[1:]))
-    below = np.flatnonzero(power[strongest:] < ABOVE * floor)
-    last = strongest + int(below[0]) if len(below) else len(power) - 1
-    if not len(below) or floor < 1e-12 * float(power.max()):
+    below = np.flatnonzero(power[1 + int(np.argmax(power[1:])) :] < ABOVE * floor)
+    last = 1 + int(np.argmax(power[1:])) + int(below[0]) if len(below) else len(power) - 1
+    if floor < FLOORLESS * float(power.max()):
         last = len(power) - 1
-    return min(float(frequency[last]), HIGHEST * rate), float(frequency[strongest])
+    whole = np.abs(np.fft.rfft(detrend(raw.output) * np.hanning(len(raw.output))))
+    strongest = (1 + int(np.argmax(whole[1:]))) * rate / len(raw.output)
+    return min(float(frequency[last]), HIGHEST * rate), float(strongest)
 
 
 def _residuals(motions: Sequence[Motion], frequency: float) -> tuple[list[Array], list[Array]]:
@@ -73,7 +75,9 @@ def _residuals(motions: Sequence[Motion], frequency: float) -> tuple[list[Array]
             made.append(motion.acceleration)
         made = np.column_stack(made)
         both = low_pass(np.column_stack([motion.effort, made]), motion.period, frequency)
-        margin = min(math.ceil(1.0 / (frequency * motion.period)), len(both) // 4)  # the filter's start and end
+        margin = min(
+            math.ceil(1.0 / (frequency * motion.period)), len(both) // 4
+        )  # the filter's start and end
         efforts.append(both[margin : len(both) - margin, 0])
         columns.append(both[margin : len(both) - margin, 1:])
     matrix = np.vstack(columns)

@@ -76,8 +76,8 @@ class EffortFit:
 
 
 def size_of(balance: Balance) -> float:
-    """Size (rms about its mean) of the recorded effort at the rows."""
-    return float(np.std(balance.measured)) or 1.0
+    """Size (rms) of the recorded effort at the rows; of a constant effort it is that constant."""
+    return float(np.sqrt(np.mean(balance.measured**2))) or 1.0
 
 
 def priors_of(balance: Balance, model: Model, names: Sequence[str], columns: Array) -> dict[str, Prior]:
@@ -102,9 +102,7 @@ def priors_of(balance: Balance, model: Model, names: Sequence[str], columns: Arr
     return found
 
 
-def linearise(
-    balance: Balance, model: Model, names: Sequence[str], alignment: float
-) -> tuple[Array, Array]:
+def linearise(balance: Balance, model: Model, names: Sequence[str], alignment: float) -> tuple[Array, Array]:
     """Residual (n,), and its derivatives (n, 1 + p) with respect to the alignment and the named parameters."""
     required = balance.required(model)
     steps, moved = [], []
@@ -202,7 +200,9 @@ def _step(
         part = normal[np.ix_(free, free)]
         scaling = 1.0 / np.sqrt(np.maximum(np.diag(part), 1e-300))
         rest = slope[free] + normal[np.ix_(free, ~free)] @ step[~free]
-        step[free] = -scaling * np.linalg.lstsq(part * np.outer(scaling, scaling), scaling * rest, rcond=1e-12)[0]
+        step[free] = (
+            -scaling * np.linalg.lstsq(part * np.outer(scaling, scaling), scaling * rest, rcond=1e-12)[0]
+        )
         outside = free & ((value + step < low) | (value + step > high))
         if not outside.any():
             break

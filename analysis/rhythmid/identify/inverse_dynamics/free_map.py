@@ -11,7 +11,9 @@ from scipy.interpolate import BSpline
 from rhythmid.identify.inverse_dynamics.motion import Motion
 
 Array = NDArray[np.float64]
-PIECES = 6  # of each spline: enough for a hardening, a kink or a Stribeck fall (fit to sin over a turn: 0.2 %)
+PIECES = (
+    6  # of each spline: enough for a hardening, a kink or a Stribeck fall (fit to sin over a turn: 0.2 %)
+)
 DEGREE = 3
 REACH = (0.01, 0.99)  # quantiles of the data between which a spline has its pieces
 

@@ -144,7 +144,9 @@ def motion_of(stretch: Stretch, model: Model, frequency: float) -> Motion:
         base, base_rate, base_acceleration = _derivatives(time, drive)
     elif stretch.kind == "base_acceleration":
         base_acceleration = drive
-    relative = stretch.kind == "base_acceleration"  # then the motion is the leg's, and the mass moves with the base besides
+    relative = (
+        stretch.kind == "base_acceleration"
+    )  # then the motion is the leg's, and the mass moves with the base besides
     if stretch.measured == "position":
         position, velocity, acceleration = _derivatives(time, smooth)
     elif stretch.measured == "velocity":

@@ -1,0 +1,80 @@
+"""What an explanation of the effort leaves: with which quantity it goes, and the curve that it draws over that."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.estimate import size_of
+
+Array = NDArray[np.float64]
+BINS = 16  # of equal numbers of rows: enough for a curve, each with enough rows for a mean
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Mean residual effort (b,) with its standard error (b,) over values (b,) of a quantity; `share` of its power is explained
+    by the curve beyond what bins explain by chance."""
+
+    quantity: str
+    value: Array
+    mean: Array
+    error: Array
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Remainder:
+    """The residual of a fit: recorded less predicted effort.
+
+    `size` is its rms as a share of the effort; `curves` are sorted, the quantity that it goes with first. `record`, `time` [s],
+    `measured`, `predicted` (n,) are of the rows.
+    """
+
+    size: float
+    curves: tuple[Curve, ...]
+    record: NDArray[np.int64]
+    time: Array
+    measured: Array
+    predicted: Array
+
+    @property
+    def goes_with(self) -> str:
+        """The quantity of which the remainder is most nearly a function."""
+        return self.curves[0].quantity
+
+
+def remainder_of(balance: Balance, fitted: Fitted) -> Remainder:
+    """What a hypothesis leaves of the recorded effort, over speed, position, acceleration, load and time."""
+    left = -fitted.fit.residual
+    mechanical = balance.mechanical
+    time = np.concatenate([m.time[p] for m, p in zip(balance.motions, balance.places, strict=True)])
+    predicted = balance.measured - left
+    quantities = {
+        "velocity": mechanical[:, 1],
+        "position": mechanical[:, 0],
+        "acceleration": mechanical[:, 2],
+        "load": predicted,
+        "time": time,
+    }
+    curves = [_curve(name, value, left) for name, value in quantities.items()]
+    return Remainder(
+        float(np.sqrt(np.mean(left**2))) / size_of(balance), tuple(sorted(curves, key=lambda one: -one.share)),
+        balance.record, time, balance.measured, predicted,
+    )  # fmt: skip
+
+
+def _curve(quantity: str, value: Array, left: Array) -> Curve:
+    order = np.argsort(value, kind="stable")
+    groups = [group for group in np.array_split(order, BINS) if len(group)]
+    centre = np.array([float(np.median(value[group])) for group in groups])
+    mean = np.array([float(np.mean(left[group])) for group in groups])
+    error = np.array([float(np.std(left[group])) / np.sqrt(len(group)) for group in groups])
+    counts = np.array([len(group) for group in groups], dtype=float)
+    between = float(np.sum(counts * (mean - left.mean()) ** 2))
+    total = float(np.sum((left - left.mean()) ** 2))
+    within = (total - between) / max(len(left) - len(groups), 1)
+    share = (between - (len(groups) - 1) * within) / total if total > 0.0 else 0.0
+    return Curve(quantity, centre, mean, error, max(share, 0.0))

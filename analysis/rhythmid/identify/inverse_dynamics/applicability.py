@@ -1,0 +1,114 @@
+"""Whether records can be scored by their effort, and whether a free run would mean something: both are questions of
+identifiability, not of how the motion looks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rhythmid.errors import InputError
+from rhythmid.identify.drive import controlled
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.estimate import condition_of, fit_effort
+from rhythmid.model import Model
+from rhythmid.record.record import Record
+from rhythmid.simulation.effect import Path, effect_along
+
+# of the scaled normal equations' root, beyond which a robot's parameters are said not to be excited (K. Schröer, in: Robot
+# Calibration, Chapman & Hall, 1993; M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362 aim below it)
+CONDITION = 100.0
+EXPLAINED = 0.5  # of the effort's power that any map of the motion has to explain, or it is not the motion that the effort makes
+# of the inertial force that the effort varies by at least: below it the machine swings by itself and the small difference of two
+# large terms is weighed (a resonance of 10 % damping is driven by a fifth of its inertial force)
+LIGHT = 0.2
+POINTS = 50  # positions at which a restoring force is looked for
+
+
+@dataclass(frozen=True)
+class Applicability:
+    """Whether the effort can be scored, and why or why not.
+
+    `condition` is that of the scaled columns, `explained` the share of the effort's power that a free map explains, `effort_share`
+    the effort's variation as a share of the inertial force. `restoring` says whether the model holds the machine anywhere,
+    `closed` whether a controller does: of a machine with a restoring force and without a controller a long free run means
+    something. `balance` holds the rows, where there are any.
+    """
+
+    applies: bool
+    reason: str
+    bandwidth: float
+    condition: float
+    explained: float
+    effort_share: float
+    restoring: bool
+    closed: bool
+    balance: Balance | None = None
+
+    @property
+    def free_run_means_something(self) -> bool:
+        """Whether a long free run of the model would not add up every small disturbance."""
+        return self.restoring and not self.closed
+
+
+def applicable(records: Sequence[Record], model: Model) -> Applicability:
+    """Whether these records can be scored by the effort that the model predicts."""
+    closed = controlled(model)
+    try:
+        balance = Balance.of(records, model)
+    except InputError as error:
+        return Applicability(False, str(error), 0.0, np.inf, 0.0, 0.0, True, closed)
+    chosen = balance.bandwidth
+    fit = fit_effort(balance, model, steps=3)
+    condition = condition_of(fit)
+    inertial = model.mass.value * balance.mechanical[:, 2]
+    driven = balance.motions[0].driven_by_base
+    share = 1.0 if driven else float(np.std(balance.measured) / max(float(np.std(inertial)), 1e-300))
+    reason = f"the effort is predicted below {chosen.effort:.3g} Hz, where a free map explains {chosen.explained:.0%} of it"
+    applies = True
+    if chosen.explained < EXPLAINED:
+        applies, reason = (
+            False,
+            f"no map of the motion explains more than {chosen.explained:.0%} of the effort",
+        )
+    elif share < LIGHT:
+        applies, reason = (
+            False,
+            f"the effort varies by {share:.0%} of the inertial force: the machine swings by itself",
+        )
+    elif condition > CONDITION:
+        applies, reason = (
+            False,
+            f"the motion does not tell the parameters apart (condition number {condition:.3g})",
+        )
+    return Applicability(
+        applies, reason, chosen.effort, condition, chosen.explained, share, restores(balance, model), closed, balance
+    )  # fmt: skip
+
+
+def restores(balance: Balance, model: Model) -> bool:
+    """Whether the model's forces at rest push the machine back from both ends of its travel, as the records show that."""
+    position = np.concatenate([motion.leg_position for motion in balance.motions])
+    travel = np.linspace(float(position.min()), float(position.max()), POINTS)
+    zero, total = np.zeros(POINTS), np.zeros(POINTS)
+    path = Path(np.linspace(0.0, 1.0, POINTS), travel, zero, zero, zero, zero)
+    for term in model.terms:
+        if term.element.slot == "force" and term.element.acts in ("leg", "body"):
+            total += effect_along(term.element, {n: v.value for n, v in term.values.items()}, model, path)
+    return bool(total[0] - total[-1] > 1e-9 * max(float(np.abs(total).max()), 1e-300))
+
+
+def moved_with_bandwidth(
+    records: Sequence[Record], model: Model, balance: Balance, by: float = 1.5
+) -> dict[str, float]:
+    """By how many standard deviations each parameter moves when the cut-off of the effort is `by` times lower.
+
+    Noise of the motion, effects that are not modelled and rows that are too few show as estimates that depend on the filter.
+    """
+
+    lower = Balance.of(records, model, replace(balance.bandwidth, effort=balance.bandwidth.effort / by))
+    first, second = fit_effort(balance, model), fit_effort(lower, model)
+    found = {}
+    for name in first.names:
+        spread = float(np.hypot(first.std_of(name), second.std_of(name)))
+        found[name] = abs(first.model.value(name) - second.model.value(name)) / max(spread, 1e-300)
+    return found
