@@ -115,13 +115,11 @@ def search_effort(
         chosen = better
     for label in chosen.elements if len(chosen.elements) > 1 else ():
         search.without(chosen, label)
-    fits = [*search.found, chosen]
     beyond = reference_of(balance, chosen, search.blocks)
     made = predict(
         [one.linearised for one in search.found] + [reference, beyond], search.blocks, balance.record
     )
     order = sorted(range(len(search.found)), key=lambda index: -made[index].score)
-    del fits
     return EffortSearch(
         balance, search.blocks, nominal, tuple(search.found[i] for i in order), tuple(made[i] for i in order), chosen,
         reference, made[-2], beyond, made[-1], condition_of(nominal.fit), unseen(catalogue),
@@ -159,7 +157,7 @@ class _Search:
         best = order[0]
         # of forms of one thing the simplest that predicts as well stands for all of them
         for index in order[1:]:
-            if new[index].size >= new[best].size or not self._alike(new[index], new[best]):
+            if not self._simpler(new[index], new[best]):
                 continue
             gain, error = difference(others[best], others[index])
             rest = others[index].mean_square - free.mean_square
@@ -262,14 +260,17 @@ class _Search:
     def _known(self, fitted: Fitted) -> bool:
         return any(set(one.elements) == set(fitted.elements) for one in self.found)
 
-    def _alike(self, first: Fitted, second: Fitted) -> bool:
-        """Whether two hypotheses differ in forms of one thing only."""
+    def _simpler(self, first: Fitted, second: Fitted) -> bool:
+        """Whether two hypotheses differ in forms of one thing only, of which the first has the simpler one."""
         one = set(first.elements) - set(second.elements)
         other = set(second.elements) - set(first.elements)
         if len(one) != 1 or len(other) != 1:
             return False
         terms = first.fit.model.term(one.pop()), second.fit.model.term(other.pop())
-        return terms[0] is not None and terms[1] is not None and kin(terms[0].element, terms[1].element)
+        if terms[0] is None or terms[1] is None or not kin(terms[0].element, terms[1].element):
+            return False
+        special = terms[1].element.name in terms[0].element.special_case_of
+        return first.size < second.size or (first.size == second.size and special)
 
 
 def _shortlist(screened: Sequence[Screened]) -> list[Screened]:

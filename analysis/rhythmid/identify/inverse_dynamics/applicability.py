@@ -60,7 +60,7 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
     chosen = balance.bandwidth
     fit = fit_effort(balance, model, steps=3)
     condition = condition_of(fit)
-    inertial = model.mass.value * balance.mechanical[:, 2]
+    inertial = model.mass.value * balance.rows([motion.acceleration for motion in balance.motions])
     driven = balance.motions[0].driven_by_base
     share = 1.0 if driven else float(np.std(balance.measured) / max(float(np.std(inertial)), 1e-300))
     reason = f"the effort is predicted below {chosen.effort:.3g} Hz, where a free map explains {chosen.explained:.0%} of it"

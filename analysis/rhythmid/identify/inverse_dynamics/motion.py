@@ -122,7 +122,7 @@ def low_pass(values: Array, period: float, frequency: float) -> Array:
     """Values (n,) or (n, p) without what is above the frequency [Hz]: a Butterworth filter in both directions."""
     if frequency * period >= 0.45:
         return values
-    sections = butter(ORDER, 2.0 * frequency * period, output="sos")
+    sections = np.atleast_2d(np.asarray(butter(ORDER, 2.0 * frequency * period, output="sos")))
     padding = min(len(values) - 1, max(3 * (2 * len(sections) + 1), math.ceil(1.5 / (frequency * period))))
     return sosfiltfilt(sections, values, axis=0, padlen=padding)
 
