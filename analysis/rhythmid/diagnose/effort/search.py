@@ -161,8 +161,9 @@ class _Search:
                 continue
             gain, error = difference(others[best], others[index])
             rest = others[index].mean_square - free.mean_square
-            small = others[index].mean_square - others[best].mean_square < REST * max(rest, 0.0)
-            if gain < EQUIVALENT * error or small:
+            removed = others[index].mean_square - others[best].mean_square
+            practical = (PRACTICAL_EFFORT * size_of(self.balance)) ** 2
+            if gain < EQUIVALENT * error or removed < max(REST * rest, practical):
                 best = index
         return new[best] if self._worth(others[best], before, free, tried) else None
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
-from rhythmid.identify.inverse_dynamics.motion import Motion, low_pass, motion_of, stretches
+from rhythmid.identify.inverse_dynamics.motion import Motion, high_pass, low_pass, motion_of, stretches
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.record.record import Record
 from rhythmid.simulation.effect import Path, effect_along
@@ -28,6 +28,7 @@ DECIMATED = 2.5  # rows a period of the cut-off: the Nyquist rate and a quarter 
 MEMORY = 2e8  # bytes of forces that are kept, so that a refit computes again only what changed
 MANY_ROWS = 200  # of a short record that are kept at least: their correlation is allowed for
 LEAST_ROWS = 40  # rows without which nothing is estimated
+INVISIBLE = 1e-4  # of a signal that is left by a filter that it does not pass
 NEIGHBOURS = np.arange(-2, 4)  # samples from which a value between two is interpolated (Lagrange)
 TESTED = 64  # samples on which it is found out whether an element's force depends on the effort
 
@@ -64,7 +65,7 @@ class Balance:
         """The balance of these records. Raises InputError where no effort was recorded, or too little of motion."""
         raw = stretches(records, model)
         chosen = bandwidth or bandwidth_of(raw, model)
-        motions = [motion_of(one, model, chosen.motion) for one in raw]
+        motions = [motion_of(one, model, chosen.motion, chosen.low) for one in raw]
         speed = float(np.quantile(np.abs(np.concatenate([one.leg_velocity for one in motions])), FAST))
         length = sum(len(one.time) * one.period for one in motions)
         often = max(DECIMATED * chosen.effort, MANY_ROWS / length)
@@ -96,10 +97,14 @@ class Balance:
         """Signals, one (n,) or (n, p) for each motion, filtered, at the rows, `shift` [s] later; (rows,) or (rows, p)."""
         return np.concatenate(
             [
-                _sampled(low_pass(one, motion.period, self.bandwidth.effort), places, shift / motion.period)
+                _sampled(self.filtered(one, motion.period), places, shift / motion.period)
                 for one, motion, places in zip(signals, self.motions, self.places, strict=True)
             ]
         )
+
+    def filtered(self, signal: Array, period: float) -> Array:
+        """A signal (n,) or (n, p) through the filter that the effort and all that is compared with it go through."""
+        return high_pass(low_pass(signal, period, self.bandwidth.effort), period, self.bandwidth.low)
 
     @property
     def mechanical(self) -> Array:
@@ -138,9 +143,19 @@ class Balance:
                     found.append(name)
                 continue
             term = model.term(name.split(".")[0])
-            if term is not None and term.element.kernel is not None and self._counts(term, model):
+            if term is None or term.element.kernel is None or not self._counts(term, model):
+                continue
+            if self.bandwidth.low == 0.0 or self._passes(name, model):
                 found.append(name)
         return found
+
+    def _passes(self, name: str, model: Model) -> bool:
+        """Whether anything of what a parameter does is left by the filter that takes slow motion away."""
+        value = model.value(name)
+        moved = self.required(model.with_values({name: value + 1e-3 * (abs(value) or 1.0)}))
+        change = [new - old for new, old in zip(moved, self.required(model), strict=True)]
+        whole = np.concatenate([one[p] for one, p in zip(change, self.places, strict=True)])
+        return bool(np.linalg.norm(self.rows(change)) > INVISIBLE * np.linalg.norm(whole))
 
     def _counts(self, term: Term, model: Model) -> bool:
         """Whether an element plays a part in the balance."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.signal import detrend, welch
 
 from rhythmid.identify.inverse_dynamics.free_map import FreeMap
-from rhythmid.identify.inverse_dynamics.motion import Motion, Stretch, low_pass, motion_of
+from rhythmid.identify.inverse_dynamics.motion import Motion, Stretch, high_pass, low_pass, motion_of
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
@@ -19,18 +19,21 @@ HALF = 0.5  # share of the effort's power that a free map has to explain in the 
 SEGMENTS = 8  # of a record in Welch's spectra, at least
 RIDGE = 1e-6  # of the columns' power, against columns that the data do not tell apart
 FLOORLESS = 1e-12  # of the strongest line, below which what looks like a floor is the window's leakage
+SLOW = 4.0  # times below its strongest frequency that a motion is integrated from an acceleration
 LOWEST = 4.0  # times the strongest frequency of the motion: less would round off what a friction does at each reversal
 
 
 @dataclass(frozen=True)
 class Bandwidth:
     """Cut-offs [Hz] of the motion's filter and of the parallel one on effort and columns; `explained` is the share of the
-    effort's power below `effort` that a free map explains, `dominant` [Hz] the motion's strongest frequency."""
+    effort's power below `effort` that a free map explains, `dominant` [Hz] the motion's strongest frequency. Where an
+    acceleration was measured, nothing below `low` [Hz] is known."""
 
     motion: float
     effort: float
     explained: float
     dominant: float
+    low: float = 0.0
 
 
 def bandwidth_of(raw: Sequence[Stretch], model: Model) -> Bandwidth:
@@ -44,10 +47,11 @@ def bandwidth_of(raw: Sequence[Stretch], model: Model) -> Bandwidth:
     motion = float(np.median(limits))
     dominant = float(np.average(lines, weights=weights))
     motion = max(motion, min(2.0 * LOWEST * dominant, HIGHEST / max(one.period for one in raw)))
-    motions = [motion_of(one, model, motion) for one in raw]
-    effort = _of_effort(motions, motion / 2.0, dominant)
+    low = dominant / SLOW if any(one.measured == "acceleration" for one in raw) else 0.0
+    motions = [motion_of(one, model, motion, low) for one in raw]
+    effort = _of_effort(motions, motion / 2.0, dominant, low)
     effort = max(effort, min(LOWEST * dominant, motion / 2.0))
-    return Bandwidth(motion, effort, _explained(motions, effort), dominant)
+    return Bandwidth(motion, effort, _explained(motions, effort, low), dominant, low)
 
 
 def _of_motion(raw: Stretch) -> tuple[float, float]:
@@ -65,7 +69,7 @@ def _of_motion(raw: Stretch) -> tuple[float, float]:
     return min(float(frequency[last]), HIGHEST * rate), float(strongest)
 
 
-def _residuals(motions: Sequence[Motion], frequency: float) -> tuple[list[Array], list[Array]]:
+def _residuals(motions: Sequence[Motion], frequency: float, low: float) -> tuple[list[Array], list[Array]]:
     """Efforts below the frequency, and what a free map leaves of them."""
     free = FreeMap(list(motions))
     efforts, columns = [], []
@@ -75,6 +79,7 @@ def _residuals(motions: Sequence[Motion], frequency: float) -> tuple[list[Array]
             made.append(motion.acceleration)
         made = np.column_stack(made)
         both = low_pass(np.column_stack([motion.effort, made]), motion.period, frequency)
+        both = high_pass(both, motion.period, low)
         margin = min(
             math.ceil(1.0 / (frequency * motion.period)), len(both) // 4
         )  # the filter's start and end
@@ -89,9 +94,9 @@ def _residuals(motions: Sequence[Motion], frequency: float) -> tuple[list[Array]
     return efforts, [effort - made @ coefficients for effort, made in zip(efforts, columns, strict=True)]
 
 
-def _of_effort(motions: Sequence[Motion], most: float, dominant: float) -> float:
+def _of_effort(motions: Sequence[Motion], most: float, dominant: float, low: float) -> float:
     """Upper end [Hz] of the highest half-octave in which a free map explains half of the effort's power."""
-    efforts, left = _residuals(motions, most)
+    efforts, left = _residuals(motions, most, low)
     edges = most / np.sqrt(2.0) ** np.arange(64)
     edges = edges[edges >= dominant]
     total, remains = np.zeros(max(len(edges) - 1, 0)), np.zeros(max(len(edges) - 1, 0))
@@ -107,8 +112,8 @@ def _of_effort(motions: Sequence[Motion], most: float, dominant: float) -> float
     return float(edges[explained[0]]) if len(explained) else float(edges[-1] if len(edges) else most)
 
 
-def _explained(motions: Sequence[Motion], frequency: float) -> float:
+def _explained(motions: Sequence[Motion], frequency: float, low: float) -> float:
     """Share of the effort's power below the frequency that a free map explains."""
-    efforts, left = _residuals(motions, frequency)
+    efforts, left = _residuals(motions, frequency, low)
     total = sum(float(np.sum((one - np.mean(one)) ** 2)) for one in efforts)
     return 1.0 - sum(float(one @ one) for one in left) / total if total > 0.0 else 0.0

@@ -23,6 +23,7 @@ from rhythmid.simulation.effect import Path, effect_along
 
 Array = NDArray[np.float64]
 ORDER = 4  # of the Butterworth filter, run forwards and backwards (the order that Gautier et al. use)
+SLOW_ORDER = 2  # of the high-pass filter, run twice
 FINER = 10.0  # samples in a period of the motion's bandwidth that are kept: the switch of a friction is placed to a tenth of it
 SHORTEST = 32  # samples of a stretch without a gap, below which it says nothing
 BASES = ("base_displacement", "base_acceleration")
@@ -127,11 +128,22 @@ def low_pass(values: Array, period: float, frequency: float) -> Array:
     return sosfiltfilt(sections, values, axis=0, padlen=padding)
 
 
-def motion_of(stretch: Stretch, model: Model, frequency: float) -> Motion:
+def high_pass(values: Array, period: float, frequency: float) -> Array:
+    """Values (n,) or (n, p) without what is below the frequency [Hz], in both directions; all of them where it is 0."""
+    if frequency <= 0.0:
+        return values
+    sections = np.atleast_2d(
+        np.asarray(butter(SLOW_ORDER, 2.0 * frequency * period, btype="highpass", output="sos"))
+    )
+    padding = min(len(values) - 1, math.ceil(1.0 / (frequency * period)))
+    return sosfiltfilt(sections, values, axis=0, padlen=padding)
+
+
+def motion_of(stretch: Stretch, model: Model, frequency: float, low: float = 0.0) -> Motion:
     """The motion below `frequency` [Hz] of one stretch, on a grid as coarse as that allows.
 
-    What the model's sensor does to the measurement is taken back to first order. A velocity or an acceleration is integrated; what
-    that leaves open is a constant position and, of an acceleration, everything slower than the record shows.
+    What the model's sensor does to the measurement is taken back to first order. A velocity is integrated to a position whose
+    mean is zero, an acceleration to a motion above `low` [Hz]: an accelerometer's drift would be all that is seen below.
     """
     time, period = stretch.time, stretch.period
     coarser = max(1, int(1.0 / (FINER * frequency * period)))
@@ -152,13 +164,18 @@ def motion_of(stretch: Stretch, model: Model, frequency: float) -> Motion:
     elif stretch.measured == "velocity":
         velocity = smooth
         acceleration = CubicSpline(time, smooth).derivative()(time)
-        position = _integral(time, smooth)
+        position = CubicSpline(time, smooth).antiderivative()(time)
+        position = position - position.mean()
     else:
-        acceleration = smooth - base_acceleration if relative else smooth
-        velocity = _integral(time, acceleration)
-        position = _integral(time, velocity)
+        acceleration = high_pass(smooth - base_acceleration if relative else smooth, period, low)
+        velocity = high_pass(_integral(time, acceleration), period, low)
+        position = high_pass(_integral(time, velocity), period, low)
     inertial = model.mass.value * (acceleration + (base_acceleration if relative else 0.0))
     moved = stretch.kind == "base_displacement"
+    if (
+        moved and stretch.measured == "acceleration"
+    ):  # the base's slow motion, too, is unknown to the accelerometer
+        base, base_rate = high_pass(base, period, low), high_pass(base_rate, period, low)
     return Motion(
         stretch.record, stretch.name, time, position, velocity, acceleration,
         position - base if moved else position,
@@ -177,7 +194,7 @@ def _derivatives(time: Array, value: Array) -> tuple[Array, Array, Array]:
 def _integral(time: Array, value: Array) -> Array:
     """Integral (n,) of a signal whose mean is taken for an offset, with mean zero."""
     total = CubicSpline(time, value - value.mean()).antiderivative()(time)
-    return total - np.polyval(np.polyfit(time - time[0], total, 1), time - time[0])
+    return total - total.mean()
 
 
 def _before_sensor(stretch: Stretch, model: Model) -> Array:

@@ -1,0 +1,125 @@
+"""Inverse dynamics: parameters from recorded efforts, the rows that count, and when the effort can be scored at all."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from axes import CATALOGUE, axis, axis_model, frame, frame_model
+
+from rhythmid.errors import InputError
+from rhythmid.identify.inverse_dynamics.applicability import applicable, moved_with_bandwidth
+from rhythmid.identify.inverse_dynamics.balance import Balance, stuck
+from rhythmid.identify.inverse_dynamics.estimate import FARTHEST, fit_effort, size_of
+from rhythmid.record.record import Channel
+
+FRICTION = {"force": 0.3, "transition": 0.02}
+
+
+def with_friction():
+    return axis_model().with_element(CATALOGUE["coulomb_friction"], FRICTION)
+
+
+def test_mass_damping_and_friction_of_an_axis_come_out_of_its_effort():
+    balance = Balance.of([axis()], axis_model())
+    fit = fit_effort(balance, with_friction())
+    assert fit.model.value("inertia.mass") == pytest.approx(1.0, abs=0.01)
+    assert fit.model.value("viscous_damper.damping") == pytest.approx(2.0, abs=0.1)
+    assert fit.model.value("coulomb_friction.force") == pytest.approx(0.8, abs=0.03)
+    assert fit.error < 0.03 * size_of(balance)
+
+
+def test_standard_deviations_cover_the_truth():
+    fits = [
+        fit_effort(Balance.of([axis(seed, friction=0.0)], axis_model()), axis_model()) for seed in range(12)
+    ]
+    scores = np.array(
+        [(f.model.value("viscous_damper.damping") - 2.0) / f.std_of("viscous_damper.damping") for f in fits]
+    )
+    assert np.sqrt(np.mean(scores**2)) < 2.0
+
+
+def test_jittered_stamps_are_put_on_a_uniform_grid():
+    even, uneven = (
+        fit_effort(Balance.of([axis(jitter=j)], axis_model()), with_friction()) for j in (0.0, 0.6)
+    )
+    for name in ("inertia.mass", "coulomb_friction.force"):
+        assert uneven.model.value(name) == pytest.approx(even.model.value(name), rel=0.03)
+
+
+def test_rows_are_the_same_for_all_models_and_leave_out_what_sticks():
+    balance = Balance.of([axis()], axis_model())
+    assert np.array_equal(Balance.of([axis()], with_friction()).measured, balance.measured)
+    assert np.abs(balance.mechanical[:, 1]).min() > balance.stick_speed
+    assert 0.0 < balance.stuck < 0.2
+
+
+def test_a_long_rest_is_left_out_with_what_the_filter_carries_of_it():
+    slow = np.zeros(100, bool)
+    slow[40:60] = True
+    slow[80:82] = True
+    out = stuck(slow, 10.0)
+    assert out[35:65].all() and not out[34] and not out[65]
+    assert out[80:82].all() and not out[79] and not out[82]
+
+
+def test_an_effort_that_is_late_is_aligned_by_two_samples_at_most():
+    record = axis()
+    assert record.input is not None
+    for late, least, most in ((1.0, 0.6, 1.4), (-1.0, -1.4, -0.6), (12.0, FARTHEST, FARTHEST)):
+        effort = Channel(record.input.time - late / 250.0, record.input.value, "N")
+        balance = Balance.of([replace(record, input=effort)], axis_model())
+        found = fit_effort(balance, with_friction()).alignment / balance.period
+        assert least - 1e-9 <= found <= most + 1e-9
+
+
+def test_the_delay_that_a_model_states_is_taken_into_account():
+    record = axis()
+    assert record.input is not None
+    late = replace(record, input=Channel(record.input.time - 0.04, record.input.value, "N"))
+    model = axis_model("command: [{input_delay: {delay: {value: 0.04, unit: s, fixed: true}}}]")
+    balance = Balance.of([late], model)
+    assert abs(fit_effort(balance, model).alignment) < balance.period
+
+
+def test_a_file_s_prior_holds_what_the_motion_does_not_tell():
+    model = axis_model(mass="{value: 1.3, unit: kg, prior: {mean: 1.3, std: 1.0e-6}}")
+    balance = Balance.of([axis()], model)
+    assert fit_effort(balance, model).model.value("inertia.mass") == pytest.approx(1.3, abs=1e-4)
+
+
+@pytest.mark.parametrize("kind", ["base_displacement", "base_acceleration"])
+@pytest.mark.parametrize("measured", ["position", "acceleration"])
+def test_stiffness_of_a_frame_on_a_moving_base_comes_out_of_its_acceleration(kind, measured):
+    model = frame_model()
+    balance = Balance.of([frame(kind, measured)], model)
+    fit = fit_effort(balance, model)
+    assert fit.model.value("linear_spring.stiffness") == pytest.approx(150.0, rel=0.02)
+    assert "inertia.mass" not in fit.names  # it is what sets the scale
+
+
+def test_the_effort_is_scored_where_it_makes_the_motion():
+    found = applicable([axis()], axis_model())
+    assert found.applies and not found.free_run_means_something
+    assert "Hz" in found.reason and found.bandwidth > 1.0
+    assert found.balance is not None
+    assert max(moved_with_bandwidth([axis()], axis_model(), found.balance).values()) < 3.0
+
+
+def test_the_effort_is_not_scored_where_the_machine_swings_by_itself():
+    found = applicable([axis(free=True)], axis_model())
+    assert not found.applies
+    assert "swings by itself" in found.reason
+
+
+def test_the_effort_is_not_scored_where_it_has_nothing_to_do_with_the_motion():
+    record = axis()
+    assert record.input is not None
+    noise = np.random.default_rng(1).standard_normal(len(record.input.value))
+    found = applicable([replace(record, input=replace(record.input, value=noise))], axis_model())
+    assert not found.applies
+
+
+def test_a_record_without_effort_or_base_is_told():
+    with pytest.raises(InputError, match="neither an effort"):
+        Balance.of([replace(axis(), input=None)], axis_model())
+    assert not applicable([replace(axis(), input=None)], axis_model()).applies
