@@ -13,7 +13,7 @@ from rhythmid.record.record import Channel, Record
 from rhythmid.record.signals import InputKind, OutputKind
 
 CATALOGUE = load_catalogue()
-STEP, RATE, LONG = 5e-4, 250.0, 20.0  # [s], [Hz], [s]
+STEP, RATE, LONG = 1e-3, 250.0, 20.0  # [s], [Hz], [s]
 
 
 def axis_model(more: str = "", mass: str = "{value: 1.3, unit: kg}") -> Model:
@@ -43,12 +43,13 @@ def axis(
     gravity: float = 0.0,
     amplitude: float = 1.0,
     free: bool = False,
+    length: float = LONG,
 ) -> Record:
     """An axis of 1 kg with 2 N s/m and Coulomb friction [N] that follows five sines under PD control; position and force with
     noise (a share of the force), stamps jittered by a share of the sample period. With `gravity` [N m] its position is an
     angle; `free`, it is a spring's mass in a light oscillation that hardly any force drives."""
     rng = np.random.default_rng(seed)
-    count = round(LONG / STEP)
+    count = round(length / STEP)
     time = STEP * np.arange(count)
     lines = np.array([0.2, 0.5, 0.9, 1.4, 2.3])
     turns = 2.0 * np.pi * lines[:, None] * time + rng.uniform(0.0, 2.0 * np.pi, 5)[:, None]
@@ -59,7 +60,7 @@ def axis(
     position, effort = np.empty(count), np.empty(count)
     for i in range(count):
         u = 400.0 * (reference[i] - x) + 40.0 * (rate[i] - v)
-        force = -2.0 * v - friction * np.tanh(v / 2e-3) - gravity * np.sin(x)
+        force = -2.0 * v - friction * np.tanh(v / 4e-3) - gravity * np.sin(x)
         if free:
             u, force = 0.05 * reference[i], -100.0 * x - 0.02 * v
         position[i], effort[i] = x, u

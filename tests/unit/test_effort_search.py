@@ -1,0 +1,122 @@
+"""The search by the recorded effort: what it names, what it leaves alone, and what it cannot be deceived by."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from axes import CATALOGUE, arm_model, axis, axis_model, frame, frame_model
+
+from rhythmid.diagnose.effort.remainder import remainder_of
+from rhythmid.diagnose.effort.search import EffortSearch, kin, search_effort
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.estimate import size_of
+
+
+@pytest.fixture(scope="module")
+def friction() -> EffortSearch:
+    return search_effort([axis()], axis_model(), CATALOGUE)
+
+
+def test_coulomb_friction_of_an_axis_is_named_alone(friction):
+    assert friction.chosen.elements == ("coulomb_friction",)
+    model = friction.chosen.model
+    assert model.value("coulomb_friction.force") == pytest.approx(0.8, abs=0.03)
+    assert model.value("inertia.mass") == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_name_predicts_no_worse_than_unknown_physics(friction):
+    chosen = friction.predictions[friction.hypotheses.index(friction.chosen)]
+    assert chosen.mean_square < 1.1 * friction.reference_prediction.mean_square
+    nominal = friction.predictions[friction.hypotheses.index(friction.nominal)]
+    assert nominal.mean_square > 10.0 * friction.reference_prediction.mean_square
+
+
+def test_what_is_left_by_the_nominal_model_goes_with_the_speed(friction):
+    before = remainder_of(friction.balance, friction.nominal)
+    after = remainder_of(friction.balance, friction.chosen)
+    assert before.goes_with == "velocity" and before.curves[0].share > 0.5
+    assert after.size < 0.3 * before.size and after.curves[0].share < 0.1
+
+
+def test_all_hypotheses_predict_the_same_rows(friction):
+    count = len(friction.balance.measured)
+    assert all(len(one.linearised.residual) == count for one in friction.hypotheses)
+    assert len(friction.reference.residual) == count
+
+
+def test_kin_compete_for_one_place(friction):
+    for one in friction.hypotheses:
+        elements = [term.element for label in one.elements if (term := one.fit.model.term(label)) is not None]
+        assert not any(kin(a, b) for i, a in enumerate(elements) for b in elements[i + 1 :])
+
+
+def test_what_the_effort_cannot_show_is_told(friction):
+    assert "sensor_lag" in friction.unseen and "clock_skew" in friction.unseen
+    assert "coulomb_friction" not in friction.unseen
+
+
+def test_nothing_is_found_where_nothing_is_missing():
+    found = [
+        search_effort(
+            [axis(seed, friction=0.0, jitter=0.3, length=10.0)], axis_model(), CATALOGUE
+        ).chosen.elements
+        for seed in range(20)
+    ]
+    assert found == [()] * 20
+
+
+def test_gravity_and_effort_do_not_extinguish_each_other():
+    found = search_effort([axis(gravity=4.0, amplitude=4.0)], arm_model(), CATALOGUE)
+    assert set(found.chosen.elements) == {"pendulum_gravity", "coulomb_friction"}
+    assert found.chosen.model.value("pendulum_gravity.moment") == pytest.approx(4.0, rel=0.03)
+    predicted = found.balance.predicted(found.chosen.fit.model, found.chosen.fit.alignment)
+    assert np.std(predicted) > 0.9 * np.std(found.balance.measured)
+
+
+def test_no_model_sees_the_effort_that_it_predicts():
+    record = axis()
+    assert record.input is not None
+    silent = replace(record, input=replace(record.input, value=0.0 * record.input.value))
+    balance = Balance.of([record], axis_model())
+    other = Balance.of([silent], axis_model(), balance.bandwidth)
+    for name, values in (
+        ("load_dependent_friction", {"coefficient": 0.1, "transition": 0.02}),
+        ("actuator_deadband", {"threshold": 0.1}),
+        ("actuator_lag", {"time_constant": 0.01}),
+    ):
+        model = axis_model().with_element(CATALOGUE[name], values)
+        assert np.array_equal(balance.predicted(model), other.predicted(model))
+
+
+def test_a_delay_beyond_two_samples_is_a_hypothesis_of_its_own():
+    record = axis(friction=0.0)
+    assert record.input is not None
+    late = replace(record, input=replace(record.input, time=record.input.time - 0.06))
+    found = search_effort([late], axis_model(), CATALOGUE)
+    assert found.chosen.elements == ("input_delay.delay",) and found.chosen.kind == "delay"
+    assert found.chosen.fit.alignment == pytest.approx(0.06, abs=0.004)
+
+
+def test_a_value_that_is_held_wrongly_is_a_hypothesis():
+    model = axis_model(mass="{value: 1.3, unit: kg, fixed: true}")
+    found = search_effort([axis(friction=0.0)], model, CATALOGUE)
+    freed = [one for one in found.hypotheses if one.elements == ("inertia.mass",)]
+    assert [one.kind for one in freed] == ["freed_value"]
+    assert freed[0].model.value("inertia.mass") == pytest.approx(1.0, abs=0.01)
+    chosen = found.predictions[found.hypotheses.index(found.chosen)].mean_square
+    assert found.predictions[found.hypotheses.index(freed[0])].mean_square <= 1.1 * chosen
+
+
+def test_dry_friction_of_a_frame_on_a_moving_base_is_named():
+    found = search_effort([frame(friction=0.6)], frame_model(), CATALOGUE)
+    assert found.chosen.elements == ("coulomb_friction",)
+    assert found.chosen.model.value("coulomb_friction.force") == pytest.approx(0.6, rel=0.05)
+    assert found.chosen.model.value("linear_spring.stiffness") == pytest.approx(150.0, rel=0.01)
+
+
+def test_a_law_that_the_catalogue_lacks_is_predicted_by_the_map():
+    short = CATALOGUE.without(*(name for name, one in CATALOGUE.items() if one.family == "friction"))
+    found = search_effort([axis()], axis_model(), short)
+    best = found.predictions[found.hypotheses.index(found.chosen)]
+    assert np.sqrt(best.mean_square) > 2.0 * np.sqrt(found.reference_prediction.mean_square)
+    assert np.sqrt(found.reference_prediction.mean_square) < 0.03 * size_of(found.balance)
