@@ -119,15 +119,17 @@ def _module(element: Element) -> Module:
     return Module(text, (kernel,))
 
 
-def effect_along(element: Element, values: Mapping[str, float], model: Model, path: Path) -> Array:
+def effect_along(
+    element: Element, values: Mapping[str, float], model: Model, path: Path, max_step: float = MAX_STEP
+) -> Array:
     """Force (n,) that the element adds on the mass along the path; for a command, actuator or sensor element the
     change of its signal.
 
-    Parameters that the element borrows come from `model`. Raises InputError when the model lacks one, or when one of the
+    An element's own states take steps of at most `max_step` [s]. Parameters that the element borrows come from `model`. Raises InputError when the model lacks one, or when one of the
     element's own has no value.
     """
     borrowed = {
-        name: MAX_STEP if source == STEP else model.borrowed(source, default)
+        name: max_step if source == STEP else model.borrowed(source, default)
         for name, (source, default) in element.borrows.items()
     }
     missing = [element.borrows[name][0] for name, value in borrowed.items() if value is None]
@@ -152,7 +154,7 @@ def effect_along(element: Element, values: Mapping[str, float], model: Model, pa
     out = np.empty(len(path.time))
     load_run(_module(element))(
         np.ascontiguousarray(path.time), rows, np.array([*parameters, *borrowed.values()], dtype=float), states,
-        MAX_STEP, out,
+        max_step, out,
     )  # fmt: skip
     return out
 

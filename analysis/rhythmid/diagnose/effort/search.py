@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import t as student_t
+from threadpoolctl import threadpool_limits
 
 from rhythmid.diagnose.constants import EQUIVALENT, FALSE_ALARM, MISMATCH, PRACTICAL_EFFORT, REST
 from rhythmid.diagnose.effort.candidate import (
@@ -87,6 +88,7 @@ def kin(first: Element, second: Element) -> bool:
     )
 
 
+@threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
 def search_effort(
     records: Sequence[Record],
     model: Model,

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
@@ -50,6 +51,7 @@ class Applicability:
         return self.restoring and not self.closed
 
 
+@threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
 def applicable(records: Sequence[Record], model: Model) -> Applicability:
     """Whether these records can be scored by the effort that the model predicts."""
     closed = controlled(model)

@@ -18,7 +18,7 @@ from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
 from rhythmid.identify.inverse_dynamics.motion import Motion, high_pass, low_pass, motion_of, stretches
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.record.record import Record
-from rhythmid.simulation.effect import Path, effect_along
+from rhythmid.simulation.effect import MAX_STEP, Path, effect_along
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -28,6 +28,7 @@ DECIMATED = 2.5  # rows a period of the cut-off: the Nyquist rate and a quarter 
 MEMORY = 2e8  # bytes of forces that are kept, so that a refit computes again only what changed
 MANY_ROWS = 200  # of a short record that are kept at least: their correlation is allowed for
 LEAST_ROWS = 40  # rows without which nothing is estimated
+SUBSTEPS = 4  # of an element's own states in a sample of the motion, whose bandwidth has ten
 INVISIBLE = 1e-4  # of a signal that is left by a filter that it does not pass
 NEIGHBOURS = np.arange(-2, 4)  # samples from which a value between two is interpolated (Lagrange)
 TESTED = 64  # samples on which it is found out whether an element's force depends on the effort
@@ -199,7 +200,9 @@ class Balance:
     ) -> Array:
         values = {name: value.value for name, value in term.values.items()}
         of_leg = term.element.slot == "force" and term.element.acts not in ("body", "drive")
-        return effect_along(term.element, values, model, motion.path(effort, leg, signal, of_leg))
+        # a motion without anything fast moves an element's states smoothly; what has none takes the simulator's own step
+        step = max(MAX_STEP, motion.period / SUBSTEPS) if term.element.states else MAX_STEP
+        return effect_along(term.element, values, model, motion.path(effort, leg, signal, of_leg), step)
 
     def _force(self, index: int, term: Term, model: Model) -> Array:
         """Force (n,) of an element that sees nothing but the motion; kept, for most refits change but one."""

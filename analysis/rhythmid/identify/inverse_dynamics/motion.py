@@ -9,6 +9,7 @@ M. Gautier, A. Janot, P. O. Vandanjon, IEEE Trans. Control Syst. Technol. 21 (20
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,11 +120,17 @@ def stretches(records: Sequence[Record], model: Model) -> list[Stretch]:
     return found
 
 
+@lru_cache(maxsize=64)
+def _sections(order: int, cut: float, kind: str) -> Array:
+    """Second-order sections of a Butterworth filter; `cut` as a share of the Nyquist frequency."""
+    return np.atleast_2d(np.asarray(butter(order, cut, btype=kind, output="sos")))  # pyright: ignore[reportArgumentType]
+
+
 def low_pass(values: Array, period: float, frequency: float) -> Array:
     """Values (n,) or (n, p) without what is above the frequency [Hz]: a Butterworth filter in both directions."""
     if frequency * period >= 0.45:
         return values
-    sections = np.atleast_2d(np.asarray(butter(ORDER, 2.0 * frequency * period, output="sos")))
+    sections = _sections(ORDER, 2.0 * frequency * period, "lowpass")
     padding = min(len(values) - 1, max(3 * (2 * len(sections) + 1), math.ceil(1.5 / (frequency * period))))
     return sosfiltfilt(sections, values, axis=0, padlen=padding)
 
@@ -132,9 +139,7 @@ def high_pass(values: Array, period: float, frequency: float) -> Array:
     """Values (n,) or (n, p) without what is below the frequency [Hz], in both directions; all of them where it is 0."""
     if frequency <= 0.0:
         return values
-    sections = np.atleast_2d(
-        np.asarray(butter(SLOW_ORDER, 2.0 * frequency * period, btype="highpass", output="sos"))
-    )
+    sections = _sections(SLOW_ORDER, 2.0 * frequency * period, "highpass")
     padding = min(len(values) - 1, math.ceil(1.0 / (frequency * period)))
     return sosfiltfilt(sections, values, axis=0, padlen=padding)
 
