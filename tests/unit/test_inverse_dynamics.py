@@ -123,3 +123,17 @@ def test_a_record_without_effort_or_base_is_told():
     with pytest.raises(InputError, match="neither an effort"):
         Balance.of([replace(axis(), input=None)], axis_model())
     assert not applicable([replace(axis(), input=None)], axis_model()).applies
+
+
+def test_a_gain_of_the_actuator_is_inverted_exactly():
+    model = axis_model("actuator: [{actuator_gain: {gain: {value: 3.0, unit: '1', fixed: true}}}]")
+    balance = Balance.of([axis()], axis_model())
+    np.testing.assert_allclose(3.0 * balance.predicted(model), balance.predicted(axis_model()), rtol=1e-9)
+
+
+def test_a_dead_band_takes_what_it_takes_from_the_effort():
+    model = axis_model().with_element(CATALOGUE["actuator_deadband"], {"threshold": 0.1})
+    balance = Balance.of([axis()], axis_model())
+    plain, dead = balance.required(axis_model())[0], balance.required(model)[0]
+    beyond = np.abs(plain) > 0.1
+    np.testing.assert_allclose(np.abs(dead - plain)[beyond], 0.1, rtol=1e-9)

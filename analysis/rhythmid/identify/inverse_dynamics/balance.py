@@ -28,6 +28,7 @@ DECIMATED = 2.5  # rows a period of the cut-off: the Nyquist rate and a quarter 
 MEMORY = 2e8  # bytes of forces that are kept, so that a refit computes again only what changed
 MANY_ROWS = 200  # of a short record that are kept at least: their correlation is allowed for
 LEAST_ROWS = 40  # rows without which nothing is estimated
+STRAIGHT = 1e-9  # of a signal: curvature that is rounding
 SUBSTEPS = 4  # of an element's own states in a sample of the motion, whose bandwidth has ten
 INVISIBLE = 1e-4  # of a signal that is left by a filter that it does not pass
 NEIGHBOURS = np.arange(-2, 4)  # samples from which a value between two is interpolated (Lagrange)
@@ -191,15 +192,30 @@ class Balance:
         for slot in ("actuator", "command"):
             for term in reversed([t for t in model.terms if t.element.slot == slot]):
                 if self._counts(term, model):
-                    # the inverse to first order: what went in is what has to come out less the change on the way
-                    required = required - self._along(motion, term, model, required, leg, required)
+                    required = self._before(motion, term, model, required, leg)
         return required
+
+    def _before(self, motion: Motion, term: Term, model: Model, after: Array, leg: Array) -> Array:
+        """The signal (n,) that went into an actuator or command element for `after` to come out.
+
+        Exact where the element is a gain and an offset at each instant, like a motor with its back-EMF; else to first order:
+        what went in is what has to come out less the change on the way.
+        """
+        if not term.element.own:
+            size = float(np.std(after)) or 1.0
+            levels = np.zeros_like(after), np.full_like(after, size), np.full_like(after, -size)
+            nothing, more, less = (self._along(motion, term, model, after, leg, one) for one in levels)
+            gain = 1.0 + (more - nothing) / size
+            straight = np.abs(more + less - 2.0 * nothing).max() <= STRAIGHT * (np.abs(gain).max() * size)
+            if straight and np.abs(gain).min() > 0.0:
+                return (after - nothing) / gain
+        return after - self._along(motion, term, model, after, leg, after)
 
     def _along(
         self, motion: Motion, term: Term, model: Model, effort: Array, leg: Array, signal: Array
     ) -> Array:
         values = {name: value.value for name, value in term.values.items()}
-        of_leg = term.element.slot == "force" and term.element.acts not in ("body", "drive")
+        of_leg = term.element.acts not in ("body", "drive")
         # a motion without anything fast moves an element's states smoothly; what has none takes the simulator's own step
         step = max(MAX_STEP, motion.period / SUBSTEPS) if term.element.states else MAX_STEP
         return effect_along(term.element, values, model, motion.path(effort, leg, signal, of_leg), step)
