@@ -13,30 +13,33 @@ from rhythmid.identify.inverse_dynamics.free_map import FreeMap
 from rhythmid.identify.student import scale_of, weights_of
 
 Array = NDArray[np.float64]
-# standard deviations of a map's coefficients, of which cross-validation chooses: shares of the effort's size
-RIDGES = (3.0, 1.0, 0.3, 0.1, 0.03)
+# standard deviations of a map's bends (second differences of a spline's coefficients), of which cross-validation chooses: shares of
+# the effort's size. The smallest leaves straight lines, the largest a tenth of the effort for every piece
+RIDGES = (0.3, 0.1, 0.03, 0.01, 0.003)
+STRAIGHT = 3.0  # standard deviation of what is straight, the same: a line may carry all of the effort
 PASSES = 8  # of reweighted least squares
 
 
-def map_columns(balance: Balance, fitted: Fitted) -> Array:
-    """Columns (n, q) of the free map at the rows; its load is the effort that the model predicts, never the measured one."""
+def map_columns(balance: Balance, fitted: Fitted) -> tuple[Array, NDArray[np.bool_]]:
+    """Columns (n, q) of the free map at the rows, and which of them are bends (q,); its load is the effort that the model
+    predicts, never the measured one."""
     free = FreeMap(list(balance.motions))
     loads = balance.required(fitted.fit.model)
     made = [free.columns(motion, load) for motion, load in zip(balance.motions, loads, strict=True)]
     shift = balance.shift(fitted.fit.model) + fitted.fit.alignment
     columns = balance.rows(made, shift)
     columns[:, -1] /= size_of(balance)  # a load counts as a share of the effort
-    return columns
+    return columns, free.bends
 
 
-def with_map(balance: Balance, fitted: Fitted, ridge: float, columns: Array | None = None) -> Linearised:
-    """The fit with a free map beside its parameters; `ridge` is the standard deviation of the map's coefficients, as a share of
-    the effort's size."""
+def with_map(balance: Balance, fitted: Fitted, ridge: float, columns: tuple[Array, NDArray[np.bool_]]) -> Linearised:
+    """The fit with a free map, of these `map_columns`, beside its parameters; `ridge` is the standard deviation of the map's
+    bends, as a share of the effort's size."""
     base = fitted.linearised
-    made = map_columns(balance, fitted) if columns is None else columns
+    made, bends = columns
     jacobian = np.hstack([base.jacobian, made])
-    spread = ridge * size_of(balance)
-    precision = np.concatenate([base.precision, np.full(made.shape[1], spread**-2)])
+    spread = np.where(bends, ridge, STRAIGHT) * size_of(balance)
+    precision = np.concatenate([base.precision, spread**-2])
     departure = np.concatenate([base.departure, np.zeros(made.shape[1])])
     residual = base.residual
     for _ in range(PASSES):

@@ -264,16 +264,15 @@ class _Search:
         return any(set(one.elements) == set(fitted.elements) for one in self.found)
 
     def _simpler(self, first: Fitted, second: Fitted) -> bool:
-        """Whether two hypotheses differ in forms of one thing only, of which the first has the simpler one."""
+        """Whether two hypotheses differ in one effect only, and that of the first is a special case of the other's."""
         one = set(first.elements) - set(second.elements)
         other = set(second.elements) - set(first.elements)
         if len(one) != 1 or len(other) != 1:
             return False
         terms = first.fit.model.term(one.pop()), second.fit.model.term(other.pop())
-        if terms[0] is None or terms[1] is None or not kin(terms[0].element, terms[1].element):
+        if terms[0] is None or terms[1] is None:
             return False
-        special = terms[1].element.name in terms[0].element.special_case_of
-        return first.size < second.size or (first.size == second.size and special)
+        return terms[1].element.name in terms[0].element.special_case_of
 
 
 def _shortlist(screened: Sequence[Screened]) -> list[Screened]:

@@ -28,6 +28,7 @@ DECIMATED = 2.5  # rows a period of the cut-off: the Nyquist rate and a quarter 
 MEMORY = 2e8  # bytes of forces that are kept, so that a refit computes again only what changed
 MANY_ROWS = 200  # of a short record that are kept at least: their correlation is allowed for
 LEAST_ROWS = 40  # rows without which nothing is estimated
+LEVELS = (1.0, -1.0, 0.3)  # of the effort's size, at which it is seen whether an actuator is a gain
 STRAIGHT = 1e-9  # of a signal: curvature that is rounding
 SUBSTEPS = 4  # of an element's own states in a sample of the motion, whose bandwidth has ten
 INVISIBLE = 1e-4  # of a signal that is left by a filter that it does not pass
@@ -203,10 +204,14 @@ class Balance:
         """
         if not term.element.own:
             size = float(np.std(after)) or 1.0
-            levels = np.zeros_like(after), np.full_like(after, size), np.full_like(after, -size)
-            nothing, more, less = (self._along(motion, term, model, after, leg, one) for one in levels)
-            gain = 1.0 + (more - nothing) / size
-            straight = np.abs(more + less - 2.0 * nothing).max() <= STRAIGHT * (np.abs(gain).max() * size)
+            nothing = self._along(motion, term, model, after, leg, np.zeros_like(after))
+            slopes = [
+                (self._along(motion, term, model, after, leg, np.full_like(after, level * size)) - nothing)
+                / (level * size)
+                for level in LEVELS
+            ]
+            gain = 1.0 + slopes[0]
+            straight = max(float(np.abs(one - slopes[0]).max()) for one in slopes) <= STRAIGHT * np.abs(gain).max()
             if straight and np.abs(gain).min() > 0.0:
                 return (after - nothing) / gain
         return after - self._along(motion, term, model, after, leg, after)

@@ -11,17 +11,18 @@ from scipy.interpolate import BSpline
 from rhythmid.identify.inverse_dynamics.motion import Motion
 
 Array = NDArray[np.float64]
-PIECES = (
-    6  # of each spline: enough for a hardening, a kink or a Stribeck fall (fit to sin over a turn: 0.2 %)
-)
+PIECES = 6  # of a spline of the speed: enough for a Stribeck fall
+PLACES = 10  # of the spline of the position: enough for a hardening, a kink or a turn's sine
 DEGREE = 3
 REACH = (0.01, 0.99)  # quantiles of the data between which a spline has its pieces
 
 
 class Spline:
-    """A basis of cubic B-splines over the bulk of the given values (n,), clipped beyond it."""
+    """Columns of a smooth function over the bulk of the given values (n,), clipped beyond it: a straight line, and cubic
+    B-splines in the form in which a ridge on their coefficients is a penalty on curvature (P. H. C. Eilers, B. D. Marx,
+    Statistical Science 11 (1996) 89; as mixed models: I. D. Currie, M. Durban, Stat. Modelling 2 (2002) 333)."""
 
-    def __init__(self, values: Array, pieces: int = PIECES) -> None:
+    def __init__(self, values: Array, pieces: int) -> None:
         low, high = np.quantile(values, REACH)
         high = high if high > low else low + max(abs(low), 1.0) * 1e-9
         # half of the way towards equal numbers of samples: quantiles alone leave the fast ends to one piece
@@ -29,35 +30,48 @@ class Spline:
         knots = 0.5 * (even + np.quantile(np.clip(values, low, high), np.linspace(0.0, 1.0, pieces + 1)))
         self.low, self.high = float(low), float(high)
         self.knots = np.concatenate([np.full(DEGREE, low), knots, np.full(DEGREE, high)])
-        self.count = pieces + DEGREE
+        bends = np.diff(np.eye(pieces + DEGREE), 2, axis=0)
+        self.shape = bends.T @ np.linalg.inv(bends @ bends.T)  # from second differences to coefficients
+
+    @property
+    def count(self) -> int:
+        """Number of columns: the straight line's two, then those that bend."""
+        return 2 + self.shape.shape[1]
 
     def __call__(self, values: Array) -> Array:
-        """Values (n, count) of the basis functions; they add up to 1."""
+        """Columns (n, count): 1, the value from -1 to 1, and the bends."""
         inside = np.clip(values, self.low, self.high)
-        return np.asarray(BSpline.design_matrix(inside, self.knots, DEGREE).toarray())
+        straight = (2.0 * inside - self.low - self.high) / (self.high - self.low)
+        bent = np.asarray(BSpline.design_matrix(inside, self.knots, DEGREE).toarray()) @ self.shape
+        return np.column_stack([np.ones(len(inside)), straight, bent])
 
 
 class FreeMap:
     """Columns of a free map over the motions: a spline of the speed for each direction, one of the position, and
-    sgn(v) times the load, position and its square."""
+    sgn(v) times the position, its square, and the load. `bends` (q,) marks those whose size is curvature."""
 
     def __init__(self, motions: list[Motion]) -> None:
         velocity = np.concatenate([motion.leg_velocity for motion in motions])
         position = np.concatenate([motion.leg_position for motion in motions])
-        forwards, backwards = velocity[velocity > 0.0], -velocity[velocity < 0.0]
-        self._forwards = Spline(forwards) if len(forwards) > PIECES else None
-        self._backwards = Spline(backwards) if len(backwards) > PIECES else None
-        self._position = Spline(position)
+        sides = ((velocity[velocity > 0.0], 1.0), (-velocity[velocity < 0.0], -1.0))
+        self._speeds = [
+            (Spline(speed, PIECES), direction) for speed, direction in sides if len(speed) > 4 * PIECES
+        ]
+        self._position = Spline(position, PLACES)
         self._centre, self._width = float(np.mean(position)), float(np.std(position)) or 1.0
+        bends = [np.arange(spline.count) > 1 for spline, _ in self._speeds]
+        self._first = 1 if self._speeds else 0  # the constant is there already, in two halves
+        bends += [(np.arange(self._position.count) > 1)[self._first :], np.zeros(3, bool)]
+        self.bends = np.concatenate(bends)
 
     def columns(self, motion: Motion, load: Array) -> Array:
         """Columns (n, q) of one motion; `load` (n,) is the effort that a model predicts, never the measured one."""
         velocity, sign = motion.leg_velocity, np.sign(motion.leg_velocity)
-        found = [self._position(motion.leg_position)]
-        for spline, direction in ((self._forwards, 1.0), (self._backwards, -1.0)):
-            if spline is not None:
-                moving = direction * velocity > 0.0
-                found.append(spline(direction * velocity) * moving[:, None])
+        found = [
+            spline(direction * velocity) * (direction * velocity > 0.0)[:, None]
+            for spline, direction in self._speeds
+        ]
+        found.append(self._position(motion.leg_position)[:, self._first :])
         place = np.clip((motion.leg_position - self._centre) / self._width, -3.0, 3.0)
         found.append(np.column_stack([sign * place, sign * place**2, sign * np.abs(load)]))
         return np.hstack(found)
