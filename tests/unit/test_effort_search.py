@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from axes import CATALOGUE, arm_model, axis, axis_model, frame, frame_model
 
+from rhythmid.diagnose.effort.held_out import HeldOut
 from rhythmid.diagnose.effort.remainder import remainder_of
 from rhythmid.diagnose.effort.search import EffortSearch, kin, search_effort
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -120,3 +121,9 @@ def test_a_law_that_the_catalogue_lacks_is_predicted_by_the_map():
     best = found.predictions[found.hypotheses.index(found.chosen)]
     assert np.sqrt(best.mean_square) > 2.0 * np.sqrt(found.reference_prediction.mean_square)
     assert np.sqrt(found.reference_prediction.mean_square) < 0.03 * size_of(found.balance)
+
+
+def test_effort_of_a_record_that_no_fit_has_seen_is_predicted(friction):
+    unseen = HeldOut.of([axis(7, amplitude=0.5)], axis_model(), friction.balance)
+    assert unseen.error(friction.chosen) < 0.06  # the noise is a twentieth of the effort
+    assert unseen.error(friction.nominal) > 2.0 * unseen.error(friction.chosen)

@@ -32,7 +32,9 @@ def map_columns(balance: Balance, fitted: Fitted) -> tuple[Array, NDArray[np.boo
     return columns, free.bends
 
 
-def with_map(balance: Balance, fitted: Fitted, ridge: float, columns: tuple[Array, NDArray[np.bool_]]) -> Linearised:
+def with_map(
+    balance: Balance, fitted: Fitted, ridge: float, columns: tuple[Array, NDArray[np.bool_]]
+) -> Linearised:
     """The fit with a free map, of these `map_columns`, beside its parameters; `ridge` is the standard deviation of the map's
     bends, as a share of the effort's size."""
     base = fitted.linearised

@@ -211,7 +211,9 @@ class Balance:
                 for level in LEVELS
             ]
             gain = 1.0 + slopes[0]
-            straight = max(float(np.abs(one - slopes[0]).max()) for one in slopes) <= STRAIGHT * np.abs(gain).max()
+            straight = (
+                max(float(np.abs(one - slopes[0]).max()) for one in slopes) <= STRAIGHT * np.abs(gain).max()
+            )
             if straight and np.abs(gain).min() > 0.0:
                 return (after - nothing) / gain
         return after - self._along(motion, term, model, after, leg, after)
