@@ -46,6 +46,9 @@ from rhythmid.record.record import Record
 
 MOST = 4  # effects that are looked for: a fifth was never real on recordings that were tried
 REFINED = 10  # additions that are fitted in earnest in each round: the right one was among the first five of a score test always
+SWALLOWED = (
+    0.5  # of the effort that an actuator's effect has to leave: one that takes more explains no motion
+)
 GAP = 3  # rows between blocks: as far as the filter of effort mixes neighbours (its impulse lasts about 1 / cut-off, 2.5 rows)
 
 
@@ -227,7 +230,20 @@ class _Search:
             priors |= self._priors(model, label, start.element, alignment)
         if any(not math.isfinite(prior.std) or prior.std <= 0.0 for prior in priors.values()):
             return None
-        return self._fit((*base.elements, label), model, priors, aligned, alignment, start.kind)
+        made = self._fit((*base.elements, label), model, priors, aligned, alignment, start.kind)
+        swallows = (
+            start.element is not None
+            and start.element.slot == "actuator"
+            and self._swallows(made, base, label)
+        )
+        return None if swallows else made
+
+    def _swallows(self, made: Fitted, base: Fitted, label: str) -> bool:
+        """Whether an actuator's effect takes most of the effort away, so that hardly any is left to move the machine."""
+        left, before = (
+            self.balance.predicted(model, 0.0) for model in (made.fit.model.without(label), base.fit.model)
+        )
+        return bool(np.linalg.norm(left) < SWALLOWED * np.linalg.norm(before))
 
     def _priors(self, model: Model, label: str, element: Element, alignment: float) -> dict[str, Prior]:
         """An addition's effect is below the effort; its shape may be anything that changes it by no more than that."""
