@@ -11,7 +11,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import condition_of, fit_effort
-from rhythmid.model import Model
+from rhythmid.model import INERTIA, Model
 from rhythmid.record.record import Record
 from rhythmid.simulation.effect import Path, effect_along
 
@@ -62,9 +62,8 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
     chosen = balance.bandwidth
     fit = fit_effort(balance, model, steps=3)
     condition = condition_of(fit)
-    inertial = model.mass.value * balance.rows([motion.acceleration for motion in balance.motions])
     driven = balance.motions[0].driven_by_base
-    share = 1.0 if driven else float(np.std(balance.measured) / max(float(np.std(inertial)), 1e-300))
+    share = 1.0 if driven else float(np.std(balance.measured)) / max(_inertial(balance, model), 1e-300)
     reason = f"the effort is predicted below {chosen.effort:.3g} Hz, where a free map explains {chosen.explained:.0%} of it"
     applies = True
     if chosen.explained < EXPLAINED:
@@ -85,6 +84,12 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
     return Applicability(
         applies, reason, chosen.effort, condition, chosen.explained, share, restores(balance, model), closed, balance
     )  # fmt: skip
+
+
+def _inertial(balance: Balance, model: Model) -> float:
+    """Size (rms about its mean) of the inertial force, in the effort's unit: that of a motor's voltage, where this is one."""
+    heavier = model.with_values({INERTIA: 1.01 * model.mass.value})
+    return float(np.std(balance.predicted(heavier) - balance.predicted(model))) / 0.01
 
 
 def restores(balance: Balance, model: Model) -> bool:

@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.student import correlation_time, cost_of, scale_of, weights_of
-from rhythmid.model import Model, Prior
+from rhythmid.model import INERTIA, Model, Prior
 
 Array = NDArray[np.float64]
 SPREAD = 0.7  # relative standard deviation of a value that the file states without a prior: a factor of two either way (ln 2)
 FAINTEST = 0.1  # of the effort that one standard deviation of a prior may move at least: a file's placeholder forbids nothing
 ALIGNED = 1.0  # samples: standard deviation of the alignment of effort and motion, whose stamps a driver rounds to a sample
 FARTHEST = 2.0  # samples by which they may be out; a longer delay is a hypothesis of its own
+LEAST = 0.01  # of an inertia or a motor's constant that is thought of, at least: none vanishes
+SHRINKS = 3.0  # times by which one of these becomes smaller in a step, at most: what is divided by it is far from linear
 STEPS = 12  # Gauss-Newton steps at most
 HALVINGS = 5
 SETTLED = 1e-4  # change of the cost below which it is at its end
@@ -146,8 +148,13 @@ def fit_effort(
     mean = np.array([aligned.mean, *(known[name].mean for name in names)])
     precision = np.array([aligned.std**-2, *(known[name].std ** -2 for name in names)])
     bounds = [(aligned.low, aligned.high), *(model.parameters[name].bounds for name in names)]
+    for place, name in enumerate(names, start=1):
+        if _divides(model, name):
+            bounds[place] = (max(bounds[place][0], LEAST * known[name].mean), bounds[place][1])
     low, high = (np.array(side) for side in zip(*bounds, strict=True))
     value = np.array([alignment, *(model.value(name) for name in names)])
+
+    divides = np.array([False, *(_divides(model, name) for name in names)])
 
     def cost(error: Array, at: Array, scale: float) -> float:
         return cost_of(error, scale) + 0.5 * float(precision @ (at - mean) ** 2)
@@ -155,7 +162,8 @@ def fit_effort(
     for _ in range(steps):
         scale = scale_of(residual)
         before = cost(residual, value, scale)
-        step = _step(residual, jacobian, precision, value, mean, low, high, scale)
+        nearest = np.where(divides, np.maximum(low, value / SHRINKS), low)
+        step = _step(residual, jacobian, precision, value, mean, nearest, high, scale)
         share, improved = 1.0, False
         for _ in range(HALVINGS):
             trial = np.clip(value + share * step, low, high)
@@ -183,6 +191,12 @@ def fit_effort(
         cost(residual, value, scale), np.sqrt(np.maximum(np.diag(covariance), 0.0)), time,
         (value <= low) | (value >= high),
     )  # fmt: skip
+
+
+def _divides(model: Model, name: str) -> bool:
+    """Whether a parameter is one that cannot be 0: the inertia, or a constant of the motor that turns a signal into a force."""
+    term = model.term(name.split(".")[0])
+    return name == INERTIA or (term is not None and term.element.acts == "transducer")  # pyright: ignore[reportUnnecessaryComparison]
 
 
 def _step(
