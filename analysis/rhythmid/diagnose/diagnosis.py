@@ -7,16 +7,18 @@ it is.
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
 from rhythmid.diagnose.admission import admitted
 from rhythmid.diagnose.answer.compose import compose
+from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.baseline import causal
 from rhythmid.diagnose.case import Budget, Case
+from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.free_run import FreeRunResult, free_run
 from rhythmid.diagnose.replay import ledger
 from rhythmid.diagnose.scoring import settle
@@ -24,6 +26,7 @@ from rhythmid.diagnose.unit_check import check_units
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import with_declared
+from rhythmid.identify.inverse_dynamics.applicability import Applicability, applicable
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.parallel import cores
@@ -37,12 +40,12 @@ class Answer:
 
     diagnosis: Diagnosis
     model: Model
-    result: FreeRunResult
+    result: FreeRunResult | EffortResult
 
     @property
     def block(self) -> int:
         """Samples that were averaged before they were compared."""
-        return self.result.series[0].block
+        return self.result.series[0].block if isinstance(self.result, FreeRunResult) else 1
 
     def ledger(self) -> dict[str, Any]:
         """All that the decision depends on, as plain data; see `replay`."""
@@ -80,6 +83,9 @@ def diagnose(
     with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
         known = catalogue or load_catalogue()
         case = Case(model, given.records[:count], given.records[count:], known, pool, tell, Budget(budget))
+        effort = applicable(case.records, model)
+        if effort.applies and not effort.free_run_means_something:
+            return _by_effort(case, effort, given.notes)
         series = prepare(given.records)
         check_units(model, series[:count], pool)
         answers: list[Answer] = []
@@ -90,5 +96,27 @@ def diagnose(
             diagnosis = compose(case, result, given.notes)
             answers.append(Answer(diagnosis, causal(result.search.fit.model), result))
             if diagnosis.verdict == "missing_physics":
-                return answers[-1]
-    return answers[0]
+                break
+        chosen = next((one for one in answers if one.diagnosis.verdict == "missing_physics"), answers[0])
+        if effort.applies and not case.budget.spent:
+            return _compared(chosen, _by_effort(case, effort, ()))
+        return chosen
+
+
+def _by_effort(case: Case, effort: Applicability, notes: Sequence[str]) -> Answer:
+    result = effort_run(case, effort)
+    return Answer(compose_effort(case, result, notes), result.chosen.model, result)
+
+
+def _compared(answer: Answer, other: Answer) -> Answer:
+    """The answer with a note where the effort, scored too, stands by other names."""
+    first, second = answer.diagnosis, other.diagnosis
+    stated = [
+        {effect.element for effect in one.missing} if one.verdict == "missing_physics" else set()
+        for one in (first, second)
+    ]
+    if not all(stated) or stated[0] & stated[1]:
+        return answer
+    words = " and ".join(sorted(stated[1])).replace("_", " ")
+    note = f"Scored by effort the same records stand by another name: {words}. Believe neither without another experiment."
+    return replace(answer, diagnosis=replace(first, notes=(*first.notes, note)))

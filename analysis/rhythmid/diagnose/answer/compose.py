@@ -16,7 +16,7 @@ from rhythmid.diagnose.answer.result import (
     Remainder,
     Scored,
 )
-from rhythmid.diagnose.answer.wording import location_of, recalibrated, summary_of
+from rhythmid.diagnose.answer.wording import freed_value, location_of, recalibrated, summary_of
 from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.evidence import difference
@@ -120,13 +120,7 @@ def _freed(nominal: Model, result: FreeRunResult) -> str | None:
     chosen = result.selection.chosen
     if chosen.kind != "freed_value":
         return None
-    *effects, name = chosen.elements
-    given, free = nominal.parameters[name], result.search.fit.model.value(name)
-    beside = f" with {' and '.join(effects).replace('_', ' ')}" if effects else ""
-    return (
-        f"{name} is held at {given.value:g} {given.unit} as given. Freed it comes out at {free:.4g}, and that{beside} predicts the "
-        "records better than any effect does while it is held: check that value, or drop its 'fixed: true'."
-    )
+    return freed_value(nominal, result.search.fit.model, chosen.elements)
 
 
 def _missing(fit: Fit, label: str, decision: Decision) -> MissingEffect:

@@ -94,6 +94,17 @@ def summary_of(
     )
 
 
+def freed_value(nominal: Model, fitted: Model, elements: Sequence[str]) -> str:
+    """A sentence about the fixed value, the last of the `elements`, that a hypothesis frees beside the others."""
+    *effects, name = elements
+    given, free = nominal.parameters[name], fitted.value(name)
+    beside = f" with {' and '.join(effects).replace('_', ' ')}" if effects else ""
+    return (
+        f"{name} is held at {given.value:g} {given.unit} as given. Freed it comes out at {free:.4g}, and that{beside} predicts the "
+        "records better than any effect does while it is held: check that value, or drop its 'fixed: true'."
+    )
+
+
 def recalibrated(nominal: Model, fit: Fit) -> list[str]:
     """Nominal parameters that the records contradict, as sentences."""
     said = []

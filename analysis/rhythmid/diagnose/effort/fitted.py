@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhythmid.diagnose.evidence import Linearised
-from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
+from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit
 from rhythmid.model import Model, Prior
@@ -50,10 +50,6 @@ class Fitted:
     def size(self) -> int:
         """Number of parameters."""
         return len(self.fit.names)
-
-    def hypothesis(self, prediction: Prediction, heldout: float | None = None) -> Hypothesis:
-        """The same with what it predicts of data that its fit has not seen."""
-        return Hypothesis(self.elements, self.kind, self.model, prediction, heldout)
 
     def std(self) -> dict[str, float]:
         """Standard deviations of the estimated parameters, inflated by the residual's autocorrelation."""

@@ -6,12 +6,13 @@ addition takes the place of its kin instead of standing beside it.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.stats import t as student_t
 from threadpoolctl import threadpool_limits
 
+from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import EQUIVALENT, FALSE_ALARM, MISMATCH, PRACTICAL_EFFORT, REST
 from rhythmid.diagnose.effort.candidate import (
     DELAY,
@@ -66,6 +67,7 @@ class EffortSearch:
     chosen : the hypothesis with which the search ended.
     condition : of the nominal model's scaled columns.
     unseen : candidates that the effort cannot show.
+    candidates : number of effects that were tried.
     """
 
     balance: Balance
@@ -80,6 +82,7 @@ class EffortSearch:
     beyond_prediction: Prediction
     condition: float
     unseen: tuple[str, ...]
+    candidates: int
 
 
 def kin(first: Element, second: Element) -> bool:
@@ -99,6 +102,7 @@ def search_effort(
     balance: Balance | None = None,
     most: int = MOST,
     tell: Tell = lambda _: None,
+    budget: Budget | None = None,
 ) -> EffortSearch:
     """Search for what the model lacks to predict the recorded effort.
 
@@ -112,8 +116,11 @@ def search_effort(
     search = _Search(balance, catalogue, Blocks.of(balance.record, GAP), nominal, [nominal])
     reference = reference_of(balance, nominal, search.blocks)
     chosen = nominal
+    budget = budget or Budget()
     for number in range(most):
-        tell(f"effect {number + 1}")
+        if budget.spent:
+            break
+        tell(f"looking for effect {number + 1} in the effort")
         better = search.further(chosen, reference)
         if better is None:
             break
@@ -127,7 +134,7 @@ def search_effort(
     order = sorted(range(len(search.found)), key=lambda index: -made[index].score)
     return EffortSearch(
         balance, search.blocks, nominal, tuple(search.found[i] for i in order), tuple(made[i] for i in order), chosen,
-        reference, made[-2], beyond, made[-1], condition_of(nominal.fit), unseen(catalogue),
+        reference, made[-2], beyond, made[-1], condition_of(nominal.fit), unseen(catalogue), len(search.tried),
     )  # fmt: skip
 
 
@@ -140,12 +147,14 @@ class _Search:
     blocks: Blocks
     nominal: Fitted
     found: list[Fitted]
+    tried: set[str] = field(default_factory=set)
 
     def further(self, parent: Fitted, reference: Linearised) -> Fitted | None:
         """The best model with one effect more, or with a kin in the place of one; None where nothing is worth it."""
         model = parent.fit.model
         starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
         screened = screen(self.balance, parent.fit, starts)
+        self.tried.update(one.start.name for one in screened)
         tried = len(screened)
         new: list[Fitted] = []
         for one in _shortlist(screened):

@@ -44,8 +44,8 @@ from rhythmid.errors import InputError
 from rhythmid.identify.free_run import accurate
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.output_error import Fit, minimise, noise_of
-from rhythmid.identify.sample_clock.tick_likelihood import ticks_sought
 from rhythmid.identify.sample_clock.clock import has_clock
+from rhythmid.identify.sample_clock.tick_likelihood import ticks_sought
 from rhythmid.identify.series import Series
 from rhythmid.identify.start_cost import start_cost
 from rhythmid.model import Model
@@ -258,7 +258,9 @@ def search(
                 step = finer.max_step
                 fit = whole_fit(replace(top, converged=False), series, here.noise, step, pool=pool)
             sought = top
-            if any(has_clock(top.model, label) for label in top.added[-2:]):  # and once more beside what came after it
+            if any(
+                has_clock(top.model, label) for label in top.added[-2:]
+            ):  # and once more beside what came after it
                 fit = ticks_sought(fit, floor, pool)
                 sought = replace(top, model=fit.model, starts=fit.starts, converged=False)
             others = [trial for trial in candidates if trial.added != top.added]

@@ -1,0 +1,158 @@
+"""An answer put together from what the recorded effort has shown."""
+
+import math
+from collections.abc import Sequence
+
+from rhythmid.diagnose.answer.compose import explanations
+from rhythmid.diagnose.answer.result import (
+    Curve,
+    Detection,
+    Diagnosis,
+    Estimate,
+    FitQuality,
+    Location,
+    MissingEffect,
+    Remainder,
+    Scored,
+)
+from rhythmid.diagnose.answer.wording import SENTENCES, freed_value, summary_of
+from rhythmid.diagnose.case import Case
+from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.effort.run import EffortResult
+from rhythmid.identify.inverse_dynamics.estimate import size_of
+
+NO_SENSOR = "The measurement is taken for the motion: effects in the sensor and in the measurement's time are not among the candidates."
+FIXED_SCALE = "The recorded effort is taken to be true in scale."
+INPUT_DELAY = "input_delay.delay"
+
+
+def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Diagnosis:
+    """The diagnosis."""
+    decision, chosen, nominal = result.decision, result.chosen, result.nominal
+    size = size_of(result.search.balance)
+    missing = tuple(
+        _missing(chosen, label, result) for label in decision.named if chosen.fit.model.term(label)
+    )
+    before, after = (
+        FitQuality(one.fit.error / size, _error(result, one) / size) for one in (nominal, chosen)
+    )
+    freed = None
+    if result.selection.chosen.kind == "freed_value":
+        freed = freed_value(case.nominal, chosen.fit.model, chosen.elements)
+    slots = list(dict.fromkeys(effect.slot for effect in missing))
+    where = (
+        "; and ".join(SENTENCES[slot] for slot in slots)
+        or "nowhere: the refitted nominal model explains the effort"
+    )
+    remainder = _remainder(result)
+    if not slots and decision.verdict == "unknown_physics":
+        slots, where = ["force"], f"{SENTENCES['force']}; it goes with {remainder.goes_with}"
+    held = f"held out: {', '.join(record.name for record in case.holdout)}"
+    return Diagnosis(
+        verdict=decision.verdict,
+        summary=summary_of(decision, missing, before, after, "effort", freed),
+        detection=Detection(None, None, before.train_nrmse, after.train_nrmse),
+        location=Location(slots[0] if slots else None, where, (result.applicability.reason,)),
+        missing=missing,
+        joint_probability=decision.joint,
+        indistinguishable=decision.equivalent,
+        alternatives=(),
+        hypotheses=explanations(result.contest, decision),
+        rejections=result.selection.rejections,
+        remainder=remainder,
+        fit={"refitted_nominal": before, "augmented": after},
+        parameters=_parameters(chosen),
+        delays=_delays(chosen),
+        next_experiment=_next_experiment(result),
+        scoring=Scored("effort", result.applicability.bandwidth, result.applicability.reason),
+        assumptions=(FIXED_SCALE, NO_SENSOR),
+        calibration=_recalibrated(case, chosen),
+        excluded=tuple(result.search.unseen),
+        heldout=held if result.heldout is not None else "held out: every block of the records in its turn",
+        notes=tuple(notes),
+    )
+
+
+def _error(result: EffortResult, fitted: Fitted) -> float:
+    return result.errors[tuple(sorted(fitted.elements))]
+
+
+def _estimate(fitted: Fitted, name: str) -> Estimate:
+    """A parameter; standard deviation 0 where it is fixed, None where the effort does not show it."""
+    value = fitted.model.parameters[name]
+    std = fitted.std().get(name)
+    if std is None and not value.fixed:
+        return Estimate(value.value, None, value.unit)
+    return (
+        Estimate(value.value, std if std is None or math.isfinite(std) else None, value.unit)
+        if std
+        else Estimate(value.value, 0.0, value.unit)
+    )
+
+
+def _parameters(fitted: Fitted) -> dict[str, Estimate]:
+    return {name: _estimate(fitted, name) for name in fitted.model.parameters}
+
+
+def _missing(fitted: Fitted, label: str, result: EffortResult) -> MissingEffect:
+    term = fitted.fit.model.term(label)
+    assert term is not None
+    return MissingEffect(
+        term.element.name,
+        term.element.slot,
+        term.element.equation,
+        result.decision.shares[label],
+        result.decision.probability[label],
+        {name: _estimate(fitted, f"{label}.{name}") for name in term.values},
+    )
+
+
+def _remainder(result: EffortResult) -> Remainder:
+    left, found = result.decision.unexplained, result.remainder
+    curve = Curve(tuple(map(float, found.curves[0].value)), tuple(map(float, found.curves[0].mean)))
+    return Remainder(left.share, left.significant, found.goes_with if left.significant else None, curve)
+
+
+def _delays(fitted: Fitted) -> dict:
+    """The alignment of effort and motion in time: the one delay that the effort shows."""
+    late = {"value": fitted.fit.alignment, "std": float(fitted.fit.std[0]), "unit": "s"}
+    return {
+        "input": {},
+        "measurement": {},
+        "sum": late,
+        "separable": False,
+        "assumption": "of the delays only how much later than the effort the motion is recorded shows",
+    }
+
+
+def _recalibrated(case: Case, fitted: Fitted) -> tuple[str, ...]:
+    """Nominal values that the effort contradicts, as sentences."""
+    said, std = [], fitted.std()
+    for name, value in case.nominal.parameters.items():
+        if name not in std or name not in fitted.model.parameters:
+            continue
+        new = fitted.model.value(name)
+        if math.isfinite(std[name]) and abs(new - value.value) > max(
+            4.0 * std[name], 0.02 * abs(value.value)
+        ):
+            said.append(
+                f"{name}: {value.value:.6g} in the nominal model, {new:.6g} ± {std[name]:.2g} {value.unit} in the records"
+            )
+    return tuple(said)
+
+
+def _next_experiment(result: EffortResult) -> str:
+    """What to record next."""
+    decision = result.decision
+    if decision.verdict == "missing_physics" and not decision.equivalent:
+        return (
+            "none needed for these records; other speeds, loads and positions would exclude smaller effects"
+        )
+    if decision.equivalent:
+        rivals = "; ".join(" or ".join(group) for group in decision.equivalent)
+        return f"several speeds in both directions, slow reversals and another load: what separates {rivals}"
+    if result.decision.unexplained.significant:
+        return (
+            f"the same motion with {result.decision.unexplained.goes_with} varied alone over its whole range"
+        )
+    return "motion with more varied speed, load and position"

@@ -1,0 +1,144 @@
+"""Diagnosis by the recorded effort: the search, its hypotheses on data that no fit has seen, and the decision."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.diagnose.case import Case
+from rhythmid.diagnose.constants import PRACTICAL_EFFORT
+from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.effort.held_out import HeldOut
+from rhythmid.diagnose.effort.remainder import Remainder, remainder_of
+from rhythmid.diagnose.effort.search import GAP, EffortSearch, search_effort
+from rhythmid.diagnose.evidence import (
+    Blocks,
+    CrossValidated,
+    Linearised,
+    autocorrelation_time,
+    cross_validate,
+    prediction,
+)
+from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, names_of
+from rhythmid.diagnose.selection import Contest, Selection, select
+from rhythmid.diagnose.verdict import Decision, decide
+from rhythmid.errors import InputError
+from rhythmid.identify.inverse_dynamics.applicability import Applicability
+from rhythmid.identify.inverse_dynamics.estimate import size_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class EffortResult:
+    """Everything behind an answer that was scored by effort; `errors` (rms) of prediction by the key of a hypothesis."""
+
+    applicability: Applicability
+    search: EffortSearch
+    heldout: HeldOut | None
+    contest: Contest
+    selection: Selection
+    decision: Decision
+    detectable: float
+    chosen: Fitted
+    nominal: Fitted
+    remainder: Remainder
+    errors: dict[tuple[str, ...], float]
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """The rows that all hypotheses predict: those that their fits saw, then those of held-out records."""
+
+    record: NDArray[np.int64]
+    blocks: Blocks
+    heldout: HeldOut | None
+
+    def predicted(self, fitted: Fitted, with_map: Linearised | None = None) -> CrossValidated:
+        """Errors of prediction of a fit; a free map beside it predicts held-out records as the fit does."""
+        seen = with_map or fitted.linearised
+        if self.heldout is None:
+            return cross_validate(seen, self.blocks)
+        other = self.heldout.residual(fitted)
+        residual = np.concatenate([seen.residual, other])
+        jacobian = np.vstack([seen.jacobian, np.zeros((len(other), seen.jacobian.shape[1]))])
+        return cross_validate(Linearised(residual, jacobian, seen.precision, seen.departure), self.blocks)
+
+    @property
+    def judged(self) -> NDArray[np.bool_]:
+        """Rows of held-out records; all, each predicted by the fit that did not see it, where there are none."""
+        held = self.blocks.fold[self.blocks.block] < 0
+        return held if held.any() else ~held
+
+
+def _rows(case: Case, found: EffortSearch) -> _Rows:
+    heldout = None
+    if case.holdout:
+        try:
+            heldout = HeldOut.of(case.holdout, found.nominal.fit.model, found.balance)
+        except InputError:
+            heldout = None  # too little motion, or no effort: they judge nothing
+    record = found.balance.record
+    if heldout is None:
+        return _Rows(record, Blocks.of(record, GAP), None)
+    first = int(record.max()) + 1
+    others = heldout.balance.record + first
+    whole = np.concatenate([record, others])
+    return _Rows(whole, Blocks.of(whole, GAP, np.unique(others)), heldout)
+
+
+def effort_run(case: Case, applicability: Applicability) -> EffortResult:
+    """Search, weigh and decide. Raises InputError where the records hold too little."""
+    found = search_effort(
+        case.records, case.nominal, case.catalogue, applicability.balance, tell=case.tell, budget=case.budget
+    )
+    case.tell("weighing the hypotheses on data that no fit has seen")
+    rows = _rows(case, found)
+    size = size_of(found.balance)
+    predicted = {one.elements: rows.predicted(one) for one in found.hypotheses}
+    mapped = {
+        "the motion and the load": rows.predicted(found.chosen, found.beyond),
+    }
+    every = [*predicted.values(), *mapped.values()]
+    best = min(every, key=lambda one: float(np.sum(one.error**2)))
+    time = autocorrelation_time(best.error, rows.record)
+
+    def made(one: CrossValidated) -> Prediction:
+        return prediction(one, rows.blocks, time)
+
+    errors = {
+        tuple(sorted(elements)): float(np.sqrt(np.mean(one.error[rows.judged] ** 2)))
+        for elements, one in predicted.items()
+    }
+    hypotheses = [
+        Hypothesis(
+            one.elements,
+            names_of(one.fit.model, one.elements),
+            one.kind,
+            one.size,
+            made(predicted[one.elements]),
+            errors[tuple(sorted(one.elements))] / size,
+        )
+        for one in found.hypotheses
+    ]
+    left = remainder_of(found.balance, found.chosen)
+    maps = {left.goes_with: made(mapped["the motion and the load"])}
+    contest = Contest(tuple(hypotheses), maps, found.candidates, size, PRACTICAL_EFFORT)
+    selection = select(contest)
+    chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)
+    noise = predicted[chosen.elements].error
+    detectable = math.sqrt(4.0 * float(np.mean(noise**2)) * math.sqrt(2.0 * time / len(noise))) / size
+    return EffortResult(
+        applicability,
+        found,
+        rows.heldout,
+        contest,
+        selection,
+        decide(contest, selection, detectable),
+        detectable,
+        chosen,
+        found.nominal,
+        left if chosen is found.chosen else remainder_of(found.balance, chosen),
+        errors,
+    )
