@@ -52,8 +52,9 @@ def test_kin_compete_for_one_place(friction):
 
 
 def test_what_the_effort_cannot_show_is_told(friction):
-    assert "sensor_lag" in friction.unseen and "clock_skew" in friction.unseen
-    assert "coulomb_friction" not in friction.unseen
+    assert "sensor" in friction.not_tried["sensor_lag"] and "timing" in friction.not_tried["clock_skew"]
+    assert "angle" in friction.not_tried["pendulum_gravity"]
+    assert "coulomb_friction" not in friction.not_tried
 
 
 def test_nothing_is_found_where_nothing_is_missing():
