@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhythmid.diagnose.evidence import Linearised
-from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction, names_of
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit
 from rhythmid.model import Model, Prior
@@ -53,7 +53,9 @@ class Fitted:
 
     def hypothesis(self, prediction: Prediction, heldout: float | None = None) -> Hypothesis:
         """The same with what it predicts of data that its fit has not seen."""
-        return Hypothesis(self.elements, self.kind, self.model, prediction, heldout)
+        return Hypothesis(
+            self.elements, names_of(self.fit.model, self.elements), self.kind, self.size, prediction, heldout
+        )
 
     def std(self) -> dict[str, float]:
         """Standard deviations of the estimated parameters, inflated by the residual's autocorrelation."""
