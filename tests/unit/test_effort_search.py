@@ -9,6 +9,7 @@ from axes import CATALOGUE, arm_model, axis, axis_model, frame, frame_model
 from rhythmid.diagnose.effort.held_out import HeldOut
 from rhythmid.diagnose.effort.remainder import remainder_of
 from rhythmid.diagnose.effort.search import EffortSearch, kin, search_effort
+from rhythmid.diagnose.evidence import probabilities
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import size_of
 
@@ -52,8 +53,9 @@ def test_kin_compete_for_one_place(friction):
 
 
 def test_what_the_effort_cannot_show_is_told(friction):
-    assert "sensor_lag" in friction.unseen and "clock_skew" in friction.unseen
-    assert "coulomb_friction" not in friction.unseen
+    assert "sensor" in friction.not_tried["sensor_lag"] and "timing" in friction.not_tried["clock_skew"]
+    assert "angle" in friction.not_tried["pendulum_gravity"]
+    assert "coulomb_friction" not in friction.not_tried
 
 
 def test_nothing_is_found_where_nothing_is_missing():
@@ -127,3 +129,12 @@ def test_effort_of_a_record_that_no_fit_has_seen_is_predicted(friction):
     unseen = HeldOut.of([axis(7, amplitude=0.5)], axis_model(), friction.balance)
     assert unseen.error(friction.chosen) < 0.06  # the noise is a twentieth of the effort
     assert unseen.error(friction.nominal) > 2.0 * unseen.error(friction.chosen)
+
+
+def test_hypotheses_weigh_against_each_other_as_all_others_do(friction):
+    pairs = zip(friction.hypotheses, friction.predictions, strict=True)
+    made = [one.hypothesis(prediction) for one, prediction in pairs]
+    probability = probabilities(made)
+    rubs = [any("friction" in name for name in one.names) for one in made]
+    assert probability[rubs].sum() > 0.95
+    assert made[friction.hypotheses.index(friction.chosen)].names == ("coulomb_friction",)

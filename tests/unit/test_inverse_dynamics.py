@@ -137,3 +137,17 @@ def test_a_dead_band_takes_what_it_takes_from_the_effort():
     plain, dead = balance.required(axis_model())[0], balance.required(model)[0]
     beyond = np.abs(plain) > 0.1
     np.testing.assert_allclose(np.abs(dead - plain)[beyond], 0.1, rtol=1e-9)
+
+
+def test_a_motor_fed_with_a_voltage_is_balanced_in_volts():
+    record = axis(friction=0.0)
+    assert record.input is not None
+    # u = k_t (V - k_t v) / R with k_t = 0.5 and R = 2, so V = 4 u + 0.5 v
+    speed = np.gradient(record.output.value, record.output.time)
+    volts = Channel(record.input.time, 4.0 * record.input.value + 0.5 * speed, "V")
+    motor = "dc_motor: {torque_constant: {value: 0.7, unit: N/A}, resistance: {value: 2.0, unit: ohm, fixed: true}}"
+    model = axis_model(f"actuator: [{{{motor}}}]", mass="{value: 1.0, unit: kg, fixed: true}")
+    balance = Balance.of([replace(record, input=volts)], model)
+    fit = fit_effort(balance, model)
+    assert fit.model.value("dc_motor.torque_constant") == pytest.approx(0.5, rel=0.02)
+    assert fit.model.value("viscous_damper.damping") == pytest.approx(2.0, rel=0.1)

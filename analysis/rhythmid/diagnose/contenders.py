@@ -19,7 +19,7 @@ from rhythmid.diagnose.evidence import (
     cross_validate,
     prediction,
 )
-from rhythmid.diagnose.hypothesis import Hypothesis, Kind, names_of
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind, names_of, richer_of
 from rhythmid.diagnose.search.refit import Trial, fine_enough, whole_fit
 from rhythmid.identify.multiple_shooting import record_of
 from rhythmid.identify.noise import NoiseModel, runs
@@ -176,6 +176,7 @@ def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> 
             prediction(one.found, rows.blocks, time, one.error),
             heldout_error(one.error, rows),
             shape(one.trial) if one.kind == "effects" else {},
+            richer_of(one.trial.model, one.trial.added),
         )
         for one in contenders
     ]

@@ -52,6 +52,7 @@ class Hypothesis:
     prediction : of blocks that the fit has not seen; the blocks are those of all hypotheses of a case.
     heldout_nrmse : error on held-out data, as a share of the motion or the effort; None where there are none.
     shape : statistics of the fitted effects themselves, by the name of the rule that looks at them.
+    richer : of each name, the laws that contain it.
     """
 
     elements: tuple[str, ...]
@@ -61,6 +62,7 @@ class Hypothesis:
     prediction: Prediction
     heldout_nrmse: float | None = None
     shape: Mapping[str, float] = field(default_factory=dict)
+    richer: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def key(self) -> tuple[str, ...]:
@@ -72,3 +74,9 @@ def names_of(model: Model, elements: Sequence[str]) -> tuple[str, ...]:
     """Catalogue names of the effects with these labels; what is no effect keeps its own name."""
     terms = [(label, model.term(label)) for label in elements]
     return tuple(label if term is None else term.element.name for label, term in terms)
+
+
+def richer_of(model: Model, elements: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """By name, the laws that contain the effects with these labels as special cases."""
+    terms = [model.term(label) for label in elements]
+    return {term.element.name: term.element.special_case_of for term in terms if term is not None}

@@ -32,10 +32,16 @@ def adequacy(explained: float) -> float:
 
 
 def joint_probability(
-    names: Sequence[str], hypotheses: Sequence[Hypothesis], weights: dict[tuple[str, ...], float]
+    names: Sequence[str], contest: Contest, chosen: Hypothesis, weights: dict[tuple[str, ...], float]
 ) -> float:
-    """Share of the evidence for hypotheses that hold all these names."""
-    wanted = set(names)
-    return float(
-        np.clip(sum(weights.get(one.key, 0.0) for one in hypotheses if wanted <= set(one.names)), 0.0, 1.0)
-    )
+    """Share of the evidence for hypotheses that hold all these names of the chosen one.
+
+    A richer law that contains a name holds it, too: were it clearly better, it would have been chosen.
+    """
+    accepted = [{name, *chosen.richer.get(name, ())} for name in names]
+    held = [
+        weights.get(one.key, 0.0)
+        for one in contest.hypotheses
+        if all(group & set(one.names) for group in accepted)
+    ]
+    return float(np.clip(sum(held), 0.0, 1.0))

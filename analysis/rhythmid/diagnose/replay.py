@@ -26,6 +26,7 @@ def ledger(contest: Contest, detectable: float) -> dict[str, Any]:
                 "free": one.free,
                 "heldout_nrmse": one.heldout_nrmse,
                 "shape": {name: value for name, value in one.shape.items() if math.isfinite(value)},
+                "richer": {name: list(others) for name, others in one.richer.items()},
                 **_written(one.prediction),
             }
             for one in contest.hypotheses
@@ -61,6 +62,7 @@ def contest_of(data: dict[str, Any]) -> Contest:
                 _read(one),
                 one["heldout_nrmse"],
                 one["shape"],
+                {name: tuple(others) for name, others in one["richer"].items()},
             )
             for one in data["hypotheses"]
         ),

@@ -108,11 +108,9 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     names = dict(zip(chosen.elements, chosen.names))
     explained = 1.0 - left.share
     sure = adequacy(explained)
-    each = {label: sure * joint_probability([names[label]], contest.hypotheses, weights) for label in labels}
-    stated = _stated(labels, names, contest.hypotheses, weights, sure)
-    joint = sure * joint_probability(
-        [names[label] for label in stated or labels], contest.hypotheses, weights
-    )
+    each = {label: sure * joint_probability([names[label]], contest, chosen, weights) for label in labels}
+    stated = _stated(labels, names, contest, chosen, weights, sure)
+    joint = sure * joint_probability([names[label] for label in stated or labels], contest, chosen, weights)
     groups = _groups(contest, chosen)
 
     def answer(verdict: Verdict, reason: str, named: tuple[str, ...] = labels) -> Decision:
@@ -157,14 +155,15 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
 def _stated(
     labels: Sequence[str],
     names: dict[str, str],
-    hypotheses: Sequence[Hypothesis],
+    contest: Contest,
+    chosen: Hypothesis,
     weights: dict[tuple[str, ...], float],
     sure: float,
 ) -> tuple[str, ...]:
     """As many of the effects, those with the largest shares first, as are jointly probable enough to be stated."""
     found: tuple[str, ...] = ()
     for count in range(1, len(labels) + 1):
-        joint = sure * joint_probability([names[label] for label in labels[:count]], hypotheses, weights)
+        joint = sure * joint_probability([names[label] for label in labels[:count]], contest, chosen, weights)
         if joint < STATED:
             break
         found = tuple(labels[:count])

@@ -67,7 +67,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         scoring=Scored("effort", result.applicability.bandwidth, result.applicability.reason),
         assumptions=(FIXED_SCALE, NO_SENSOR),
         calibration=_recalibrated(case, chosen),
-        excluded=tuple(result.search.unseen),
+        excluded=tuple(f"{name}: {why}" for name, why in result.search.not_tried.items()),
         heldout=held if result.heldout is not None else "held out: every block of the records in its turn",
         notes=tuple(notes),
     )

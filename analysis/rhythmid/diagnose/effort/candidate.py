@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.hypothesis import Kind
-from rhythmid.diagnose.search.score_tests import guesses
+from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -49,7 +49,7 @@ def starts_of(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
     """All first guesses of what may be missing from the model and can be seen in the effort."""
     found: list[Start] = []
     driven = any(motion.driven_by_base for motion in balance.motions)
-    for element, values in guesses(catalogue.within(sizes), model, sizes):
+    for element, values in candidates(catalogue.within(sizes), model.setting, sizes).tried:
         if element.slot not in SEEN or element.kernel is None or element.acts == "feedback":
             continue
         if driven and (element.slot == "actuator" or element.acts == "drive"):
@@ -63,9 +63,14 @@ def starts_of(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
     return found
 
 
-def unseen(catalogue: Catalogue) -> tuple[str, ...]:
-    """Candidates that the balance of effort cannot see: what commands, sensors and clocks do."""
-    return tuple(e.name for e in catalogue.values() if e.candidate and e.slot not in SEEN)
+def not_tried(catalogue: Catalogue, model: Model, sizes: Scales) -> dict[str, str]:
+    """Why candidates of the catalogue take no part, by name: those that the model or the motion rules out, and those that the
+    balance of effort cannot see, which are all that commands, sensors and clocks do."""
+    reasons = dict(candidates(catalogue.within(sizes), model.setting, sizes).not_tried)
+    for element in catalogue.values():
+        if element.candidate and element.slot not in SEEN:
+            reasons[element.name] = f"it acts in the {element.slot} path, which the effort does not show"
+    return reasons
 
 
 def fixed_values(balance: Balance, model: Model) -> list[str]:

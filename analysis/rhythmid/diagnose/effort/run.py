@@ -20,7 +20,7 @@ from rhythmid.diagnose.evidence import (
     cross_validate,
     prediction,
 )
-from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, names_of
+from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, names_of, richer_of
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.verdict import Decision, decide
 from rhythmid.errors import InputError
@@ -119,6 +119,7 @@ def effort_run(case: Case, applicability: Applicability) -> EffortResult:
             one.size,
             made(predicted[one.elements]),
             errors[tuple(sorted(one.elements))] / size,
+            richer=richer_of(one.fit.model, one.elements),
         )
         for one in found.hypotheses
     ]

@@ -5,7 +5,7 @@ addition takes the place of its kin instead of standing beside it.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,9 +20,9 @@ from rhythmid.diagnose.effort.candidate import (
     Start,
     extended,
     late_start,
+    not_tried,
     screen,
     starts_of,
-    unseen,
     widest,
 )
 from rhythmid.diagnose.effort.fitted import Fitted
@@ -66,7 +66,7 @@ class EffortSearch:
     reference, beyond : the nominal model, and the chosen one, with a free map beside them; and what they predict.
     chosen : the hypothesis with which the search ended.
     condition : of the nominal model's scaled columns.
-    unseen : candidates that the effort cannot show.
+    not_tried : why candidates of the catalogue took no part, by name.
     candidates : number of effects that were tried.
     """
 
@@ -81,7 +81,7 @@ class EffortSearch:
     beyond: Linearised
     beyond_prediction: Prediction
     condition: float
-    unseen: tuple[str, ...]
+    not_tried: Mapping[str, str]
     candidates: int
 
 
@@ -134,7 +134,7 @@ def search_effort(
     order = sorted(range(len(search.found)), key=lambda index: -made[index].score)
     return EffortSearch(
         balance, search.blocks, nominal, tuple(search.found[i] for i in order), tuple(made[i] for i in order), chosen,
-        reference, made[-2], beyond, made[-1], condition_of(nominal.fit), unseen(catalogue), len(search.tried),
+        reference, made[-2], beyond, made[-1], condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)), len(search.tried),
     )  # fmt: skip
 
 

@@ -22,7 +22,7 @@ from rhythmid.simulation.effect import MAX_STEP, Path, effect_along
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-STICK = 0.03  # of the fast speed, below which dry friction is set-valued: any force up to the friction (EVIDENCE: real machines)
+STICK = 0.03  # of the fast speed, below which dry friction is set-valued: any force up to the friction (six arm joints, an axis, a frame)
 FAST = 0.95  # quantile of the speed that is called fast
 DECIMATED = 2.5  # rows a period of the cut-off: the Nyquist rate and a quarter for the filter's slope (Gautier et al.)
 MEMORY = 2e8  # bytes of forces that are kept, so that a refit computes again only what changed
