@@ -54,16 +54,30 @@ class Decision:
 
 
 def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
-    """What is left beside a hypothesis."""
+    """What is left beside a hypothesis: what free maps predict, or hypotheses with more effects that were not granted."""
     whole = contest.nominal.prediction.mean_square - contest.floor
-    best: tuple[float, str] | None = None
-    for quantity, one in contest.maps.items():
+    rivals = [(quantity, one, len(contest.maps)) for quantity, one in contest.maps.items()]
+    rivals += [
+        (_further(one, chosen), one.prediction, contest.candidates)
+        for one in contest.hypotheses
+        if len(one.elements) > len(chosen.elements) and one.kind == "effects"
+    ]
+    found: list[tuple[float, str]] = []
+    for words, one, count in rivals:
         gain, error = difference(one, chosen.prediction)
-        if error > 0.0 and gain > significance(one, len(contest.maps)) * error:
-            best = max(best or (0.0, ""), (chosen.prediction.mean_square - one.mean_square, quantity))
-    if best is None or whole <= 0.0:
+        removed = chosen.prediction.mean_square - one.mean_square
+        if error > 0.0 and removed > 0.0 and gain > significance(one, count) * error:
+            found.append((removed, words))
+    if not found or whole <= 0.0:
         return Unexplained(0.0, False, None)
-    return Unexplained(float(min(max(best[0] / whole, 0.0), 1.0)), True, best[1])
+    removed, words = max(found)
+    return Unexplained(float(min(removed / whole, 1.0)), True, words)
+
+
+def _further(other: Hypothesis, chosen: Hypothesis) -> str:
+    """In words, the effects of another hypothesis that the chosen one does not have."""
+    more = [name for name in other.names if name not in chosen.names]
+    return f"what {' and '.join(more).replace('_', ' ')} would add"
 
 
 def shares_of(contest: Contest, chosen: Hypothesis) -> dict[str, float]:
@@ -84,7 +98,7 @@ def _groups(contest: Contest, chosen: Hypothesis) -> tuple[tuple[str, ...], ...]
     for label, name in zip(chosen.elements, chosen.names):
         rest = set(chosen.elements) - {label}
         others = [
-            (set(one.elements) - rest).pop()
+            dict(zip(one.elements, one.names))[(set(one.elements) - rest).pop()]
             for one in contest.hypotheses
             if one.kind == "effects"
             and len(one.elements) == len(chosen.elements)
@@ -106,6 +120,8 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     weights = weights_of(contest, selection)
     labels = tuple(sorted(chosen.elements, key=lambda label: -shares[label]))
     names = dict(zip(chosen.elements, chosen.names))
+    if chosen.kind == "free_map":  # the map is no name
+        labels = tuple(label for label in labels if label != chosen.elements[-1])
     explained = 1.0 - left.share
     sure = adequacy(explained)
     each = {label: sure * joint_probability([names[label]], contest, chosen, weights) for label in labels}
@@ -116,7 +132,7 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     def answer(verdict: Verdict, reason: str, named: tuple[str, ...] = labels) -> Decision:
         return Decision(verdict, reason, named, shares, each, joint, weights, groups, left, explained)
 
-    if not labels:
+    if not chosen.elements:
         missed = left.share * (contest.nominal.prediction.mean_square - contest.floor)
         if left.significant and missed > (contest.practical * contest.size) ** 2:
             return answer("unknown_physics", f"no name explains what goes with {left.goes_with}")

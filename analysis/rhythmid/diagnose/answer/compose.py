@@ -98,7 +98,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         location=location_of(found, missing, result.before, decision.verdict),
         missing=missing,
         joint_probability=decision.joint,
-        indistinguishable=decision.equivalent,
+        indistinguishable=_indistinguishable(found.fit.model, decision),
         alternatives=alternatives,
         hypotheses=explanations(contest, decision),
         rejections=result.selection.rejections,
@@ -113,6 +113,28 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         heldout=held,
         notes=tuple(notes),
     )
+
+
+def _indistinguishable(model: Model, decision: Decision) -> tuple[tuple[str, ...], ...]:
+    """Groups of names that these records cannot separate: those that the evidence does not, and those that make one model."""
+    groups = [list(group) for group in decision.equivalent]
+    for label in decision.named:
+        term = model.term(label)
+        if term is None:
+            continue
+        same = [*term.element.same_as]
+        same += [other for beside, other in term.element.same_beside.items() if _estimated(model, beside)]
+        known = next((group for group in groups if term.element.name in group), None)
+        if known is not None:
+            known += [name for name in same if name not in known]
+        elif same:
+            groups.append([term.element.name, *same])
+    return tuple(tuple(group) for group in groups)
+
+
+def _estimated(model: Model, name: str) -> bool:
+    """Whether the model has the named element, with parameters that are not all known."""
+    return any(t.element.name == name and not all(v.fixed for v in t.values.values()) for t in model.terms)
 
 
 def _freed(nominal: Model, result: FreeRunResult) -> str | None:

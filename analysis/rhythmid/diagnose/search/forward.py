@@ -65,7 +65,7 @@ NEAR = 60.0
 # gain in the criterion from which a model is worth a second look where a better one does not hold under the noise that it
 # leaves; and how many of them get it
 PLAIN, SECOND = 100.0, 2
-MOST = 4  # effects at once
+MOST = 3  # effects at once
 RIVALS = 4  # models of each number of effects that are compared at the end
 OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
