@@ -99,10 +99,18 @@ def select(contest: Contest) -> Selection:
 
 
 def _simplest(ranked: Sequence[Hypothesis], floor: float) -> Hypothesis:
-    """The hypothesis with the fewest free parameters among those that the best one does not clearly beat."""
+    """Of the hypotheses that the best one does not clearly beat, one that no other is a special case of, with the fewest free
+    parameters."""
     best = ranked[0]
     close = [best, *(one for one in ranked[1:] if equivalent(one, best, floor))]
-    return min(close, key=lambda one: (one.free, -one.prediction.score))
+    plain = [one for one in close if not any(special_case(other, one) for other in close)]
+    return min(plain or close, key=lambda one: (one.free, -one.prediction.score))
+
+
+def special_case(first: Hypothesis, second: Hypothesis) -> bool:
+    """Whether the first is the second but for one effect, of which its own is a special case."""
+    mine, other = set(first.names) - set(second.names), set(second.names) - set(first.names)
+    return len(mine) == len(other) == 1 and other <= set(first.richer.get(next(iter(mine)), ()))
 
 
 def equivalent(other: Hypothesis, best: Hypothesis, floor: float) -> bool:

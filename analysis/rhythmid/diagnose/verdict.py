@@ -1,5 +1,6 @@
 """The verdict: consistent, missing physics, unknown physics or undecided."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -133,9 +134,15 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
         return Decision(verdict, reason, named, shares, each, joint, weights, groups, left, explained)
 
     if not chosen.elements:
-        missed = left.share * (contest.nominal.prediction.mean_square - contest.floor)
-        if left.significant and missed > (contest.practical * contest.size) ** 2:
-            return answer("unknown_physics", f"no name explains what goes with {left.goes_with}")
+        explainable = left.share * (contest.nominal.prediction.mean_square - contest.floor)
+        if left.significant and explainable > (contest.practical * contest.size) ** 2:
+            return answer("unknown_physics", f"no name explains what is there: it goes with {left.goes_with}")
+        missed = math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300)
+        if missed > BLIND:
+            return answer(
+                "undecided",
+                f"the refitted nominal model misses {100.0 * missed:.0f} % of what was measured, and nothing that was tried explains it",
+            )
         if detectable > BLIND:
             return answer(
                 "undecided",
