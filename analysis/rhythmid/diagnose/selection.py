@@ -104,7 +104,12 @@ def _simplest(ranked: Sequence[Hypothesis], floor: float) -> Hypothesis:
     best = ranked[0]
     close = [best, *(one for one in ranked[1:] if equivalent(one, best, floor))]
     plain = [one for one in close if not any(special_case(other, one) for other in close)]
-    return min(plain or close, key=lambda one: (one.free, -one.prediction.score))
+    return min(plain or close, key=lambda one: (one.free, -_basic(one), -one.prediction.score))
+
+
+def _basic(one: Hypothesis) -> int:
+    """How many richer laws contain the hypothesis' effects: the more, the more basic they are."""
+    return sum(len(richer) for richer in one.richer.values())
 
 
 def special_case(first: Hypothesis, second: Hypothesis) -> bool:
