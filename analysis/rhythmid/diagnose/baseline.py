@@ -16,12 +16,16 @@ from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
 from rhythmid.identify.series import REST_LENGTH, Series, dominant_frequency
-from rhythmid.model import INERTIA, Model
+from rhythmid.model import INERTIA, Model, Prior
 from rhythmid.progress import Tell
 from rhythmid.simulation.signal import band_limited, first_order_hold
 
 INPUT_DELAY = "input_delay.delay"
 NO_ORIGIN = "No position was measured, so that its origin is arbitrary: the spring's rest length is kept as it was given."
+EARLIEST, LATEST = (
+    1.5,
+    2.5,
+)  # samples that the input's delay may be short of none, and of which a nuisance may be
 EVEN = 1e-3  # of the period; spread of the times between samples that still counts as even
 FOLLOWS = 0.3  # error, as a share of the motion, below which a model follows the machine
 GAIN = 0.7  # share to which a delay far from its start has to lower the error, or it but stands in for what is missing
@@ -42,21 +46,26 @@ class Calibration:
 
 
 def with_delays(model: Model, series: Sequence[Series], catalogue: Catalogue) -> Model:
-    """The model with the delay of every path that the records can show.
+    """The model with the delay of the input, if it has none, as a nuisance: known to a sample, two at most.
 
-    The input's delay may come out negative by up to a sample and a half: that is how an input that is not held, but
-    simulated as held, shows.
+    A longer delay is a hypothesis of its own, or else it would take up friction and lags; a model that has a delay may take
+    any. Either may come out negative by up to a sample and a half: that is how an input that is not held, but simulated as
+    held, shows.
     """
-    if any(one.command is not None for one in series):
-        if model.term("input_delay") is None:
-            model = model.with_element(catalogue["input_delay"], {"delay": 0.0})
-        period = max(one.period for one in series)
-        current = model.parameters[INPUT_DELAY]
-        if not current.fixed:
-            model = with_bounds(
-                model, {INPUT_DELAY: (min(current.bounds[0], -1.5 * period), current.bounds[1])}
-            )
-    return model
+    if not any(one.command is not None for one in series):
+        return model
+    period = max(one.period for one in series)
+    own = model.term("input_delay") is not None
+    if not own:
+        model = model.with_element(catalogue["input_delay"], {"delay": 0.0})
+    current = model.parameters[INPUT_DELAY]
+    if current.fixed:
+        return model
+    low = min(current.bounds[0], -EARLIEST * period)
+    if own:
+        return with_bounds(model, {INPUT_DELAY: (low, current.bounds[1])})
+    nuisance = replace(current, bounds=(low, LATEST * period), prior=Prior(0.0, period))
+    return model.with_parameters({INPUT_DELAY: nuisance})
 
 
 def causal(model: Model) -> Model:
@@ -141,6 +150,8 @@ def _scan_delays(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | 
     best = fit
     for name in names:
         for delay in (0.03, 0.08, 0.15, 0.25):
+            if delay > fit.model.parameters[name].bounds[1]:
+                continue
             model = fit.model.with_values({name: delay})
             try:
                 trial = minimise(model, fit.run, fit.names, fit.noise, fit.starts, 12, pool)

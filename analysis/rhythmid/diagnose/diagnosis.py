@@ -19,6 +19,7 @@ from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.baseline import causal
 from rhythmid.diagnose.case import Budget, Case
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
+from rhythmid.diagnose.effort.search import MOST
 from rhythmid.diagnose.free_run import FreeRunResult, free_run
 from rhythmid.diagnose.replay import ledger
 from rhythmid.diagnose.scoring import settle
@@ -98,13 +99,13 @@ def diagnose(
             if diagnosis.verdict == "missing_physics":
                 break
         chosen = next((one for one in answers if one.diagnosis.verdict == "missing_physics"), answers[0])
-        if effort.applies and not case.budget.spent:
-            return _compared(chosen, _by_effort(case, effort, ()))
+        if effort.applies and chosen.diagnosis.verdict == "missing_physics" and not case.budget.spent:
+            return _compared(chosen, _by_effort(case, effort, (), 1))
         return chosen
 
 
-def _by_effort(case: Case, effort: Applicability, notes: Sequence[str]) -> Answer:
-    result = effort_run(case, effort)
+def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST) -> Answer:
+    result = effort_run(case, effort, most)
     return Answer(compose_effort(case, result, notes), result.chosen.model, result)
 
 
