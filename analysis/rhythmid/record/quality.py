@@ -180,9 +180,9 @@ def _moving(value: NDArray[np.float64], runs: list[tuple[int, int]]) -> bool:
     rest, at a stop or by friction, slows down and starts from rest."""
     step = np.abs(np.diff(value))
     usual = float(np.sqrt(np.mean(step**2)))
-    ends = [
-        min(step[begin - 2], step[end])  # the steps outside the one that the limit itself cuts
-        for begin, end in runs
-        if begin >= 2 and end < len(step)
-    ]
-    return not ends or float(np.median(ends)) > MOVING * usual
+    ends = []
+    for begin, end in runs:  # the steps outside the ones that the limit itself cuts
+        beside = [*step[max(begin - 2, 0) : max(begin - 1, 0)], *step[end : end + 1]]
+        ends += [min(beside)] if beside else []
+    least = max(MOVING * usual, 1.5 * resolution(value))  # a step of a rounded value may be that of a creep
+    return bool(ends) and float(np.median(ends)) > least
