@@ -48,6 +48,11 @@ class Answer:
         """Samples that were averaged before they were compared."""
         return self.result.series[0].block if isinstance(self.result, FreeRunResult) else 1
 
+    @property
+    def stands(self) -> bool:
+        """Whether it stands by names."""
+        return self.diagnosis.verdict == "missing_physics"
+
     def ledger(self) -> dict[str, Any]:
         """All that the decision depends on, as plain data; see `replay`."""
         return ledger(self.result.contest, self.result.detectable)
@@ -85,21 +90,28 @@ def diagnose(
         known = catalogue or load_catalogue()
         case = Case(model, given.records[:count], given.records[count:], known, pool, tell, Budget(budget))
         effort = applicable(case.records, model)
+        answers: list[Answer] = []
         if effort.applies and not effort.free_run_means_something:
             return _by_effort(case, effort, given.notes)
         series = prepare(given.records)
         check_units(model, series[:count], pool)
-        answers: list[Answer] = []
-        for scoring in settle(model, series[:count], series[count:], known, pool, tell):
+        ways = settle(model, series[:count], series[count:], known, pool, tell, windows=not effort.applies)
+        if not ways:  # in free run the model loses the machine, but the effort shows what it lacks
+            answers.append(_by_effort(case, effort, given.notes))
+            if answers[0].stands:
+                return answers[0]
+            ways = settle(model, series[:count], series[count:], known, pool, tell)
+        for scoring in ways:
             if answers:
                 tell(f"no name found; scoring in {scoring.kind.replace('_', ' ')}")
             result = free_run(case, scoring)
             diagnosis = compose(case, result, given.notes)
             answers.append(Answer(diagnosis, causal(result.search.fit.model), result))
-            if diagnosis.verdict == "missing_physics":
+            if answers[-1].stands:
                 break
-        chosen = next((one for one in answers if one.diagnosis.verdict == "missing_physics"), answers[0])
-        if effort.applies and chosen.diagnosis.verdict == "missing_physics" and not case.budget.spent:
+        chosen = next((one for one in answers if one.stands), answers[0])
+        compare = effort.applies and chosen.stands and isinstance(answers[0].result, FreeRunResult)
+        if compare and not case.budget.spent:
             return _compared(chosen, _by_effort(case, effort, (), 1))
         return chosen
 

@@ -16,7 +16,8 @@ from rhythmid.diagnose.baseline import FOLLOWS, Calibration, calibrate, reconstr
 from rhythmid.diagnose.hypothesis import ScoringKind
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
-from rhythmid.identify.multiple_shooting import LEAST, forgets, periods_long, windows
+from rhythmid.identify.multiple_shooting import LEAST, forgets, periods_long
+from rhythmid.identify.multiple_shooting import windows as cut_up
 from rhythmid.identify.output_error import Fit
 from rhythmid.identify.series import Series, hold_out_tail
 from rhythmid.model import Model
@@ -57,17 +58,21 @@ def settle(
     catalogue: Catalogue,
     pool: ThreadPoolExecutor | None = None,
     tell: Tell = lambda _: None,
+    windows: bool = True,
 ) -> tuple[Scoring, ...]:
     """Calibrate the nominal model in the longest runs through which it follows the machine, in free run or in windows.
 
     The first result is the way to score. Where it is not the free run, but a free run is not hopeless, that comes second, for
     what the first leaves without a name: windows hide what is slow, and lines that are narrower than a window resolves.
+    Without `windows` only a free run that follows the machine is a result, else there is none.
     Without `separate` held-out series the last fifth of every run is held out. Raises InputError when no length works.
     """
     tried: list[Scoring] = []
     idle = 0
     failure: InputError | None = None
     for how in _ladder(model, series):
+        if how.kind == "windows" and not windows:
+            break
         if how.kind != "free_run":
             tell(f"scoring in {how.reason}")
         cut, unseen = how.of(series), how.of(separate)
@@ -88,6 +93,8 @@ def settle(
         tried.append(Scoring(calibration, tuple(unseen), how.kind, how.reason))
         if calibration.fit.nrmse() < FOLLOWS:
             break
+    if not windows:
+        return tuple(one for one in tried if one.calibration.fit.nrmse() < FOLLOWS)
     if not tried:
         assert failure is not None
         raise failure
@@ -118,7 +125,7 @@ def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
     length = float(np.median([periods_long(one) for one in series]))
     shortest = LEAST * max(one.period * one.block for one in series)
     while length >= shortest:
-        yield _Way("windows", _words(length, LOSES if free else INTEGRATES), partial(windows, length=length))
+        yield _Way("windows", _words(length, LOSES if free else INTEGRATES), partial(cut_up, length=length))
         length /= SHORTER
 
 

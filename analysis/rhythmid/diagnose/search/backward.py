@@ -12,7 +12,7 @@ from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.simulation.compiled import compile_model
 
-RIVALS = 4  # elements that scored best at first, tried again in the place of each of several effects
+RIVALS = 2  # elements that scored best at first, tried again in the place of each of several effects
 
 
 def defend(

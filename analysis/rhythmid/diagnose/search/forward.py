@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rhythmid.diagnose.baseline import FOLLOWS
 from rhythmid.diagnose.case import Budget
+from rhythmid.diagnose.constants import PRACTICAL
 from rhythmid.diagnose.search.backward import defend
 from rhythmid.diagnose.search.order import in_best_order
 from rhythmid.diagnose.search.refit import (
@@ -65,6 +66,7 @@ NEAR = 60.0
 # gain in the criterion from which a model is worth a second look where a better one does not hold under the noise that it
 # leaves; and how many of them get it
 PLAIN, SECOND = 100.0, 2
+UNDERSTATED = 0.1  # share of what a refit gains that a score shows at least, where an effect is far from its first guess
 MOST = 3  # effects at once
 RIVALS = 4  # models of each number of effects that are compared at the end
 OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
@@ -224,7 +226,9 @@ def search(
     now = first
     gained = 0.0
     while (
-        now.p_value < LEVEL and _could_pay(now, best, max(WORTH, SHARE * gained)) and len(best.added) < MOST
+        now.p_value < LEVEL
+        and _could_pay(now, best, max(WORTH, SHARE * gained), current)
+        and len(best.added) < MOST
     ):
         if budget.spent:
             untried = [score.element.name for score, _ in distinct(now.scores, REFITTED)]
@@ -328,9 +332,17 @@ def _most_likely(
     return near[min(found, key=lambda index: (found[index], index), default=0)]
 
 
-def _could_pay(now: Round, best: Trial, margin: float) -> bool:
-    """Whether the best score, which can understate what a refit gains, is of the order that an element has to earn."""
-    return now.scores[0].statistic > 0.5 * (margin + math.log(max(best.samples, 2)))
+def _could_pay(now: Round, best: Trial, margin: float, current: Fit) -> bool:
+    """Whether the best score, which can understate what a refit gains, is of the order that an element has to earn, and that an
+    effect of practical size has."""
+    series, noise = current.run.series, current.noise
+    if current.nrmse() < PRACTICAL:
+        return False
+    power = sum(one.power(one.used) for one in series)  # the number of samples times the motion's mean square
+    practical = PRACTICAL**2 * power / max(noise.variance, noise.long_run_variance)
+    return now.scores[0].statistic > max(
+        0.5 * (margin + math.log(max(best.samples, 2))), UNDERSTATED * practical
+    )
 
 
 def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial) -> list[Trial]:
