@@ -11,7 +11,6 @@ from rhythmid.simulation.signal import (
     first_order_hold,
     impulse_preserving,
     pieces,
-    shifted,
     spline,
     zero_order_hold,
 )
@@ -69,15 +68,6 @@ def test_a_band_limited_signal_passes_through_its_samples_up_to_the_ends():
 def test_a_band_limited_ramp_stays_a_ramp():
     at = np.linspace(0.0, TIME[-1], 999)
     np.testing.assert_allclose(evaluate(band_limited(TIME, 3 * TIME - 1), at), 3 * at - 1, atol=1e-12)
-
-
-@pytest.mark.parametrize("hold", ["zero", "linear", "band_limited"])
-def test_a_shifted_signal_is_the_same_later(hold):
-    signal = continuous(TIME, np.sin(9 * TIME), hold)
-    at = np.linspace(-1, 3, 1234) + 1.7e-5  # off the jumps
-    np.testing.assert_allclose(
-        evaluate(shifted(signal, 0.0403), at + 0.0403), evaluate(signal, at), atol=1e-9
-    )
 
 
 def test_the_smooth_stand_in_of_a_held_command_has_its_impulse():

@@ -52,8 +52,7 @@ def alternatives(
         term = chosen.model.term(label)
         assert term is not None
         for place in _free_places(term.element, catalogue):
-            tied = place == "sensor" and series[0].observer is not None
-            if not tied and not (place == "command" and series[0].kind not in DRIVES):
+            if not (place == "command" and series[0].kind not in DRIVES):
                 moved.append(_moved(beside, term, place))
     made: dict[Kind, list[Proposal]] = {
         "freed_value": freed,

@@ -66,8 +66,6 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     calibration, seen = scoring.calibration, list(scoring.calibration.series)
     unseen = tuple(scoring.unseen) if case.holdout else ()
     known = case.catalogue.within(scales(seen, calibration.fit.model))
-    if seen[0].observer is not None:  # which takes the measurement for the motion
-        known = known.without(*(name for name, element in known.elements.items() if element.slot == "sensor"))
     found = search(seen, calibration.fit, case.nominal, known, case.pool, case.tell, case.budget)
     case.tell("weighing the hypotheses on data that no fit has seen")
     step = found.fit.run.max_step

@@ -11,7 +11,6 @@ from scipy.interpolate import PPoly
 from rhythmid.elements.element import STEP
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model
-from rhythmid.identify.observer import tied, with_observer
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import Compiled, compile_model
@@ -74,9 +73,6 @@ class FreeRun:
             knots = knots.copy()
             knots[1:-1] += late if varies else late[0]
         out = np.empty((len(times), self.states + 2))
-        if one.observer is not None:
-            behind = float(np.mean(one.centres - times))
-            disturbance = one.observer.disturbance(model.mass.value, behind, disturbance)
         force = NO_SIGNAL if disturbance is None else pieces(disturbance)
         done = compiled.run(
             times, knots, coefficients, *given.forcing, *force,
@@ -145,11 +141,6 @@ def _ticks(series: Sequence[Series]) -> list[float]:
     return [float(np.median(np.diff(times))) for times in knots if len(times) > 2]
 
 
-def _longest(one: Series) -> float:
-    """Longest step [s] that shows all of a series: a block, or what lies between two values of an observer's pull."""
-    return one.period * one.block if one.observer is None else float(np.median(np.diff(one.observer.pull.x)))
-
-
 def _inputs(one: Series) -> Inputs:
     return Inputs(_contiguous(pieces(one.command)), _stand_in(one), _contiguous(pieces(one.forcing)))
 
@@ -159,8 +150,7 @@ def prepare_run(
 ) -> FreeRun:
     """Prepare the model's structure for the series. Raises InputError when series of different input kinds are mixed.
 
-    `max_step` [s] None means one Runge-Kutta step a block, a value of an observer's pull, or one of a command at whose knots
-    steps end, at most.
+    `max_step` [s] None means one Runge-Kutta step a block, or a value of a command at whose knots steps end, at most.
     """
     kinds: set[InputKind] = {one.kind for one in series if one.command is not None}
     if len(kinds) > 1:
@@ -178,14 +168,12 @@ def prepare_run(
     smooth = not _sees_steps(model) and all(i.smooth is not None or len(i.command[0]) <= 2 for i in inputs)
     if not smooth:
         inputs = tuple(replace(i, smooth=None) for i in inputs)
-    observer = next((one.observer for one in series), None)
-    whole, disturbed = with_observer(model, observer), disturbed or observer is not None
     return FreeRun(
-        tied(compile_model(whole, disturbed, excited, smooth, measured), observer),
-        lambda: tied(compile_model(whole, disturbed, excited, measured=measured), observer),
+        compile_model(model, disturbed, excited, smooth, measured),
+        lambda: compile_model(model, disturbed, excited, measured=measured),
         tuple(series),
         inputs,
-        max_step or min([*map(_longest, series), *([] if smooth else _ticks(series))]),
+        max_step or min([*(one.period * one.block for one in series), *([] if smooth else _ticks(series))]),
     )
 
 

@@ -15,7 +15,6 @@ from scipy.interpolate import PPoly
 
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
-from rhythmid.identify.observer import Observer
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.simulation.generated_source import InputKind, OutputKind
@@ -36,7 +35,7 @@ class Series:
     one; `used` (n // block,) marks the averages that the fit may see, `hidden` those that are kept from it to be judged by;
     what is in neither, like a gap, counts for nothing. `period` [s] is the usual sample period.
     `ignored` (n // block, q) are signals any multiple of which the averages may contain, so that nothing is learnt from
-    them (the limit cycle's harmonics, where the cycle is not to be used). `observer` ties simulations to the record.
+    them (the limit cycle's harmonics, where the cycle is not to be used).
     `parameters` are values of the model's parameters that the record declares; see `own_model`.
     """
 
@@ -51,7 +50,6 @@ class Series:
     kind: InputKind = "force"
     measured: OutputKind = "position"
     ignored: Array | None = None
-    observer: Observer | None = None
     hidden: Mask | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
 
@@ -115,16 +113,8 @@ class Series:
             return self.used
         return np.zeros(self.blocks, bool) if self.hidden is None else self.hidden
 
-    @property
-    def whole(self) -> str:
-        """What an error is a share of, in words; in figures, see `power`."""
-        return "motion" if self.observer is None else "driving force"
-
     def power(self, chosen: Mask) -> float:
-        """Sum of squares over the chosen averages that an error is a share of: of the motion, or where an observer holds the
-        simulation, of what the driving force would stretch it by."""
-        if self.observer is not None:
-            return float(chosen.sum()) * self.observer.size**2
+        """Sum of squares of the motion over the chosen averages, which an error is a share of."""
         return float(np.sum((self.averaged[chosen] - self.averaged.mean()) ** 2))
 
 

@@ -114,8 +114,3 @@ def pieces(signal: PPoly | None) -> tuple[Array, Array]:
     after = np.zeros((4, 1))
     after[0, 0] = float(signal(signal.x[-1]))
     return np.concatenate([[-FAR], signal.x, [FAR]]), np.hstack([before, body, after])
-
-
-def shifted(signal: PPoly, delay: float) -> PPoly:
-    """The signal `delay` seconds later."""
-    return PPoly(signal.c, signal.x + delay, extrapolate=True)

@@ -87,7 +87,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     return Diagnosis(
         verdict=decision.verdict,
         summary=summary_of(
-            decision, missing, plain, augmented, series[0].whole, _freed(case.nominal, result)
+            decision, missing, plain, augmented, "motion", _freed(case.nominal, result)
         ),
         detection=Detection(
             found.rounds[0].p_value,

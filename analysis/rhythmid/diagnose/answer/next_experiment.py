@@ -94,7 +94,7 @@ def _played(
     used = np.ones(len(time) // series.block, bool)
     return replace(
         series, name="imagined", time=time, value=value, command=command, forcing=forcing, used=used,
-        ignored=None, observer=None,
+        ignored=None,
     )  # fmt: skip
 
 

@@ -158,8 +158,6 @@ def _runs(
                 hidden=np.zeros_like(one.used) if heldout else _hidden(one),
                 heldout=heldout,
                 quiet=_quiet(one),
-                size=None if one.observer is None else one.observer.size,
-                whole=one.whole,
             )
         )
     return found
