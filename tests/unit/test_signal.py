@@ -7,7 +7,6 @@ from scipy.integrate import simpson
 from rhythmid.simulation.signal import (
     FAR,
     band_limited,
-    continuous,
     first_order_hold,
     impulse_preserving,
     pieces,

@@ -1,11 +1,11 @@
 """`rhythmid diagnose`: which physics the nominal model lacks."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from rhythmid.commands.options import Bags, Elements, JsonFile, ReportFile, SignalsFile, command_line
 from rhythmid.errors import InputError
@@ -45,6 +45,14 @@ def diagnose(
     save_model: Annotated[
         Path | None, typer.Option("--save-model", help="Write the augmented model.")
     ] = None,
+    budget: Annotated[
+        float | None,
+        typer.Option(
+            "--budget",
+            metavar="SECONDS",
+            help="Begin no further round of the search after so many seconds; the answer says what was not tried.",
+        ),
+    ] = None,
 ) -> None:
     """Say where records and model part, which physics the model lacks, and how much better it fits with it.
 
@@ -52,13 +60,18 @@ def diagnose(
     """
     from rhythmid.elements.catalogue import load_catalogue
     from rhythmid.model import Model
+    from rhythmid.progress_bar import progress
     from rhythmid.record.read import load_records
 
     require_new(json, report, save_model)
+    if budget is not None and not (math.isfinite(budget) and budget > 0.0):
+        raise InputError("--budget is a number of seconds greater than 0")
     if model is None and sim is None:
         raise InputError("nothing to compare the records with: give --model NOMINAL.yaml, --sim BAG, or both")
-    if model is None and (holdout or save_model):
-        raise InputError("--holdout and --save-model belong to a model: give --model NOMINAL.yaml too")
+    if model is None and (holdout or save_model or budget):
+        raise InputError(
+            "--holdout, --budget and --save-model belong to a model: give --model NOMINAL.yaml too"
+        )
     catalogue = load_catalogue(elements or ())
     nominal = None if model is None else Model.load(model, catalogue)
     records = load_records(bags, signals)
@@ -66,25 +79,21 @@ def diagnose(
     simulation = None if sim is None else _simulation(sim, signals, sim_signals)
     console = Console(stderr=True)
     result, answer, comparison = {}, None, None
-    with console.status("reading") as status:
+    if simulation is not None:
+        from rhythmid.compare.compare import compare
 
-        def tell(what: str) -> None:
-            status.update(what)
-            console.print(f"[dim]{what}[/]")
-
-        if simulation is not None:
-            from rhythmid.compare.compare import compare
-
+        with progress(console) as tell:
             comparison = compare(simulation, records, nominal, tell)
-            result["comparison"] = comparison.to_dict()
-            show_comparison(result["comparison"])
-        if nominal is not None:
-            from rhythmid.diagnose.diagnosis import diagnose as find
+        result["comparison"] = comparison.to_dict()
+        show_comparison(result["comparison"])
+    if nominal is not None:
+        from rhythmid.diagnose.answer.printed import show
+        from rhythmid.diagnose.diagnosis import diagnose as find
 
-            answer = find(records, nominal, unseen, catalogue, tell)
-            result = answer.diagnosis.to_dict() | result
-    if answer is not None:
-        show(result)
+        with progress(console, budget) as tell:
+            answer = find(records, nominal, unseen, catalogue, tell, budget)
+        result = answer.diagnosis.to_dict() | result
+        show(answer.diagnosis, Console())
     if json is not None:
         write_json(json, result)
     if save_model is not None and answer is not None:
@@ -129,35 +138,3 @@ def show_comparison(result: dict) -> None:
     console.print(result["summary"])
     for note in result["notes"]:
         console.print(f"note: {note}")
-
-
-def show(result: dict) -> None:
-    """Print a diagnosis."""
-    console = Console()
-    console.print(f"[bold]{result['verdict'].replace('_', ' ')}[/]: {result['summary']}")
-    where = result["location"]
-    console.print(f"where: {where['where']}")
-    for effect in result["missing"]:
-        table = Table(
-            title=f"{effect['element']}   {effect['equation']}   ({100 * effect['probability']:.0f} %)"
-        )
-        for column in ("parameter", "value", "std", "unit"):
-            table.add_column(column)
-        for name, value in effect["parameters"].items():
-            std = "—" if value["std"] is None else f"{value['std']:.2g}"
-            table.add_row(name, f"{value['value']:.6g}", std, value["unit"])
-        console.print(table)
-    for group in result["indistinguishable"]:
-        console.print(f"indistinguishable here: {', '.join(group)}")
-    if result["scoring"] != "free run":
-        console.print(f"scored in {result['scoring']}")
-    for name, fit in result["fit"].items():
-        held = "—" if fit["heldout_nrmse"] is None else f"{fit['heldout_nrmse']:.5f}"
-        console.print(f"{name.replace('_', ' ')}: NRMSE {fit['train_nrmse']:.5f} seen, {held} held out")
-    for line in result["calibration"]:
-        console.print(f"calibration: {line}")
-    for line in result["excluded"]:
-        console.print(f"excluded: {line}")
-    for line in result["notes"]:
-        console.print(f"note: {line}")
-    console.print(f"next experiment: {result['next_experiment']}")

@@ -1,0 +1,134 @@
+"""A diagnosis on the terminal: the verdict first, then names, hypotheses, what is left, and what is not believed."""
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from rhythmid.diagnose.answer.result import Diagnosis, Estimate, MissingEffect, Remainder, Scored
+from rhythmid.diagnose.rejections import Rejection
+
+HYPOTHESES_SHOWN = 6
+REJECTIONS_SHOWN = 5
+NOMINAL = "nominal model"
+
+
+def show(found: Diagnosis, console: Console) -> None:
+    """Print a diagnosis."""
+    lines = _Lines(console)
+    lines.told(found.verdict.replace("_", " "), found.summary)
+    lines.said("where", found.location.where)
+    for effect in found.missing:
+        console.print(_parameters(effect))
+    if len(found.missing) > 1:
+        lines.said("all of these names together", _percent(found.joint_probability))
+    for group in found.indistinguishable:
+        lines.said("indistinguishable here", ", ".join(group))
+    if len(found.hypotheses) > 1:
+        console.print(_hypotheses(found))
+    lines.said("left", remainder_words(found.remainder))
+    lines.said("scored", scoring_words(found.scoring))
+    for name, fit in found.fit.items():
+        held = "—" if fit.heldout_nrmse is None else f"{fit.heldout_nrmse:.5f}"
+        lines.said(name.replace("_", " "), f"NRMSE {fit.train_nrmse:.5f} seen, {held} held out")
+    for label, group in (
+        ("assumption", found.assumptions),
+        ("calibration", found.calibration),
+        ("excluded", found.excluded),
+        ("note", found.notes),
+    ):
+        for line in group:
+            lines.said(label, line)
+    for line in rejection_words(found.rejections):
+        lines.said("not believed", line)
+    lines.said("next experiment", found.next_experiment)
+
+
+class _Lines:
+    """Lines of a console that begin with a label; nothing in them is markup."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+
+    def told(self, label: str, text: str) -> None:
+        self._console.print(f"[bold]{escape(label)}[/]: {escape(text)}")
+
+    def said(self, label: str, text: str) -> None:
+        self._console.print(f"{escape(label)}: {escape(text)}")
+
+
+def _parameters(effect: MissingEffect) -> Table:
+    head = f"{effect.element}   {effect.equation}"
+    sizes = f"probability {_percent(effect.probability)}, {_percent(effect.share)} of the mismatch"
+    table = Table(title=escape(f"{head}   ({sizes})"))
+    for column in ("parameter", "value", "std", "unit"):
+        table.add_column(column)
+    for name, value in effect.parameters.items():
+        table.add_row(name, f"{value.value:.6g}", _std(value), escape(value.unit))
+    return table
+
+
+def _std(value: Estimate) -> str:
+    return "—" if value.std is None else f"{value.std:.2g}"
+
+
+def _hypotheses(found: Diagnosis) -> Table:
+    shown = found.hypotheses[:HYPOTHESES_SHOWN]
+    table = Table(
+        title=f"the {len(shown)} best of {len(found.hypotheses)} hypotheses, by their predictions of unseen data"
+    )
+    table.add_column("hypothesis", overflow="fold")
+    for column in ("kind", "worse by", "probability", "held-out error"):
+        table.add_column(column, justify="left" if column == "kind" else "right")
+    for one in shown:
+        behind = (
+            "best"
+            if one.score_difference == 0.0
+            else f"{one.score_difference:.3g} ± {one.standard_error:.2g}"
+        )
+        held = "—" if one.heldout_nrmse is None else f"{100.0 * one.heldout_nrmse:.3g} %"
+        table.add_row(
+            escape(" + ".join(one.elements)) or NOMINAL,
+            one.kind.replace("_", " "),
+            behind,
+            _percent(one.probability),
+            held,
+        )
+    return table
+
+
+def remainder_words(left: Remainder) -> str:
+    """What the names leave, in words."""
+    if not left.significant:
+        return "nothing that any free function predicts better than chance"
+    return f"{_percent(left.share)} of the mismatch, which goes with {left.goes_with}"
+
+
+def scoring_words(scored: Scored) -> str:
+    """How the records were scored and why, in words."""
+    how = {"free_run": "in free run", "windows": "in windows", "effort": "by the recorded effort"}[
+        scored.kind
+    ]
+    below = "" if scored.bandwidth is None else f" below {scored.bandwidth:.3g} Hz"
+    return f"{how}{below}: {scored.reason}"
+
+
+def rejection_words(rejections: Sequence[Rejection]) -> list[str]:
+    """The hypotheses that are not believed with all reasons of each; the first few, and how many more there are."""
+    reasons: dict[tuple[str, ...], list[str]] = {}
+    for row in rejections:
+        reasons.setdefault(row.hypothesis, []).append(row.reason)
+    told = [
+        f"{' + '.join(elements).replace('_', ' ')} ({'; '.join(why)})"
+        for elements, why in list(reasons.items())[:REJECTIONS_SHOWN]
+    ]
+    more = len(reasons) - len(told)
+    if more > 0:
+        told.append(f"and {more} more; --json and --report list all, with statistics and thresholds")
+    return told
+
+
+def _percent(share: float) -> str:
+    percent = 100.0 * share
+    return "below 0.1 %" if 0.0 < percent < 0.1 else f"{percent:.3g} %"

@@ -1,0 +1,70 @@
+"""Progress on the terminal: what is under way and for how long, and how much of a given time is spent.
+
+How long a search will take is not known beforehand, so no bar pretends to know: there is one only where a time is given, and it
+shows how much of that is spent.
+"""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeElapsedColumn
+from rich.progress_bar import ProgressBar
+from rich.table import Column
+from rich.text import Text
+
+from rhythmid.progress import Tell
+
+BAR = 30  # characters
+
+
+class SpentColumn(ProgressColumn):
+    """A bar of the share of `seconds` that has passed, and the share in figures."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__(Column(no_wrap=True))
+        self._seconds = seconds
+
+    def render(self, task: Task) -> ProgressBar:
+        """The bar of a task by the time for which it has been running."""
+        return ProgressBar(self._seconds, min(task.elapsed or 0.0, self._seconds), BAR)
+
+
+class SpentText(ProgressColumn):
+    """The share of `seconds` that has passed, in words."""
+
+    def __init__(self, seconds: float) -> None:
+        super().__init__(Column(no_wrap=True))
+        self._seconds = seconds
+
+    def render(self, task: Task) -> Text:
+        """The words of a task by the time for which it has been running."""
+        return Text(spent_words(task.elapsed or 0.0, self._seconds))
+
+
+def spent_words(elapsed: float, seconds: float) -> str:
+    """How much of a budget [s] is spent after `elapsed` [s]. What is under way when it ends is brought to its end."""
+    if elapsed >= seconds:
+        return f"all {seconds:g} s of the budget spent; finishing"
+    return f"{100.0 * elapsed / seconds:.0f} % of the budget of {seconds:g} s"
+
+
+@contextmanager
+def progress(console: Console, budget: float | None = None) -> Iterator[Tell]:
+    """While this is open, what is told stands in a line with the time since it was opened, and with a `budget` [s] the share of
+    it that is spent; each thing that was told is also printed with the time at which it began."""
+    columns: list[ProgressColumn] = [SpinnerColumn(), TimeElapsedColumn()]
+    if budget is not None:
+        columns += [SpentColumn(budget), SpentText(budget)]
+    columns.append(TextColumn("{task.description}"))
+    began = time.monotonic()
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("", total=None)
+
+        def tell(what: str) -> None:
+            bar.update(task, description=escape(what))
+            console.print(f"[dim]{time.monotonic() - began:6.1f} s  {escape(what)}[/]")
+
+        yield tell
