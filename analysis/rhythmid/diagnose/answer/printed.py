@@ -12,6 +12,7 @@ from rhythmid.diagnose.rejections import Rejection
 HYPOTHESES_SHOWN = 6
 REJECTIONS_SHOWN = 5
 NOMINAL = "nominal model"
+LEAST = 1e-3  # probability, of itself or of the contrary, below which only that is told
 
 
 def show(found: Diagnosis, console: Console) -> None:
@@ -22,7 +23,7 @@ def show(found: Diagnosis, console: Console) -> None:
     for effect in found.missing:
         console.print(_parameters(effect))
     if len(found.missing) > 1:
-        lines.said("all of these names together", _percent(found.joint_probability))
+        lines.said("all of these names together", _probability(found.joint_probability))
     for group in found.indistinguishable:
         lines.said("indistinguishable here", ", ".join(group))
     if len(found.hypotheses) > 1:
@@ -60,7 +61,7 @@ class _Lines:
 
 def _parameters(effect: MissingEffect) -> Table:
     head = f"{effect.element}   {effect.equation}"
-    sizes = f"probability {_percent(effect.probability)}, {_percent(effect.share)} of the mismatch"
+    sizes = f"probability {_probability(effect.probability)}, {_percent(effect.share)} of the mismatch"
     table = Table(title=escape(f"{head}   ({sizes})"))
     for column in ("parameter", "value", "std", "unit"):
         table.add_column(column)
@@ -82,17 +83,13 @@ def _hypotheses(found: Diagnosis) -> Table:
     for column in ("kind", "worse by", "probability", "held-out error"):
         table.add_column(column, justify="left" if column == "kind" else "right")
     for one in shown:
-        behind = (
-            "best"
-            if one.score_difference == 0.0
-            else f"{one.score_difference:.3g} ± {one.standard_error:.2g}"
-        )
+        behind = "best" if one.score_difference == 0.0 else _worse(one.score_difference, one.standard_error)
         held = "—" if one.heldout_nrmse is None else f"{100.0 * one.heldout_nrmse:.3g} %"
         table.add_row(
             escape(" + ".join(one.elements)) or NOMINAL,
             one.kind.replace("_", " "),
             behind,
-            _percent(one.probability),
+            _probability(one.probability),
             held,
         )
     return table
@@ -115,12 +112,12 @@ def scoring_words(scored: Scored) -> str:
 
 
 def rejection_words(rejections: Sequence[Rejection]) -> list[str]:
-    """The hypotheses that are not believed with all reasons of each; the first few, and how many more there are."""
-    reasons: dict[tuple[str, ...], list[str]] = {}
+    """The hypotheses that are not believed with the first reason of each; a few, and how many more there are."""
+    reasons: dict[tuple[str, ...], str] = {}
     for row in rejections:
-        reasons.setdefault(row.hypothesis, []).append(row.reason)
+        reasons.setdefault(row.hypothesis, row.reason)
     told = [
-        f"{' + '.join(elements).replace('_', ' ')} ({'; '.join(why)})"
+        f"{' + '.join(elements).replace('_', ' ')} ({why})"
         for elements, why in list(reasons.items())[:REJECTIONS_SHOWN]
     ]
     more = len(reasons) - len(told)
@@ -129,6 +126,19 @@ def rejection_words(rejections: Sequence[Rejection]) -> list[str]:
     return told
 
 
+def _worse(difference: float, error: float) -> str:
+    """A difference of log densities with its standard error: whole numbers where it is large."""
+    if difference >= 10.0:
+        return f"{difference:.0f} ± {error:.0f}"
+    return f"{difference:.2g} ± {error:.2g}"
+
+
+def _probability(value: float) -> str:
+    """A probability, which evidence never makes 0 or 1."""
+    if value < LEAST:
+        return f"< {100.0 * LEAST:g} %"
+    return f"> {100.0 * (1.0 - LEAST):g} %" if value > 1.0 - LEAST else _percent(value)
+
+
 def _percent(share: float) -> str:
-    percent = 100.0 * share
-    return "below 0.1 %" if 0.0 < percent < 0.1 else f"{percent:.3g} %"
+    return f"{100.0 * share:.3g} %"
