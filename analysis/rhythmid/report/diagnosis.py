@@ -1,27 +1,25 @@
 """The report of a diagnosis: the verdict first, then where, what, how much better, and what remains open."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from rhythmid.report.blocks import (
     Block,
     Bullets,
-    Drawing,
     Equation,
-    Fold,
     Heading,
     Paragraph,
     Section,
-    Table,
     Tile,
     Tiles,
 )
 from rhythmid.report.findings import Findings
+from rhythmid.report.hypotheses import hypotheses_section, rejections_section
 from rhythmid.report.location import location_section, unknown_section
 from rhythmid.report.page import Page, Tone
-from rhythmid.report.quantity import NONE, number, percent, plain, pretty_name, sentence
+from rhythmid.report.quantity import number, percent, plain, pretty_name, probability, sentence
 from rhythmid.report.record_quality import quality_section
 from rhythmid.report.residual_figures import cycle_harmonics, error_changes, error_table, residual_folds
-from rhythmid.report.row_chart import Bar, draw_bars
 from rhythmid.report.run import error_of
 from rhythmid.report.sections import (
     compared_parameters,
@@ -38,7 +36,12 @@ VERDICTS: dict[str, tuple[str, Tone]] = {
     "unknown_physics": ("Something unknown is missing", "open"),
     "undecided": ("Undecided", "open"),
 }
-SCORES_SHOWN = 12
+
+SCORED = {
+    "free_run": "scored in free run: the model is started once and runs on its own for the whole record",
+    "windows": "scored in windows, each started anew",
+    "effort": "scored by effort: what the measured motion needs by the model, beside what was recorded",
+}
 
 
 def diagnosis_page(found: Findings) -> Page:
@@ -57,16 +60,18 @@ def diagnosis_page(found: Findings) -> Page:
         tiles=_tiles(found),
         sections=(
             location_section(found),
-            *([_what(found)] if found.repaired else []),
+            *([_what(found)] if result["missing"] else []),
             _better(found),
             _residuals(found),
-            _harmonics(found),
-            _ranking(found),
+            *_harmonics(found),
+            hypotheses_section(found),
+            rejections_section(found),
             _parameters(found),
-            delays_section(result["delays"], found.refitted_delays if found.repaired else None),
+            delays_section(result["delays"], (found.refitted_delays or None) if found.repaired else None),
             unknown_section(found),
             Section("The next experiment", (Paragraph(sentence(plain(result["next_experiment"])), "lead"),)),
             _calibration(found),
+            *_assumptions(found),
             quality_section(found.records),
             reproduce_section(found.command, found.models),
         ),
@@ -84,8 +89,8 @@ def _words(found: Findings) -> str:
     summary = str(result["summary"])
     if ". " in summary:
         return summary
-    detection = result["detection"]
-    said = f"{sentence(summary)} The refitted model's error is {percent(detection['refitted_nominal_nrmse'])} of the {found.whole}"
+    detection, whole = result["detection"], found.compared.quantity
+    said = f"{sentence(summary)} The refitted model's error is {percent(detection['refitted_nominal_nrmse'])} of the {whole}"
     if found.noise is not None:
         said += f"; noise alone would make {percent(detection['noise_floor_nrmse'])}"
     return f"{said}."
@@ -116,7 +121,7 @@ def _tiles(found: Findings) -> Tiles:
             value += f" → {percent(held[1], after.half if after else None)}"
         tiles.append(
             Tile(
-                f"error on held-out data, of the {found.whole}",
+                f"error on held-out data, of the {found.compared.quantity}",
                 value,
                 "before → after" if found.repaired else "",
             )
@@ -126,15 +131,19 @@ def _tiles(found: Findings) -> Tiles:
             Tile(
                 "least possible: noise alone",
                 percent(detection["noise_floor_nrmse"]),
-                f"of the {found.whole} in the fitted records, by what repeats in them",
+                f"of the {found.compared.quantity} in the fitted records, by what repeats in them",
             )
         )
     if result["verdict"] == "missing_physics":
-        chance = min(effect["probability"] for effect in result["missing"])
+        several = len(result["missing"]) > 1
         tiles.append(
-            Tile("such a name is right in", percent(chance), "of simulated machines whose truth was known")
+            Tile(
+                f"probability of {'these names' if several else 'this name'}",
+                probability(result["joint_probability"]),
+                "by the evidence, see the hypotheses",
+            )
         )
-    else:
+    elif detection["p_value"] is not None:
         tiles.append(
             Tile(
                 "chance of such a mismatch if nothing is missing",
@@ -157,18 +166,16 @@ def _what(found: Findings) -> Section:
         blocks.append(Heading(found.title(effect["element"])))
         blocks.append(Equation(effect["equation"]))
         known = found.words.get(effect["element"])
+        blocks.append(
+            Paragraph(
+                f"It explains {percent(effect['share'])} of the mismatch; the probability of the name is "
+                f"{probability(effect['probability'])}."
+            )
+        )
         blocks.append(parameters_table(effect["parameters"], known.parameters if known else None))
         if known is not None:
             names = f"Also known as {_joined(known.also_known_as)}. " if known.also_known_as else ""
             blocks.append(Paragraph(f"{names}Reference: {sentence(known.reference)}", "note"))
-        if result["verdict"] == "missing_physics":
-            blocks.append(
-                Paragraph(
-                    f"In simulated machines whose truth was known, a name that led its nearest rival by this much was right in "
-                    f"{percent(effect['probability'])} of the cases.",
-                    "note",
-                )
-            )
     blocks += _families(found)
     return Section(title, tuple(blocks))
 
@@ -189,11 +196,11 @@ def _families(found: Findings) -> list[Block]:
 
 def _better(found: Findings) -> Section:
     result = found.result
-    fit = result["fit"]
+    fit, whole = result["fit"], found.compared.quantity
     if found.repaired:
         lead = (
             f"In the records used for the fit the error goes from {percent(fit['refitted_nominal']['train_nrmse'])} to "
-            f"{percent(fit['augmented']['train_nrmse'])} of the {found.whole}"
+            f"{percent(fit['augmented']['train_nrmse'])} of the {whole}"
         )
         if fit["augmented"]["heldout_nrmse"] is not None:
             lead += (
@@ -201,124 +208,61 @@ def _better(found: Findings) -> Section:
                 f"{percent(fit['augmented']['heldout_nrmse'])}"
             )
     else:
-        lead = f"The refitted nominal model's error is {percent(fit['refitted_nominal']['train_nrmse'])} of the {found.whole}"
+        lead = f"The refitted nominal model's error is {percent(fit['refitted_nominal']['train_nrmse'])} of the {whole}"
         if fit["refitted_nominal"]["heldout_nrmse"] is not None:
             lead += f", and {percent(fit['refitted_nominal']['heldout_nrmse'])} on data that no fit has seen"
-    scoring = result.get("scoring") or "free run"
-    said = f"{sentence(str(result.get('heldout') or 'nothing was held out'))} Scored in {scoring}"
-    said += (
-        ": the model is started once and runs on its own for the whole record."
-        if scoring == "free run"
-        else "."
-    )
+    said = f"{sentence(str(result.get('heldout') or 'nothing was held out'))} {_scored(result['scoring'])}"
     as_given = result["detection"]["nominal_nrmse"]
     blocks: list[Block] = [
         Paragraph(f"{lead}.", "lead"),
-        Paragraph(f"{said} Before any refit, the nominal model as given: {percent(as_given)}."),
-        error_changes(found.runs, found.noise),
-        error_table(found.runs, found.output_unit),
+        Paragraph(said),
     ]
+    if as_given is not None:
+        blocks.append(Paragraph(f"Before any refit, the nominal model as given: {percent(as_given)}."))
+    if found.runs:
+        blocks.append(error_changes(found.runs, found.noise, found.compared))
+        blocks.append(error_table(found.runs, found.compared))
     return Section("How much better it fits", tuple(blocks))
+
+
+def _scored(scoring: Mapping[str, Any]) -> str:
+    """How the records were scored and why, in sentences."""
+    how = SCORED[scoring["kind"]]
+    if scoring["bandwidth"] is not None:
+        how += f", below {number(scoring['bandwidth'], 3)} Hz"
+    return f"{sentence(how)} Why: {scoring['reason'].rstrip('.')}."
 
 
 def _residuals(found: Findings) -> Section:
     lead = (
-        "What each model fails to explain: the refitted nominal model (before), and the same with what was added (after)."
+        f"What each model fails to explain: the refitted nominal model (before), and the one {found.changed} (after)."
         if found.repaired
         else "What the refitted nominal model fails to explain."
     )
     return Section(
-        "What is left unexplained", (Paragraph(lead), *residual_folds(found.runs, found.output_unit))
+        "What is left unexplained",
+        (Paragraph(lead), *residual_folds(found.runs, found.compared, found.output_unit)),
     )
 
 
-def _harmonics(found: Findings) -> Section:
+def _harmonics(found: Findings) -> list[Section]:
+    """Harmonics and transfer functions, where the records or the models were asked for them."""
     blocks: list[Block] = []
-    forced = [run for run in found.runs if run.phase is not None and run.used.any()]
+    forced = []
+    if found.slow_noise is not None:
+        forced = [run for run in found.runs if run.phase is not None and run.used.any()]
     quiet = [run for run in forced if run.quiet] or sorted(forced, key=lambda r: -len(r.time))[:1]
     for run in quiet[:3]:
-        table = cycle_harmonics(run, found.output_unit, found.slow_noise)
+        table = cycle_harmonics(run, found.output_unit, found.slow_noise or 0.0)
         if table is not None:
             blocks.append(table)
     if isinstance(found.transfer, str):
         blocks.append(Paragraph(sentence(found.transfer)))
-    else:
+    elif found.transfer is not None:
         one = found.transfer
         before = one.before if found.repaired else None
         blocks.append(change_figures(one.frequency, one.indices, before, one.after, one.unit, one.pumping))
-    return Section("Harmonics of the cycle and transfer functions", tuple(blocks))
-
-
-def _ranking(found: Findings) -> Section:
-    result = found.result
-    score = {one.element: one.statistic for one in found.scores}
-    best = tuple(effect["element"] for effect in result["missing"])
-    entries = [(best, 0.0, result["fit"]["augmented"]["heldout_nrmse"])]
-    entries += [(tuple(o["elements"]), o["delta_bic"], o["heldout_nrmse"]) for o in result["alternatives"]]
-    rows = []
-    for elements, delta, held in entries:
-        name = " + ".join(map(found.title, elements)) or "nominal model alone"
-        if elements in found.unconverged:
-            name += " (refit did not settle)"
-        scores = ", ".join(number(score[e], 3) if e in score else NONE for e in elements) or NONE
-        verdict = "chosen" if elements == best else "rejected" if delta > found.worth else "not excluded"
-        if verdict == "not excluded" and _richer(found, best, elements):
-            verdict = "contains the chosen one, not needed"
-        rows.append((name, scores, "0" if elements == best else number(delta, 3), percent(held), verdict))
-    blocks: list[Block] = [
-        Paragraph(
-            "Every element of the catalogue was scored against the mismatch; the most promising were put into the model and "
-            "everything refitted."
-        ),
-        Table(
-            f"ΔBIC: how much worse than the chosen model, parameters paid for; above {number(found.worth)} counts as rejected. Score: "
-            f"χ² with one degree of freedom in the first round.",
-            ("model", "score χ²", "ΔBIC", "held-out error", "verdict"),
-            tuple(rows),
-            (0,),
-        ),
-    ]
-    if result["excluded"]:
-        blocks += [Heading("Could not be tried"), Bullets(tuple(map(plain, result["excluded"])))]
-    shown = found.scores[:SCORES_SHOWN]
-    if shown:
-        bars = [
-            Bar(
-                found.title(s.element),
-                s.statistic,
-                number(s.statistic, 3),
-                "after" if s.element in best else "measured",
-                s.element in best,
-            )
-            for s in shown
-        ]
-        figure = Drawing(
-            f"The {len(shown)} best scores of {len(found.scores)} elements",
-            draw_bars(
-                "Best scores: " + ", ".join(f"{b.label} {b.text}" for b in bars),
-                bars,
-                found.threshold,
-                "chance",
-            ),
-            "χ² of each element's best first guess. Relatives score alike; the refits above tell them apart. Dotted line: what chance "
-            "reaches once in a hundred diagnoses.",
-        )
-        listed = Table(
-            "All elements that were scored.",
-            ("element", "slot", "score χ²"),
-            tuple((found.title(s.element), s.slot, number(s.statistic, 3)) for s in found.scores),
-        )
-        blocks += [figure, Fold(f"All {len(found.scores)} elements", (listed,))]
-    return Section("The ranking", tuple(blocks))
-
-
-def _richer(found: Findings, best: tuple[str, ...], other: tuple[str, ...]) -> bool:
-    """Whether the other model differs from the chosen one by a richer element of which the chosen one is a special case."""
-    gone, come = set(best) - set(other), set(other) - set(best)
-    return len(gone) == len(come) == 1 and any(
-        name in found.words and found.words[name].contained_in and come <= set(found.words[name].contained_in)
-        for name in gone
-    )
+    return [Section("Harmonics of the cycle and transfer functions", tuple(blocks))] if blocks else []
 
 
 def _parameters(found: Findings) -> Section:
@@ -341,3 +285,9 @@ def _calibration(found: Findings) -> Section:
             Bullets(lines),
         ),
     )
+
+
+def _assumptions(found: Findings) -> list[Section]:
+    """What the answer takes for granted; nothing where it says nothing of that."""
+    lines = tuple(sentence(plain(line)) for line in found.result["assumptions"])
+    return [Section("What was assumed", (Bullets(lines),))] if lines else []

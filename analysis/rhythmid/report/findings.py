@@ -1,7 +1,7 @@
 """What a diagnosis found, as plain data for its report."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rhythmid.report.quantity import pretty_name
 from rhythmid.report.record_quality import RecordQuality
-from rhythmid.report.run import Run
+from rhythmid.report.run import Compared, Run
 from rhythmid.report.sections import Estimates
 
 Array = NDArray[np.float64]
@@ -69,59 +69,73 @@ class TransferChange:
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """All that the page shows, as plain data.
+    """All that the page shows, as plain data. What has a default belongs to one way of scoring only, and is left out where it is
+    absent.
 
     Attributes
     ----------
     result : the diagnosis as its JSON has it.
     source : the nominal model's name and the records' names in words.
     slots : elements of the nominal model by slot; `forced` if a forcing was recorded.
-    runs : records beside their simulations, those held out last.
+    compared : what of the records is compared with what the models say: motion or effort.
+    runs : records beside what the models say of them, those held out last.
+    chosen : names of the chosen hypothesis, nothing where that is the nominal model.
+    output_unit, force_unit : of the motion, and of what moves it.
     noise : standard deviation of the measurement noise in the compared averages, by what repeats; None where nothing does.
     slow_noise : of slow averages, per sample: noise as above, or what the final model leaves.
-    scores : best score of every element, best first; `threshold` above which chance is no explanation.
+    scores : best score test of every element, best first; `threshold` above which chance is no explanation.
     functions : free functions, the most explaining first.
-    transfer : change of the transfer functions, or the reason why there is none.
+    transfer : change of the transfer functions, or the reason why there is none; None where they were not looked at.
     nominal, refitted, refitted_delays : the nominal model's parameters as given and refitted, and its delays.
     at_bound : parameters of the final model that ended at a bound; `unconverged` models whose refit did not settle.
     words : what the catalogue says of the elements that are mentioned, by name.
     hints : (element, other element, what tells them apart).
-    worth : difference of the criterion that counts as decided.
     """
 
     result: Mapping[str, Any]
     source: str
     slots: Mapping[str, tuple[str, ...]]
     forced: bool
+    compared: Compared
     runs: tuple[Run, ...]
+    chosen: tuple[str, ...]
     output_unit: str
-    noise: float | None
-    slow_noise: float
-    scores: tuple[ElementScore, ...]
-    threshold: float
-    functions: tuple[FreeFunction, ...]
-    transfer: TransferChange | str
+    force_unit: str
     nominal: Estimates
     refitted: Estimates
-    refitted_delays: Mapping[str, Any]
     records: tuple[RecordQuality, ...]
     words: Mapping[str, ElementWords]
     command: str
     models: Mapping[str, str]
-    worth: float
+    refitted_delays: Mapping[str, Any] = field(default_factory=dict)
+    noise: float | None = None
+    slow_noise: float | None = None
+    scores: tuple[ElementScore, ...] = ()
+    threshold: float | None = None
+    functions: tuple[FreeFunction, ...] = ()
+    transfer: TransferChange | str | None = None
     at_bound: tuple[str, ...] = ()
     unconverged: tuple[tuple[str, ...], ...] = ()
     hints: tuple[tuple[str, str, str], ...] = ()
 
     @property
-    def whole(self) -> str:
-        """What errors are a share of, in words."""
-        return self.runs[0].whole if self.runs else "motion"
+    def repaired(self) -> bool:
+        """Whether anything was added to the nominal model, or set free in it."""
+        return bool(self.result["missing"]) or any(run.after is not None for run in self.runs)
 
     @property
-    def repaired(self) -> bool:
-        """Whether anything was added to the nominal model."""
-        return bool(self.result["missing"])
+    def changed(self) -> str:
+        """What the final model is beside the refitted nominal one, in words."""
+        return self.runs[0].labels[1] if self.runs else "with the added effect"
+
+    def unit_of(self, quantity: str) -> str:
+        """Unit of a quantity that a mismatch may go with."""
+        rates = {"velocity": "s", "acceleration": "s^2"}
+        if quantity in rates:
+            return f"{self.output_unit}/{rates[quantity]}"
+        if quantity == "time":
+            return "s"
+        return self.force_unit if quantity in ("actuator force", "effort", "load") else self.output_unit
 
     def title(self, element: str) -> str:
         """The element's name as a heading has it."""

@@ -131,49 +131,67 @@ def _dependences(found: Findings) -> Drawing | None:
 
 
 def unknown_section(found: Findings) -> Section:
-    remainder = found.result.get("remainder")
-    blocks: list[Block] = []
-    if remainder is None and found.result["verdict"] == "unknown_physics":
-        blocks.append(
-            Paragraph(
-                "Something is left that no element of the catalogue explains and that is no function of position, velocity, "
-                "actuator force, time or the measured position alone: memory, a disturbance, or an effect on the way in or out."
-            )
+    """What the named effects leave: its share of the mismatch, what it goes with, and the curve that it draws over that."""
+    left = found.result["remainder"]
+    verdict = found.result["verdict"]
+    if left["significant"]:
+        said = (
+            f"The final model leaves a mismatch that goes with {left['goes_with']}: a free function of it predicts unseen "
+            f"data better by more than chance, and explains {percent(left['share'])} of what the nominal model leaves unexplained."
         )
-    elif remainder is None:
-        blocks.append(
-            Paragraph(
-                "The final model leaves nothing that depends on position, velocity, actuator force, time or the measured "
-                "position beyond noise. Effects smaller than the noise, or in states that the records never reached, "
-                "stay unseen."
-            )
+        said += (
+            " The names stand all the same: they carry nearly all of it."
+            if verdict == "missing_physics"
+            else " No element of the catalogue is this function."
+        )
+    elif verdict == "unknown_physics":
+        said = (
+            "Something is left that no element of the catalogue explains, and no function of one of the quantities that were "
+            "tried either: memory, a disturbance, or an effect on the way in or out."
         )
     else:
-        share = 100.0 * max(float(remainder["explained"]), 0.0)
-        blocks.append(
-            Paragraph(
-                f"The final model leaves a mismatch that depends on {remainder['quantity']}: a free function of it "
-                f"explains {share:.0f} % of what is left in stretches it was not fitted to (p = "
-                f"{number(remainder['p_value'], 2)}). No element of the catalogue is this function."
-            )
+        said = (
+            "The final model leaves nothing that a free function predicts better than chance. Effects smaller than the noise, "
+            "or in states that the records never reached, stay unseen."
         )
-    figures = [_force_map(f, found.repaired) for f in _most_telling(found.functions, remainder)]
+    blocks: list[Block] = [Paragraph(said)]
+    chosen = _most_telling(found.functions, left["goes_with"] if left["significant"] else None)
+    figures = [_force_map(one, found.repaired) for one in chosen]
+    if left["curve"] is not None and left["goes_with"] not in [one.quantity for one in chosen]:
+        figures.append(_curve(found, left))
     if figures:
         blocks.append(Columns(tuple(figures)))
-    for line in found.result.get("notes") or ():
+    for line in found.result["notes"]:
         blocks.append(Paragraph(sentence(line)))
     return Section("What remains unknown", tuple(blocks))
 
 
-def _most_telling(
-    functions: Sequence[FreeFunction], remainder: Mapping[str, Any] | None
-) -> list[FreeFunction]:
-    """The function that explains most, and the one of the remainder where that is another."""
+def _most_telling(functions: Sequence[FreeFunction], goes_with: str | None) -> list[FreeFunction]:
+    """The function that explains most, and the one that the remainder goes with where that is another."""
     drawn = [f for f in functions if len(f.force)]
     chosen = [f for f in drawn[:1] if f.explained > TELLING]
-    if remainder is not None:
-        chosen += [f for f in drawn if f.quantity == remainder["quantity"] and f not in chosen]
-    return chosen
+    return chosen + [f for f in drawn if f.quantity == goes_with and f not in chosen]
+
+
+def _curve(found: Findings, left: Mapping[str, Any]) -> Drawing:
+    """The curve of the remainder, as the diagnosis has it."""
+    quantity = str(left["goes_with"])
+    grid, force = np.array(left["curve"]["grid"]), np.array(left["curve"]["force"])
+    sensor = "sensor" in quantity
+    factor, unit = scaled(
+        float(np.max(np.abs(force), initial=0.0)), found.output_unit if sensor else found.force_unit
+    )
+    along, grid_unit = scaled(float(np.max(np.abs(grid), initial=0.0)), found.unit_of(quantity))
+    kind = "sensor error" if sensor else "force"
+    return drawing(
+        f"What is left over {quantity}",
+        Chart(
+            f"Remaining {kind} over {quantity}.", f"{quantity} [{pretty_unit(grid_unit)}]", f"{kind} [{pretty_unit(unit)}]",
+            (Curve(along * grid, factor * force, "left by the final model", "after"),),
+        ),
+        f"What the final model leaves as a free function of {quantity}, no formula assumed. A law that the model lacks shows by "
+        "its shape.",
+    )  # fmt: skip
 
 
 def _force_map(one: FreeFunction, repaired: bool) -> Drawing:

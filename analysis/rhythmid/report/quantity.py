@@ -6,6 +6,7 @@ import re
 NORMAL_95 = 1.959963984540054  # standard deviations to either side that hold 95 % of a normal distribution
 MINUS = "\u2212"
 NONE = "—"
+RARE = 1e-3  # probability below which only that is told
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 PREFIXED = {"m", "s", "N", "rad", "V", "A", "Hz", "N*m"}
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -104,6 +105,15 @@ def percent(ratio: float | None, half: float | None = None) -> str:
     if half is not None and math.isfinite(half) and half > 0.0:
         return f"{plus_minus(100.0 * ratio, 100.0 * half)}\u202f%"
     return f"{number(100.0 * ratio, 3)}\u202f%"
+
+
+def probability(value: float | None) -> str:
+    """A probability in percent. Evidence never makes one 0 or 1, so the rest of very small and very large ones is bounded."""
+    if value is None or math.isnan(value):
+        return NONE
+    if value < RARE:
+        return f"below {percent(RARE)}"
+    return f"above {percent(1.0 - RARE)}" if value > 1.0 - RARE else percent(value)
 
 
 def scaled(size: float, unit: str) -> tuple[float, str]:

@@ -8,16 +8,29 @@ from rhythmid.report.blocks import Columns, Drawing, Fold, Paragraph, Table, dra
 from rhythmid.report.chart import Chart, Curve
 from rhythmid.report.quantity import number, percent, plus_minus, pretty_unit, scaled, with_unit
 from rhythmid.report.row_chart import Change, draw_changes
-from rhythmid.report.run import FEWEST, Error, Harmonic, Run, Which, by_phase, density, error_of, harmonics
+from rhythmid.report.run import (
+    FEWEST,
+    Compared,
+    Error,
+    Harmonic,
+    Run,
+    Which,
+    by_phase,
+    density,
+    error_of,
+    harmonics,
+)
 from rhythmid.report.state_map import draw_maps, state_map
 
-BEFORE, AFTER = "refitted nominal model", "with the added effect"
 HELD_OUT = "held out"
 MOST_SHOWN = 12  # records drawn in full; all are in the table
 
 
-def residual_folds(runs: Sequence[Run], unit: str) -> list[Fold | Paragraph]:
-    """Four figures of every record, the one that gains most opened; of very many records only the most telling."""
+def residual_folds(runs: Sequence[Run], compared: Compared, position: str) -> list[Fold | Paragraph]:
+    """Four figures of every record, the one that gains most opened; of very many records only the most telling.
+
+    `position` is the unit of the motion.
+    """
 
     def gain(run: Run) -> float:
         before, after = error_of([run], "before"), error_of([run], "after")
@@ -34,8 +47,8 @@ def residual_folds(runs: Sequence[Run], unit: str) -> list[Fold | Paragraph]:
         role = HELD_OUT if run.heldout else "used in the fit"
         blocks.append(
             Fold(
-                f"{run.name} ({role}): error {told} of the {run.whole}",
-                (residual_grid(run, unit),),
+                f"{run.name} ({role}): error {told} of the {compared.quantity}",
+                (residual_grid(run, compared, position),),
                 run is ranked[0],
             )
         )
@@ -49,17 +62,17 @@ def residual_folds(runs: Sequence[Run], unit: str) -> list[Fold | Paragraph]:
     return blocks
 
 
-def residual_grid(run: Run, unit: str) -> Columns:
-    """The four figures of one record; `unit` is that of its output."""
+def residual_grid(run: Run, compared: Compared, position: str) -> Columns:
+    """The four figures of one record; `position` is the unit of the motion."""
     size = float(np.quantile(np.abs(run.residual("before")[run.used]), 0.98))
-    factor, shown = scaled(size, unit)
+    factor, shown = scaled(size, compared.unit)
     cycle = _over_cycle(run, factor, shown)
     return Columns(
         (
-            _over_time(run, factor, shown),
+            _over_time(run, compared, factor, shown),
             *([cycle] if cycle is not None else []),
-            _over_states(run, unit, factor, shown),
-            _over_frequency(run, unit),
+            _over_states(run, position, factor, shown),
+            _over_frequency(run, compared),
         )
     )
 
@@ -71,7 +84,7 @@ def _curves(run: Run, factor: float) -> tuple[Curve, ...]:
     return tuple(curves)
 
 
-def _over_time(run: Run, factor: float, unit: str) -> Drawing:
+def _over_time(run: Run, compared: Compared, factor: float, unit: str) -> Drawing:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], run.hidden.astype(np.int8), [0]])))
     last = len(run.time) - 1
     shaded = tuple(
@@ -86,8 +99,8 @@ def _over_time(run: Run, factor: float, unit: str) -> Drawing:
     return drawing(
         "Over time",
         Chart(
-            f"{run.name}: measured minus simulated output over time. {_rms_words(run, factor, unit)}",
-            "time [s]", f"measured − simulated [{pretty_unit(unit)}]", _curves(run, factor), shaded=shaded,
+            f"{run.name}: measured minus {compared.made} {compared.quantity} over time. {_rms_words(run, factor, unit)}",
+            "time [s]", f"measured − {compared.made} [{pretty_unit(unit)}]", _curves(run, factor), shaded=shaded,
         ),
         f"What each model misses of {run.name}, moment by moment.{change}{hidden}",
     )  # fmt: skip
@@ -124,7 +137,7 @@ def _over_cycle(run: Run, factor: float, unit: str) -> Drawing | None:
     )  # fmt: skip
 
 
-def _over_states(run: Run, output: str, factor: float, unit: str) -> Drawing:
+def _over_states(run: Run, length: str, factor: float, unit: str) -> Drawing:
     position, velocity = run.position[run.used], run.velocity[run.used]
     maps = [
         (
@@ -134,8 +147,8 @@ def _over_states(run: Run, output: str, factor: float, unit: str) -> Drawing:
     ]
     if run.after is not None:
         maps.append(("after", state_map(position, velocity, run.residual("after")[run.used])))
-    rate = "m/s" if output == "m" else f"{output}/s"
-    x_unit = scaled(float(np.ptp(position)), output)
+    rate = f"{length}/s"
+    x_unit = scaled(float(np.ptp(position)), length)
     return Drawing(
         "Over position and velocity",
         draw_maps(
@@ -147,11 +160,11 @@ def _over_states(run: Run, output: str, factor: float, unit: str) -> Drawing:
     )  # fmt: skip
 
 
-def _over_frequency(run: Run, output: str) -> Drawing:
-    frequency, motion = density(run, run.measured)
+def _over_frequency(run: Run, compared: Compared) -> Drawing:
+    frequency, whole = density(run, run.measured)
     _, before = density(run, run.residual("before"))
-    factor, unit = scaled(float(np.quantile(before, 0.9)), output)
-    curves = [Curve(frequency, factor * motion, "measured motion", "measured"),
+    factor, unit = scaled(float(np.quantile(before, 0.9)), compared.unit)
+    curves = [Curve(frequency, factor * whole, f"measured {compared.quantity}", "measured"),
               Curve(frequency, factor * before, run.labels[0], "before")]  # fmt: skip
     if run.after is not None:
         curves.append(
@@ -160,10 +173,10 @@ def _over_frequency(run: Run, output: str) -> Drawing:
     return drawing(
         "Over frequency",
         Chart(
-            f"{run.name}: amplitude spectral density of the motion and of what the models miss of it.",
+            f"{run.name}: amplitude spectral density of the {compared.quantity} and of what the models miss of it.",
             "frequency [Hz]", f"density [{pretty_unit(unit)}/√Hz]", tuple(curves), y_log=True, x_log=True,
         ),
-        "Spectra of the motion and of the residuals. Peaks that go are what was missing; a flat floor that stays is "
+        f"Spectra of the {compared.quantity} and of the residuals. Peaks that go are what was missing; a flat floor that stays is "
         "measurement noise.",
     )  # fmt: skip
 
@@ -177,7 +190,7 @@ def _parts(runs: Sequence[Run]) -> Iterator[tuple[Run, bool, str, str]]:
             yield run, True, f"{run.name}, its end", HELD_OUT
 
 
-def error_changes(runs: Sequence[Run], noise: float | None) -> Drawing:
+def error_changes(runs: Sequence[Run], noise: float | None, compared: Compared) -> Drawing:
     """Error of every record before and after; `noise` is the standard deviation of the measurement's averages."""
     rows: list[Change] = []
     for run, hidden, name, role in _parts(runs):
@@ -193,18 +206,17 @@ def error_changes(runs: Sequence[Run], noise: float | None) -> Drawing:
         )
     shown = sorted(rows, key=lambda row: -row.before)[:30]
     repaired = any(row.after is not None for row in rows)
-    legend = (
-        (("square before", BEFORE), ("circle after", AFTER)) if repaired else (("square before", BEFORE),)
-    )
+    before, after = runs[0].labels if runs else ("", "")
+    legend = (("square before", before), *([("circle after", after)] if repaired else []))
     return Drawing(
         "Error of every record",
         draw_changes(
-            "Free-run error of every record: "
+            f"Error of the {compared.quantity} in every record: "
             + "; ".join(
                 f"{row.label} {number(row.before, 3)} %" + (f" to {number(row.after, 3)} %" if row.after is not None else "")
                 for row in shown
             ),
-            shown, f"error [% of the {runs[0].whole if runs else 'motion'}]",
+            shown, f"error [% of the {compared.quantity}]",
         ),
         f"{'Squares: before; circles: after' if repaired else 'Squares: error'}. "
         + (
@@ -216,17 +228,18 @@ def error_changes(runs: Sequence[Run], noise: float | None) -> Drawing:
     )  # fmt: skip
 
 
-def error_table(runs: Sequence[Run], unit: str) -> Table:
+def error_table(runs: Sequence[Run], compared: Compared) -> Table:
     """The same as numbers."""
     rows = []
     repaired = any(run.after is not None for run in runs)
     for run, hidden, name, role in _parts(runs):
         before, after = error_of([run], "before", hidden), error_of([run], "after", hidden)
-        row = [name, role, _told(before, unit)]
-        rows.append((*row, _told(after, unit)) if repaired else tuple(row))
+        row = [name, role, _told(before, compared.unit)]
+        rows.append((*row, _told(after, compared.unit)) if repaired else tuple(row))
     columns = ("record", "used for", "before" if repaired else "error")
+    sized = any(run.size is not None for run in runs)
     return Table(
-        f"Rms residual, and its share of the {runs[0].whole if runs else 'motion'} (standard deviation) with a 95 % interval "
+        f"Rms residual, and its share of the {compared.quantity} ({'rms' if sized else 'standard deviation'}) with a 95 % interval "
         "from ten stretches of the record.",
         (*columns, "after") if repaired else columns,
         tuple(rows),
@@ -262,7 +275,7 @@ def cycle_harmonics(run: Run, unit: str, noise: float) -> Table | None:
         for h in found
     ]
     return Table(
-        f"Amplitudes of the limit cycle in {run.name}, and what the {BEFORE}{' (before) and the final one (after)' if repaired else ''} "
+        f"Amplitudes of the limit cycle in {run.name}, and what the {run.labels[0]}{' (before) and the final one (after)' if repaired else ''} "
         f"miss{'' if repaired else 'es'} of them; 95 % intervals by the measurement noise.",
         columns if repaired else (*columns[:2], "missed"),
         tuple(rows),

@@ -19,22 +19,40 @@ PHASES = 48  # parts of a cycle
 FEWEST = 16  # samples below which a record is not drawn
 
 
+@dataclass(frozen=True)
+class Compared:
+    """What of a record is compared with what a model says of it.
+
+    Parameters
+    ----------
+    quantity : "motion" or "effort"; errors are shares of it.
+    unit : of the quantity.
+    made : what a model does to come to it: "simulated" or "predicted".
+    bandwidth : frequency [Hz] below which it is compared; None where nothing is filtered.
+    """
+
+    quantity: str
+    unit: str
+    made: str = "simulated"
+    bandwidth: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A record and its free-run simulations.
+    """A record beside what models say of it: a free run's motion, or the effort that its motion needs.
 
     Attributes
     ----------
     name : of the record.
-    time, measured : float64[n] [s] and the output as it was compared (averaged over a few samples).
-    before : float64[n] output of the refitted nominal model; `after` of the augmented one, None where there is none.
-    position, velocity : float64[n] motion of the mass by the better model.
+    time, measured : float64[n] [s] and what was measured as it was compared (averaged over a few samples, or filtered).
+    before : float64[n] the same by the refitted nominal model; `after` by the augmented one, None where there is none.
+    position, velocity : float64[n] motion of the mass, by the better model or as it was measured.
     phase : float64[n] phase of the forcing's cycle, 0 <= phase < 1, or None without forcing.
     used : bool[n] samples that count: those the fit saw, or, where `heldout`, those it never saw.
     hidden : bool[n] samples of a record that the fit was not shown although it saw the rest.
     heldout : whether no fit has seen this record.
     quiet : whether nothing but the forcing drove the machine.
-    size : what an error is a share of, where that is not the measured motion [the output's unit]; `whole` names it.
+    size : what an error is a share of, where that is not the standard deviation of `measured` [its unit].
     labels : what `before` and `after` are called in figures.
     """
 
@@ -51,13 +69,12 @@ class Run:
     heldout: bool = False
     quiet: bool = False
     size: float | None = None
-    whole: str = "motion"
     labels: tuple[str, str] = ("refitted nominal model", "with the added effect")
 
     def residual(self, which: Which) -> Array:
-        """Measured minus simulated, float64[n]."""
-        simulated = self.after if which == "after" and self.after is not None else self.before
-        return self.measured - simulated
+        """Measured minus what the model says, float64[n]."""
+        said = self.after if which == "after" and self.after is not None else self.before
+        return self.measured - said
 
     @property
     def step(self) -> float:
@@ -67,7 +84,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Error:
-    """rms of a residual, the same as a share of the motion's standard deviation (or of the run's `size`), and the half-width
+    """rms of a residual, the same as a share of the standard deviation of what was measured (or of the run's `size`), and the half-width
     of the 95 % interval of that ratio: how much it would differ in another stretch of the same kind."""
 
     rms: float

@@ -65,7 +65,7 @@ def compared_parameters(
     columns = ("parameter", "nominal model", "nominal model, refitted")
     caption = "Parameters with 95 % intervals."
     if augmented is not None:
-        columns += ("with the added effect", "change by the effect")
+        columns += ("final model", "change")
         caption += (
             " The last column tells by how much the refit of the nominal model had been bent to make up for what it "
             "lacks. Shaded rows are new."
@@ -101,9 +101,7 @@ def delays_section(delays: Mapping[str, Any], before: Mapping[str, Any] | None =
     if not rows:
         return Section("Delays", (Paragraph("The model has no delay, so none was estimated."),))
     columns = (
-        ("delay", "final model")
-        if before is None
-        else ("delay", "nominal model, refitted", "with the added effect")
+        ("delay", "final model") if before is None else ("delay", "nominal model, refitted", "final model")
     )
     blocks: list[Block] = [Table("Delays with 95 % intervals.", columns, tuple(rows))]
     assumption = str(delays.get("assumption") or "")

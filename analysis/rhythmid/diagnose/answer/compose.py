@@ -86,9 +86,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         )
     return Diagnosis(
         verdict=decision.verdict,
-        summary=summary_of(
-            decision, missing, plain, augmented, "motion", _freed(case.nominal, result)
-        ),
+        summary=summary_of(decision, missing, plain, augmented, "motion", _freed(case.nominal, result)),
         detection=Detection(
             found.rounds[0].p_value,
             _nominal_error(case.nominal, found.nominal, found.noise),

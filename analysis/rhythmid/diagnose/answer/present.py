@@ -10,8 +10,9 @@ from scipy.stats import chi2 as chi2_distribution
 from rhythmid.compare.compare import Comparison, run_of
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.diagnosis import Answer
+from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.diagnose.location import Dependence
-from rhythmid.diagnose.search.forward import LEVEL, WORTH, Search
+from rhythmid.diagnose.search.forward import LEVEL, Search
 from rhythmid.elements.element import SLOTS
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import record_of
@@ -27,13 +28,19 @@ from rhythmid.report.diagnosis import diagnosis_page
 from rhythmid.report.findings import ElementScore, ElementWords, Findings, FreeFunction, TransferChange
 from rhythmid.report.page import Page
 from rhythmid.report.record_quality import quality_of
-from rhythmid.report.run import Run
+from rhythmid.report.run import Compared, Run
 from rhythmid.simulation.simulate import physical_times
 
 Array = NDArray[np.float64]
 INDICES = (0, -1, 1, -2, 2)  # transfer functions that are compared
 RARE = 0.02  # share of the motion at either end where a free function is poorly known
 POINTS = 240  # of a transfer function
+REFITTED = "refitted nominal model"
+CHANGED: dict[Kind, str] = {  # what the final model is called beside it, by the kind of the chosen hypothesis
+    "freed_value": "with the value set free",
+    "delay": "with a longer delay",
+    "free_map": "with a free law",
+}
 
 
 def present(
@@ -76,13 +83,15 @@ def findings(
     """What the report shows, as plain data; arguments as for `present`."""
     result, found = answer.result, answer.result.search
     pumpings = {id(record): active_pumping(record) for record in (*records, *holdout)}
-    runs = _runs(found.nominal, found.fit, {r.name: pumpings[id(r)] for r in records}, bool(found.best.added))
+    chosen = result.selection.chosen
+    labels = (REFITTED, CHANGED.get(chosen.kind, "with the added effect"))
+    seen = {record.name: pumpings[id(record)] for record in records}
+    runs = _runs(found.nominal, found.fit, seen, bool(found.best.added), labels)
     if result.unseen_nominal is not None:
         after = result.unseen_augmented or result.unseen_nominal
         repaired = bool(found.best.added) and result.unseen_augmented is not None
-        runs += _runs(
-            result.unseen_nominal, after, {r.name: pumpings[id(r)] for r in holdout}, repaired, heldout=True
-        )
+        unseen = {record.name: pumpings[id(record)] for record in holdout}
+        runs += _runs(result.unseen_nominal, after, unseen, repaired, labels, heldout=True)
     models = {"Nominal model": nominal.to_yaml(), "Nominal model, refitted": found.nominal.model.to_yaml()}
     if found.best.added:
         models["Augmented model"] = answer.model.to_yaml()
@@ -95,8 +104,11 @@ def findings(
             slot: tuple(t.element.name for t in nominal.terms if t.element.slot == slot) for slot in SLOTS
         },
         forced=any(one.forcing is not None for one in result.series),
+        compared=Compared("motion", nominal.units.position),
         runs=tuple(runs),
+        chosen=chosen.names,
         output_unit=nominal.units.position,
+        force_unit=nominal.units.force,
         noise=repeats.variance**0.5 if repeats else None,
         slow_noise=(repeats or noise_of(found.fit.residuals, found.fit.run.series)).long_run_variance ** 0.5,
         scores=_scores(found),
@@ -114,7 +126,6 @@ def findings(
         words=_words(answer, nominal),
         command=command,
         models=models,
-        worth=WORTH,
         at_bound=found.fit.at_bound,
         unconverged=tuple(_names(trial.model, trial.added) for trial in found.trials if not trial.converged),
         hints=_hints(answer),
@@ -128,7 +139,12 @@ def _listed(names: Sequence[str], most: int = 4) -> str:
 
 
 def _runs(
-    before: Fit, after: Fit, pumpings: Mapping[str, Pumping | None], repaired: bool, heldout: bool = False
+    before: Fit,
+    after: Fit,
+    pumpings: Mapping[str, Pumping | None],
+    repaired: bool,
+    labels: tuple[str, str],
+    heldout: bool = False,
 ) -> list[Run]:
     """Every series of the fits beside its simulations; they were fitted to the same series.
 
@@ -158,6 +174,7 @@ def _runs(
                 hidden=np.zeros_like(one.used) if heldout else _hidden(one),
                 heldout=heldout,
                 quiet=_quiet(one),
+                labels=labels,
             )
         )
     return found

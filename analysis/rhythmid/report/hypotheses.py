@@ -1,0 +1,132 @@
+"""What else might be missing: all hypotheses by their evidence, and what speaks against those that are not believed."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rhythmid.report.blocks import Block, Bullets, Drawing, Fold, Heading, Paragraph, Section, Table
+from rhythmid.report.findings import Findings
+from rhythmid.report.quantity import number, percent, plain, plus_minus, pretty_name, probability
+from rhythmid.report.row_chart import Bar, draw_bars
+
+HYPOTHESES_SHOWN, REJECTIONS_SHOWN, SCORES_SHOWN = 12, 12, 12
+KINDS = {
+    "nominal": "nothing is missing",
+    "effects": "effects are missing",
+    "freed_value": "a value held fixed is wrong",
+    "delay": "the delay is longer",
+    "location": "the effect is in another place",
+    "free_map": "an unknown law",
+}
+
+
+def hypotheses_section(found: Findings) -> Section:
+    """The hypotheses, the best first, and the score tests from which they came."""
+    rows: Sequence[Mapping[str, Any]] = found.result["hypotheses"]
+    chosen = sorted(found.chosen)
+    against = {tuple(sorted(row["hypothesis"])) for row in found.result["rejections"]}
+    blocks: list[Block] = [
+        Paragraph(
+            "Each hypothesis is a model that was fitted to the records. It is scored by how well it predicts stretches of them that its "
+            "fit did not see; models that differ by less than about two standard errors predict equally well."
+        )
+    ]
+    columns = ("hypothesis", "it says", "predicts worse by", "probability", "held-out error", "")
+    table = [_row(found, row, chosen, against) for row in rows]
+    marked = [index for index, row in enumerate(rows) if sorted(row["elements"]) == chosen]
+    caption = (
+        "Predicts worse by: difference of the logarithm of the predictive density to the best hypothesis, ± one standard error over "
+        "stretches of the records. The probabilities divide the evidence among hypotheses with no more effects than the chosen one."
+    )
+    first = tuple(index for index in marked if index < HYPOTHESES_SHOWN)
+    blocks.append(Table(caption, columns, tuple(table[:HYPOTHESES_SHOWN]), first))
+    if len(table) > HYPOTHESES_SHOWN:
+        every = Table("All hypotheses, the best first.", columns, tuple(table), tuple(marked))
+        blocks.append(Fold(f"All {len(table)} hypotheses", (every,)))
+    if found.result["excluded"]:
+        blocks += [Heading("Could not be tried"), Bullets(tuple(map(plain, found.result["excluded"])))]
+    return Section("The hypotheses", (*blocks, *_scores(found)))
+
+
+def _named(found: Findings, elements: Sequence[str]) -> str:
+    return " + ".join(map(found.title, elements)) or "nominal model alone"
+
+
+def _row(
+    found: Findings,
+    row: Mapping[str, Any],
+    chosen: Sequence[str],
+    against: set[tuple[str, ...]],
+) -> tuple[str, ...]:
+    elements = tuple(row["elements"])
+    name = _named(found, elements)
+    if elements in found.unconverged:
+        name += " (refit did not settle)"
+    behind = "best"
+    if row["score_difference"]:
+        behind = plus_minus(row["score_difference"], row["standard_error"] or 0.0)
+    said = "not believed, see below" if tuple(sorted(elements)) in against else ""
+    if sorted(elements) == chosen:
+        said = "chosen"
+    kind = KINDS.get(row["kind"], pretty_name(row["kind"]))
+    return name, kind, behind, probability(row["probability"]), percent(row["heldout_nrmse"]), said
+
+
+def _scores(found: Findings) -> list[Block]:
+    """The score tests of all elements; nothing where none were made."""
+    shown = found.scores[:SCORES_SHOWN]
+    if not shown:
+        return []
+    best = {effect["element"] for effect in found.result["missing"]}
+    bars = [
+        Bar(
+            found.title(one.element),
+            one.statistic,
+            number(one.statistic, 3),
+            "after" if one.element in best else "measured",
+            one.element in best,
+        )
+        for one in shown
+    ]
+    figure = Drawing(
+        f"The {len(shown)} best scores of {len(found.scores)} elements",
+        draw_bars(
+            "Best scores: " + ", ".join(f"{bar.label} {bar.text}" for bar in bars),
+            bars,
+            found.threshold,
+            "chance",
+        ),
+        "Every element of the catalogue was scored against the mismatch, and the most promising became hypotheses: χ² of each "
+        "element's best first guess. Related laws score alike; the hypotheses above tell them apart. Dotted line: what chance "
+        "reaches once in a hundred diagnoses.",
+    )
+    listed = Table(
+        "All elements that were scored.",
+        ("element", "slot", "score χ²"),
+        tuple((found.title(one.element), one.slot, number(one.statistic, 3)) for one in found.scores),
+    )
+    return [figure, Fold(f"All {len(found.scores)} elements", (listed,))]
+
+
+def rejections_section(found: Findings) -> Section:
+    """What speaks against hypotheses, one row for each rule that rejects one."""
+    rejections: Sequence[Mapping[str, Any]] = found.result["rejections"]
+    title = "What is not believed, and why"
+    if not rejections:
+        return Section(title, (Paragraph("No rule speaks against any of the hypotheses."),))
+    columns = ("hypothesis", "rule", "statistic", "least", "reason")
+    rows = tuple(
+        (
+            _named(found, row["hypothesis"]),
+            pretty_name(row["name"]),
+            number(row["statistic"], 3),
+            number(row["threshold"], 3),
+            str(row["reason"]),
+        )
+        for row in rejections
+    )
+    caption = "A rule rejects a hypothesis whose statistic is below the least that it asks for."
+    blocks: list[Block] = [Table(caption, columns, rows[:REJECTIONS_SHOWN])]
+    if len(rows) > REJECTIONS_SHOWN:
+        every = Table(f"{caption} All rejections.", columns, rows)
+        blocks.append(Fold(f"All {len(rows)} rejections", (every,)))
+    return Section(title, tuple(blocks))
