@@ -15,7 +15,7 @@ from rhythmid.report.findings import ElementScore, ElementWords, Findings, FreeF
 from rhythmid.report.identification import comparison_section, identification_page
 from rhythmid.report.page import Page, render, write_page
 from rhythmid.report.record_quality import RecordQuality
-from rhythmid.report.run import Run
+from rhythmid.report.run import Compared, Run
 
 EVIL = '</title><img src=x onerror="alert(1)">'
 
@@ -64,7 +64,7 @@ def result(
         "inertia.mass": estimate(1.0, 0.0, "kg"),
     }
     effect = {
-        "element": element, "slot": slot, "equation": "F = −F_c sgn v", "probability": 0.98,
+        "element": element, "slot": slot, "equation": "F = −F_c sgn v", "share": 0.93, "probability": 0.98,
         "parameters": {"force": estimate(0.05, 1e-3, "N")},
     }  # fmt: skip
     return {
@@ -73,6 +73,7 @@ def result(
         "detection": {"p_value": 1e-9, "nominal_nrmse": 0.3, "refitted_nominal_nrmse": 0.05, "noise_floor_nrmse": 0.004},
         "location": {"slot": slot if named else None, "where": "in the balance of forces", "evidence": ["best score in slot force: chi2 = 100"]},
         "missing": [effect] if named else [],
+        "joint_probability": 0.97 if named else 0.0,
         "indistinguishable": [["coulomb_friction", "stribeck_friction"]] if named else [],
         "alternatives": [
             {"elements": ["stribeck_friction"], "delta_bic": 3.0, "heldout_nrmse": 0.005},
@@ -88,10 +89,31 @@ def result(
         "calibration": ["linear_spring.stiffness: 180 in the nominal model, 200 ± 0.1 N/m in the records"],
         "excluded": ["second_mode: the model diverges"],
         "heldout": "held out: h1",
-        "remainder": None,
-        "scoring": "free run",
+        "hypotheses": [
+            hypothesis("effects", 0.0, 0.98, [element]), hypothesis("effects", 12.0, 0.02, ["stribeck_friction"]),
+            hypothesis("freed_value", 300.0, 0.0, ["inertia.mass"]), hypothesis("nominal", 400.0, 0.0, []),
+        ],
+        "rejections": [
+            {"hypothesis": ["stribeck_friction"], "name": "within_bounds", "statistic": 0.0, "threshold": 1e-3, "reason": "the effect has become the limit of another one"},
+            {"hypothesis": ["inertia.mass"], "name": "share_of_rest", "statistic": None, "threshold": 0.2, "reason": "so small a part belongs to something else"},
+        ],
+        "remainder": {"share": 0.0, "significant": False, "goes_with": None, "curve": None},
+        "scoring": {"kind": "free_run", "bandwidth": None, "reason": "the model follows the machine in free run"},
+        "assumptions": ["the forcing acts undelayed on the mass"],
         "notes": [],
     }  # fmt: skip
+
+
+def hypothesis(kind: str, worse: float, probability: float, elements: list[str]) -> dict[str, Any]:
+    return {
+        "elements": elements, "kind": kind, "score": 1000.0 - worse, "score_difference": worse, "standard_error": 0.1 * worse,
+        "probability": probability, "heldout_nrmse": None if kind == "nominal" else 0.01,
+    }  # fmt: skip
+
+
+REMAINDER = {
+    "share": 0.07, "significant": True, "goes_with": "velocity", "curve": {"grid": [-0.1, 0.0, 0.1], "force": [-0.2, 0.0, 0.2]},
+}  # fmt: skip
 
 
 def findings(told: dict[str, Any], name: str = "run 1", forced: bool = True) -> Findings:
@@ -118,8 +140,11 @@ def findings(told: dict[str, Any], name: str = "run 1", forced: bool = True) -> 
         source=f"nominal.yaml against {name}",
         slots={"force": ("gravity", "linear_spring"), "command": ("input_delay",)},
         forced=forced,
+        compared=Compared("motion", "m"),
         runs=(run, replace(run, name="h1", heldout=True)),
+        chosen=tuple(effect["element"] for effect in told["missing"]),
         output_unit="m",
+        force_unit="N",
         noise=1e-5,
         slow_noise=1e-5,
         scores=(ElementScore("coulomb_friction", "force", 100.0), ElementScore("sensor_lag", "sensor", 7.0)),
@@ -139,9 +164,32 @@ def findings(told: dict[str, Any], name: str = "run 1", forced: bool = True) -> 
         },
         command=f"rhythmid diagnose {name}",
         models={"Nominal model": "inertia: {}\n"},
-        worth=10.0,
         hints=(("coulomb_friction", "stribeck_friction", "dwell at low speed"),),
     )
+
+
+def by_effort() -> Findings:
+    """Findings of an answer that was scored by effort: what belongs to free runs is absent."""
+    told = result() | {
+        "scoring": {"kind": "effort", "bandwidth": 12.0, "reason": "a controller holds the machine"},
+        "remainder": REMAINDER | {"goes_with": "load"},
+        "delays": {},
+    }
+    told["detection"] = told["detection"] | {"p_value": None, "nominal_nrmse": None}
+    made = findings(told)
+    run = replace(made.runs[0], phase=None, size=0.02)
+    return Findings(
+        told, made.source, made.slots, False, Compared("effort", "N", "predicted", 12.0), (run,), made.chosen, "m", "N",
+        made.nominal, made.refitted, made.records, made.words, made.command, made.models,
+    )  # fmt: skip
+
+
+def rows_with(html: str, *texts: str) -> list[str]:
+    """Text of the rows of all tables that hold any of these texts."""
+    rows = [
+        re.sub(r"\s", " ", re.sub("<[^>]+>", " ", row)) for row in re.findall("<tr.*?</tr>", html, re.DOTALL)
+    ]
+    return [row for row in rows if any(text in row for text in texts)]
 
 
 def identified() -> dict[str, Any]:
@@ -165,16 +213,9 @@ def pages() -> list[tuple[str, Page]]:
         (verdict, diagnosis_page(findings(result(verdict))))
         for verdict in ("consistent", "missing_physics", "undecided")
     ]
-    unknown = result("unknown_physics") | {
-        "remainder": {
-            "quantity": "velocity",
-            "explained": 0.4,
-            "p_value": 1e-20,
-            "grid": [0.0],
-            "force": [0.0],
-        }
-    }
+    unknown = result("unknown_physics") | {"remainder": REMAINDER}
     made.append(("unknown_physics", diagnosis_page(findings(unknown))))
+    made.append(("effort", diagnosis_page(by_effort())))
     made.append(("unforced", diagnosis_page(findings(result(), forced=False))))
     made.append(
         (
@@ -246,25 +287,82 @@ def test_the_verdict_comes_first(verdict: str, heading: str) -> None:
     assert html.index("<h1>") < html.index("<nav") < html.index("<section")
 
 
-def test_only_a_settled_name_comes_with_its_probability() -> None:
-    assert "such a name is right in" in render(diagnosis_page(findings(result())))
-    assert "such a name is right in" not in render(diagnosis_page(findings(result("unknown_physics"))))
+def test_only_names_that_the_answer_stands_by_come_with_their_probability_in_the_head() -> None:
+    assert "probability of this name" in render(diagnosis_page(findings(result())))
+    assert "probability of this name" not in render(diagnosis_page(findings(result("unknown_physics"))))
+
+
+def test_hypotheses_stand_with_how_much_worse_they_predict_and_how_sure_that_is() -> None:
+    html = render(diagnosis_page(findings(result())))
+    (table,) = (one for one in re.findall("<table.*?</table>", html, re.DOTALL) if "Predicts worse by" in one)
+    _, chosen, rival, freed, nominal = rows_with(table, "")
+    assert "chosen" in chosen and "best" in chosen and "98 %" in chosen
+    assert "not believed" in rival and "Stribeck friction" in rival
+    assert "12.0 ±" in rival and "1.2" in rival
+    assert "a value held fixed is wrong" in freed and "below 0.1" in freed
+    assert "400 ±" in nominal
+
+
+def test_rejections_stand_with_statistic_threshold_and_reason() -> None:
+    html = render(diagnosis_page(findings(result())))
+    (row,) = rows_with(html, "the effect has become the limit of another one")
+    assert "Stribeck friction" in row and "within bounds" in row and "0.001" in row
+
+
+def test_a_small_remainder_is_told_beside_names_that_stand() -> None:
+    html = render(diagnosis_page(findings(result() | {"remainder": REMAINDER})))
+    assert "explains 7\u202f% of what the nominal model leaves" in html
+    assert "The names stand all the same" in html
+
+
+def test_the_remainder_s_curve_is_drawn_where_no_free_function_was_simulated() -> None:
+    html = render(diagnosis_page(replace(findings(result() | {"remainder": REMAINDER}), functions=())))
+    assert "What is left over velocity" in html
+
+
+def test_an_answer_by_effort_shows_efforts_and_nothing_of_free_runs() -> None:
+    html = render(diagnosis_page(by_effort()))
+    for shown in (
+        "of the effort",
+        "measured − predicted [",
+        "Scored by effort",
+        "below 12 Hz",
+        "What is left over load",
+    ):
+        assert shown in html or shown in re.sub("<[^>]+>", "", html), shown
+    for absent in (
+        "free run",
+        "simulated output",
+        "Harmonics of the cycle",
+        "best scores of",
+        "Best score in each slot",
+        "of the motion",
+        "p-value",
+    ):
+        assert absent not in html, absent
+
+
+def test_a_value_that_was_set_free_is_not_called_an_effect() -> None:
+    told = result() | {"missing": [], "verdict": "undecided"}
+    made = findings(result())
+    runs = tuple(
+        replace(run, labels=("refitted nominal model", "with the value set free")) for run in made.runs
+    )
+    html = render(diagnosis_page(replace(made, result=told, runs=runs, chosen=("inertia.mass",))))
+    assert "with the value set free" in html and "added effect" not in html
+    (row,) = rows_with(html, "a value held fixed is wrong")
+    assert "chosen" in row
 
 
 def test_the_diagnosis_shows_all_that_it_promises() -> None:
     html = render(diagnosis_page(findings(result())))
     for promised in (
         "Where model and machine part", "What is missing", "How much better it fits", "What is left unexplained",
-        "Harmonics of the cycle", "The ranking", "Parameters", "Delays", "What remains unknown", "The next experiment",
+        "Harmonics of the cycle", "The hypotheses", "What is not believed, and why", "What was assumed", "Parameters", "Delays", "What remains unknown", "The next experiment",
         "Calibration", "Quality of the records", "How to reproduce this", "Could not be tried", "dwell at low speed",
         "the forcing acts undelayed", "1 (3 samples lost)", "rhythmid diagnose run 1", "friction force F<sub>c</sub>",
     ):  # fmt: skip
         assert promised in html, promised
-
-
-def test_a_richer_rival_is_not_called_rejected() -> None:
-    html = render(diagnosis_page(findings(result())))
-    assert "contains the chosen one, not needed" in html
 
 
 def test_the_parameters_table_shows_what_the_refit_had_bent() -> None:
@@ -329,5 +427,5 @@ def test_a_noise_level_that_is_not_known_is_not_shown() -> None:
 
 def test_an_unknown_effect_is_never_said_to_be_explained() -> None:
     html = render(diagnosis_page(findings(result("unknown_physics"))))
-    assert "leaves nothing that depends" not in html
+    assert "leaves nothing that a free function" not in html
     assert "seems to be" in html
