@@ -5,7 +5,7 @@ from typing import Any
 
 from rhythmid.report.blocks import Block, Bullets, Drawing, Fold, Heading, Paragraph, Section, Table
 from rhythmid.report.findings import Findings
-from rhythmid.report.quantity import number, percent, plain, plus_minus, pretty_name, probability
+from rhythmid.report.quantity import NONE, number, percent, plain, plus_minus, pretty_name, probability
 from rhythmid.report.row_chart import Bar, draw_bars
 
 HYPOTHESES_SHOWN, REJECTIONS_SHOWN, SCORES_SHOWN = 12, 12, 12
@@ -30,7 +30,7 @@ def hypotheses_section(found: Findings) -> Section:
             "fit did not see; models that differ by less than about two standard errors predict equally well."
         )
     ]
-    columns = ("hypothesis", "it says", "predicts worse by", "probability", "held-out error", "")
+    columns = ("hypothesis", "it says", "predicts worse by", "probability", "held-out error", "verdict")
     table = [_row(found, row, chosen, against) for row in rows]
     marked = [index for index, row in enumerate(rows) if sorted(row["elements"]) == chosen]
     caption = (
@@ -64,7 +64,7 @@ def _row(
     behind = "best"
     if row["score_difference"]:
         behind = plus_minus(row["score_difference"], row["standard_error"] or 0.0)
-    said = "not believed, see below" if tuple(sorted(elements)) in against else ""
+    said = "not believed, see below" if tuple(sorted(elements)) in against else NONE
     if sorted(elements) == chosen:
         said = "chosen"
     kind = KINDS.get(row["kind"], pretty_name(row["kind"]))
