@@ -136,13 +136,13 @@ def unknown_section(found: Findings) -> Section:
     verdict = found.result["verdict"]
     if left["significant"]:
         said = (
-            f"The final model leaves a mismatch that goes with {left['goes_with']}: a free function of it predicts unseen "
-            f"data better by more than chance, and explains {percent(left['share'])} of what the nominal model leaves unexplained."
+            f"The final model leaves {percent(left['share'])} of the mismatch, by more than chance. What is left goes with "
+            f"{left['goes_with']}."
         )
         said += (
             " The names stand all the same: they carry nearly all of it."
             if verdict == "missing_physics"
-            else " No element of the catalogue is this function."
+            else " The names do not explain that."
         )
     elif verdict == "unknown_physics":
         said = (

@@ -61,8 +61,8 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         rejections=result.selection.rejections,
         remainder=remainder,
         fit={"refitted_nominal": before, "augmented": after},
-        parameters=_parameters(chosen),
-        delays=_delays(chosen),
+        parameters=effort_parameters(chosen),
+        delays=effort_delays(chosen),
         next_experiment=_next_experiment(result),
         scoring=Scored("effort", result.applicability.bandwidth, result.applicability.reason),
         assumptions=(FIXED_SCALE, NO_SENSOR),
@@ -90,7 +90,8 @@ def _estimate(fitted: Fitted, name: str) -> Estimate:
     )
 
 
-def _parameters(fitted: Fitted) -> dict[str, Estimate]:
+def effort_parameters(fitted: Fitted) -> dict[str, Estimate]:
+    """All parameters of a fit, by name."""
     return {name: _estimate(fitted, name) for name in fitted.model.parameters}
 
 
@@ -109,11 +110,13 @@ def _missing(fitted: Fitted, label: str, result: EffortResult) -> MissingEffect:
 
 def _remainder(result: EffortResult) -> Remainder:
     left, found = result.decision.unexplained, result.remainder
-    curve = Curve(tuple(map(float, found.curves[0].value)), tuple(map(float, found.curves[0].mean)))
+    curve = None
+    if left.significant:  # over the quantity that is named
+        curve = Curve(tuple(map(float, found.curves[0].value)), tuple(map(float, found.curves[0].mean)))
     return Remainder(left.share, left.significant, found.goes_with if left.significant else None, curve)
 
 
-def _delays(fitted: Fitted) -> dict:
+def effort_delays(fitted: Fitted) -> dict:
     """The alignment of effort and motion in time: the one delay that the effort shows."""
     late = {"value": fitted.fit.alignment, "std": float(fitted.fit.std[0]), "unit": "s"}
     return {

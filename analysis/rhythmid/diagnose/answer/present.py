@@ -8,12 +8,24 @@ from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 
 from rhythmid.compare.compare import Comparison, run_of
+from rhythmid.diagnose.answer.described import (
+    given_values,
+    hints_of,
+    labels_of,
+    listed,
+    qualities,
+    slots_of,
+    words_of,
+)
+from rhythmid.diagnose.answer.present_effort import effort_findings
+from rhythmid.diagnose.answer.result import Diagnosis
+from rhythmid.diagnose.baseline import causal
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.diagnosis import Answer
-from rhythmid.diagnose.hypothesis import Kind
+from rhythmid.diagnose.free_run import FreeRunResult
 from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.forward import LEVEL, Search
-from rhythmid.elements.element import SLOTS
+from rhythmid.elements.element import Element
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import record_of
 from rhythmid.identify.output_error import Fit, noise_of
@@ -25,7 +37,7 @@ from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.report.comparison import comparison_page, comparison_section
 from rhythmid.report.diagnosis import diagnosis_page
-from rhythmid.report.findings import ElementScore, ElementWords, Findings, FreeFunction, TransferChange
+from rhythmid.report.findings import ElementScore, Findings, FreeFunction, TransferChange
 from rhythmid.report.page import Page
 from rhythmid.report.record_quality import quality_of
 from rhythmid.report.run import Compared, Run
@@ -35,12 +47,6 @@ Array = NDArray[np.float64]
 INDICES = (0, -1, 1, -2, 2)  # transfer functions that are compared
 RARE = 0.02  # share of the motion at either end where a free function is poorly known
 POINTS = 240  # of a transfer function
-REFITTED = "refitted nominal model"
-CHANGED: dict[Kind, str] = {  # what the final model is called beside it, by the kind of the chosen hypothesis
-    "freed_value": "with the value set free",
-    "delay": "with a longer delay",
-    "free_map": "with a free law",
-}
 
 
 def present(
@@ -57,7 +63,12 @@ def present(
     `nominal`, `records` and `holdout` are what `diagnose` was given, `command` the command line, `name` the nominal model's;
     a `comparison` with a simulation is put first.
     """
-    page = diagnosis_page(findings(answer, nominal, records, holdout, command, name))
+    result = answer.result
+    if isinstance(result, FreeRunResult):
+        found = findings(answer.diagnosis, result, nominal, records, holdout, command, name)
+    else:
+        found = effort_findings(answer.diagnosis, result, nominal, records, holdout, command, name)
+    page = diagnosis_page(found)
     if comparison is None:
         return page
     section = comparison_section(comparison.to_dict(), run_of(comparison), comparison.unit)
@@ -73,18 +84,20 @@ def present_comparison(
 
 
 def findings(
-    answer: Answer,
+    diagnosis: Diagnosis,
+    result: FreeRunResult,
     nominal: Model,
     records: Sequence[Record],
     holdout: Sequence[Record] = (),
     command: str = "",
     name: str = "the nominal model",
 ) -> Findings:
-    """What the report shows, as plain data; arguments as for `present`."""
-    result, found = answer.result, answer.result.search
+    """What the report shows of a free run or of windows, as plain data; arguments as for `present`."""
+    found = result.search
     pumpings = {id(record): active_pumping(record) for record in (*records, *holdout)}
     chosen = result.selection.chosen
-    labels = (REFITTED, CHANGED.get(chosen.kind, "with the added effect"))
+    labels = labels_of(chosen.kind)
+    elements = _elements(found, nominal)
     seen = {record.name: pumpings[id(record)] for record in records}
     runs = _runs(found.nominal, found.fit, seen, bool(found.best.added), labels)
     if result.unseen_nominal is not None:
@@ -94,15 +107,13 @@ def findings(
         runs += _runs(result.unseen_nominal, after, unseen, repaired, labels, heldout=True)
     models = {"Nominal model": nominal.to_yaml(), "Nominal model, refitted": found.nominal.model.to_yaml()}
     if found.best.added:
-        models["Augmented model"] = answer.model.to_yaml()
+        models["Augmented model"] = causal(found.fit.model).to_yaml()
     count = max(len(found.rounds[0].scores), 1)
     repeats = noise_from_repeats(list(found.fit.run.series))
     return Findings(
-        result=answer.diagnosis.to_dict(),
-        source=f"{name} against {_listed([r.name for r in records])}",
-        slots={
-            slot: tuple(t.element.name for t in nominal.terms if t.element.slot == slot) for slot in SLOTS
-        },
+        result=diagnosis.to_dict(),
+        source=f"{name} against {listed([r.name for r in records])}",
+        slots=slots_of(nominal),
         forced=any(one.forcing is not None for one in result.series),
         compared=Compared("motion", nominal.units.position),
         runs=tuple(runs),
@@ -117,25 +128,17 @@ def findings(
         transfer=_transfer(
             found, [p for r in records if (p := pumpings[id(r)]) is not None], result.series, nominal
         ),
-        nominal={n: {"value": v.value, "std": None, "unit": v.unit} for n, v in nominal.parameters.items()},
+        nominal=given_values(nominal),
         refitted=_estimates(found.nominal),
         refitted_delays=delays_of(found.nominal),
-        records=tuple(
-            quality_of(r, role) for group, role in ((records, "fit"), (holdout, "held out")) for r in group
-        ),
-        words=_words(answer, nominal),
+        records=qualities(records, holdout),
+        words=words_of(elements),
         command=command,
         models=models,
         at_bound=found.fit.at_bound,
         unconverged=tuple(_names(trial.model, trial.added) for trial in found.trials if not trial.converged),
-        hints=_hints(answer),
+        hints=hints_of(diagnosis.indistinguishable, elements),
     )
-
-
-def _listed(names: Sequence[str], most: int = 4) -> str:
-    if len(names) > most:
-        return f"{', '.join(names[: most - 1])} and {len(names) - most + 1} more records"
-    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
 
 
 def _runs(
@@ -286,29 +289,8 @@ def _names(model: Model, labels: Sequence[str]) -> tuple[str, ...]:
     return tuple(term.element.name for label in labels if (term := model.term(label)) is not None)
 
 
-def _words(answer: Answer, nominal: Model) -> dict[str, ElementWords]:
+def _elements(found: Search, nominal: Model) -> list[Element]:
+    """The elements that a report may mention."""
     elements = [term.element for term in nominal.terms]
-    elements += [score.element for score in answer.result.search.rounds[0].scores]
-    elements += [term.element for trial in answer.result.search.trials for term in trial.model.terms]
-    return {
-        e.name: ElementWords(
-            e.title,
-            {p.name: p.description for p in e.parameters},
-            e.special_case_of,
-            e.also_known_as,
-            e.reference,
-        )
-        for e in elements
-    }
-
-
-def _hints(answer: Answer) -> tuple[tuple[str, str, str], ...]:
-    """What tells the members of the families apart, by the elements' own account."""
-    known = {t.element.name: t.element for trial in answer.result.search.trials for t in trial.model.terms}
-    made = []
-    for group in answer.diagnosis.indistinguishable:
-        for name in group:
-            for other, words in known[name].confusable.items() if name in known else ():
-                if other in group:
-                    made.append((name, other, words))
-    return tuple(made)
+    elements += [score.element for score in found.rounds[0].scores]
+    return elements + [term.element for trial in found.trials for term in trial.model.terms]

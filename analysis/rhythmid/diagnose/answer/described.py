@@ -1,0 +1,73 @@
+"""What a report says of the nominal model and of the catalogue's elements, however the records were scored."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from rhythmid.diagnose.hypothesis import Kind
+from rhythmid.elements.element import SLOTS, Element
+from rhythmid.model import Model
+from rhythmid.record.record import Record
+from rhythmid.report.findings import ElementWords
+from rhythmid.report.record_quality import RecordQuality, quality_of
+
+REFITTED = "refitted nominal model"
+CHANGED: dict[Kind, str] = {  # what the final model is called beside it, by the kind of the chosen hypothesis
+    "freed_value": "with the value set free",
+    "delay": "with a longer delay",
+    "free_map": "with a free law",
+}
+
+
+def labels_of(kind: Kind) -> tuple[str, str]:
+    """What the models before and after are called in figures."""
+    return REFITTED, CHANGED.get(kind, "with the added effect")
+
+
+def listed(names: Sequence[str], most: int = 4) -> str:
+    """Names in words, the last of very many only counted."""
+    if len(names) > most:
+        return f"{', '.join(names[: most - 1])} and {len(names) - most + 1} more records"
+    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
+
+
+def slots_of(nominal: Model) -> dict[str, tuple[str, ...]]:
+    """The nominal model's elements by slot."""
+    return {slot: tuple(t.element.name for t in nominal.terms if t.element.slot == slot) for slot in SLOTS}
+
+
+def given_values(nominal: Model) -> dict[str, dict[str, float | str | None]]:
+    """The nominal model's parameters as its file has them."""
+    return {n: {"value": v.value, "std": None, "unit": v.unit} for n, v in nominal.parameters.items()}
+
+
+def qualities(records: Sequence[Record], holdout: Sequence[Record]) -> tuple[RecordQuality, ...]:
+    """Quality of the fitted and of the held-out records."""
+    roles = ((records, "fit"), (holdout, "held out"))
+    return tuple(quality_of(one, role) for group, role in roles for one in group)
+
+
+def words_of(elements: Iterable[Element]) -> dict[str, ElementWords]:
+    """What the catalogue says of these elements, by name."""
+    return {
+        e.name: ElementWords(
+            e.title,
+            {p.name: p.description for p in e.parameters},
+            e.special_case_of,
+            e.also_known_as,
+            e.reference,
+        )
+        for e in elements
+    }
+
+
+def hints_of(
+    groups: Sequence[Sequence[str]], elements: Iterable[Element]
+) -> tuple[tuple[str, str, str], ...]:
+    """What tells the members of these groups apart, by the elements' own account."""
+    known: Mapping[str, Element] = {element.name: element for element in elements}
+    made = []
+    for group in groups:
+        for name in group:
+            for other, words in known[name].confusable.items() if name in known else ():
+                if other in group:
+                    made.append((name, other, words))
+    return tuple(made)
