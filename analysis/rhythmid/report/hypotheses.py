@@ -31,7 +31,8 @@ def hypotheses_section(found: Findings) -> Section:
         )
     ]
     columns = ("hypothesis", "it says", "predicts worse by", "probability", "held-out error", "verdict")
-    table = [_row(found, row, chosen, against) for row in rows]
+    weighed = max((len(row["elements"]) for row in rows if row["probability"] > 0.0), default=0)
+    table = [_row(found, row, chosen, against, weighed) for row in rows]
     marked = [index for index, row in enumerate(rows) if sorted(row["elements"]) == chosen]
     caption = (
         "Predicts worse by: difference of the logarithm of the predictive density to the best hypothesis, ± one standard error over "
@@ -56,6 +57,7 @@ def _row(
     row: Mapping[str, Any],
     chosen: Sequence[str],
     against: set[tuple[str, ...]],
+    weighed: int,
 ) -> tuple[str, ...]:
     elements = tuple(row["elements"])
     name = _named(found, elements)
@@ -67,8 +69,9 @@ def _row(
     said = "not believed, see below" if tuple(sorted(elements)) in against else NONE
     if sorted(elements) == chosen:
         said = "chosen"
+    chance = probability(row["probability"]) if len(elements) <= weighed else NONE
     kind = KINDS.get(row["kind"], pretty_name(row["kind"]))
-    return name, kind, behind, probability(row["probability"]), percent(row["heldout_nrmse"]), said
+    return name, kind, behind, chance, percent(row["heldout_nrmse"]), said
 
 
 def _scores(found: Findings) -> list[Block]:

@@ -6,12 +6,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from rhythmid.diagnose.answer.result import Diagnosis, Estimate, MissingEffect, Remainder, Scored
+from rhythmid.diagnose.answer.result import Diagnosis, Estimate, Explanation, MissingEffect, Remainder, Scored
 from rhythmid.diagnose.rejections import Rejection
 
 HYPOTHESES_SHOWN = 6
 REJECTIONS_SHOWN = 5
 NOMINAL = "nominal model"
+NONE = "—"
 LEAST = 1e-3  # probability, of itself or of the contrary, below which only that is told
 
 
@@ -21,6 +22,8 @@ def show(found: Diagnosis, console: Console) -> None:
     lines.told(found.verdict.replace("_", " "), found.summary)
     lines.said("where", found.location.where)
     for effect in found.missing:
+        sizes = f"probability {_probability(effect.probability)}, {_percent(effect.share)} of the mismatch"
+        lines.told(effect.element, f"{effect.equation}   ({sizes})")
         console.print(_parameters(effect))
     if len(found.missing) > 1:
         lines.said("all of these names together", _probability(found.joint_probability))
@@ -31,12 +34,12 @@ def show(found: Diagnosis, console: Console) -> None:
     lines.said("left", remainder_words(found.remainder))
     lines.said("scored", scoring_words(found.scoring))
     for name, fit in found.fit.items():
-        held = "—" if fit.heldout_nrmse is None else f"{fit.heldout_nrmse:.5f}"
+        held = NONE if fit.heldout_nrmse is None else f"{fit.heldout_nrmse:.5f}"
         lines.said(name.replace("_", " "), f"NRMSE {fit.train_nrmse:.5f} seen, {held} held out")
     for label, group in (
         ("assumption", found.assumptions),
         ("calibration", found.calibration),
-        ("excluded", found.excluded),
+        ("not tried", grouped(found.excluded)),
         ("note", found.notes),
     ):
         for line in group:
@@ -60,9 +63,7 @@ class _Lines:
 
 
 def _parameters(effect: MissingEffect) -> Table:
-    head = f"{effect.element}   {effect.equation}"
-    sizes = f"probability {_probability(effect.probability)}, {_percent(effect.share)} of the mismatch"
-    table = Table(title=escape(f"{head}   ({sizes})"))
+    table = Table()
     for column in ("parameter", "value", "std", "unit"):
         table.add_column(column)
     for name, value in effect.parameters.items():
@@ -71,11 +72,12 @@ def _parameters(effect: MissingEffect) -> Table:
 
 
 def _std(value: Estimate) -> str:
-    return "—" if value.std is None else f"{value.std:.2g}"
+    return NONE if value.std is None else f"{value.std:.2g}"
 
 
 def _hypotheses(found: Diagnosis) -> Table:
     shown = found.hypotheses[:HYPOTHESES_SHOWN]
+    weighed = most_weighed(found.hypotheses)
     table = Table(
         title=f"the {len(shown)} best of {len(found.hypotheses)} hypotheses, by their predictions of unseen data"
     )
@@ -84,15 +86,31 @@ def _hypotheses(found: Diagnosis) -> Table:
         table.add_column(column, justify="left" if column == "kind" else "right")
     for one in shown:
         behind = "best" if one.score_difference == 0.0 else _worse(one.score_difference, one.standard_error)
-        held = "—" if one.heldout_nrmse is None else f"{100.0 * one.heldout_nrmse:.3g} %"
+        held = NONE if one.heldout_nrmse is None else f"{100.0 * one.heldout_nrmse:.3g} %"
         table.add_row(
             escape(" + ".join(one.elements)) or NOMINAL,
             one.kind.replace("_", " "),
             behind,
-            _probability(one.probability),
+            _probability(one.probability) if len(one.elements) <= weighed else NONE,
             held,
         )
     return table
+
+
+def most_weighed(hypotheses: Sequence[Explanation]) -> int:
+    """Number of effects beyond which hypotheses have no probability: they are not among those that share the evidence."""
+    return max((len(one.elements) for one in hypotheses if one.probability > 0.0), default=0)
+
+
+def grouped(excluded: Sequence[str]) -> list[str]:
+    """Lines "name: reason", one for each reason with all its names."""
+    names: dict[str, list[str]] = {}
+    for line in excluded:
+        name, _, reason = line.partition(": ")
+        names.setdefault(reason, []).append(name)
+    return [
+        f"{', '.join(group)}: {reason}" if reason else ", ".join(group) for reason, group in names.items()
+    ]
 
 
 def remainder_words(left: Remainder) -> str:
