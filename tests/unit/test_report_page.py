@@ -359,7 +359,7 @@ def test_the_diagnosis_shows_all_that_it_promises() -> None:
     for promised in (
         "Where model and machine part", "What is missing", "How much better it fits", "What is left unexplained",
         "Harmonics of the cycle", "The hypotheses", "What is not believed, and why", "What was assumed", "Parameters", "Delays", "What remains unknown", "The next experiment",
-        "Calibration", "Quality of the records", "How to reproduce this", "Could not be tried", "dwell at low speed",
+        "Calibration", "Quality of the records", "How to reproduce this", "What was not tried", "dwell at low speed",
         "the forcing acts undelayed", "1 (3 samples lost)", "rhythmid diagnose run 1", "friction force F<sub>c</sub>",
     ):  # fmt: skip
         assert promised in html, promised

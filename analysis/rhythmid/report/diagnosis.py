@@ -187,7 +187,7 @@ def _families(found: Findings) -> list[Block]:
     blocks: list[Block] = [Heading("What these records cannot tell apart")]
     for group in groups:
         names = [found.title(name) for name in group]
-        hints = [words for a, b, words in found.hints if {a, b} <= set(group)]
+        hints = dict.fromkeys(words for a, b, words in found.hints if {a, b} <= set(group))
         blocks.append(Paragraph(f"{' or '.join(names)}: one of these."))
         if hints:
             blocks.append(Bullets(tuple(f"to tell them apart: {words}" for words in hints)))

@@ -31,7 +31,7 @@ def hypotheses_section(found: Findings) -> Section:
         )
     ]
     columns = ("hypothesis", "it says", "predicts worse by", "probability", "held-out error", "verdict")
-    weighed = max((len(row["elements"]) for row in rows if row["probability"] > 0.0), default=0)
+    weighed = most_weighed([(row["elements"], row["probability"]) for row in rows])
     table = [_row(found, row, chosen, against, weighed) for row in rows]
     marked = [index for index, row in enumerate(rows) if sorted(row["elements"]) == chosen]
     caption = (
@@ -44,8 +44,28 @@ def hypotheses_section(found: Findings) -> Section:
         every = Table("All hypotheses, the best first.", columns, tuple(table), tuple(marked))
         blocks.append(Fold(f"All {len(table)} hypotheses", (every,)))
     if found.result["excluded"]:
-        blocks += [Heading("Could not be tried"), Bullets(tuple(map(plain, found.result["excluded"])))]
+        blocks += [
+            Heading("What was not tried"),
+            Bullets(tuple(map(plain, grouped(found.result["excluded"])))),
+        ]
     return Section("The hypotheses", (*blocks, *_scores(found)))
+
+
+def most_weighed(hypotheses: Sequence[tuple[Sequence[str], float]]) -> int:
+    """Number of effects beyond which hypotheses, given as (effects, probability), do not share in the evidence: they have no
+    probability."""
+    return max((len(effects) for effects, chance in hypotheses if chance > 0.0), default=0)
+
+
+def grouped(excluded: Sequence[str]) -> list[str]:
+    """Lines "name: reason" as one line for each reason, with all its names."""
+    names: dict[str, list[str]] = {}
+    for line in excluded:
+        name, _, reason = line.partition(": ")
+        names.setdefault(reason, []).append(name)
+    return [
+        f"{', '.join(group)}: {reason}" if reason else ", ".join(group) for reason, group in names.items()
+    ]
 
 
 def _named(found: Findings, elements: Sequence[str]) -> str:

@@ -126,7 +126,7 @@ def _dependences(found: Findings) -> Drawing | None:
             bars,
             full=100.0,
         ),
-        f"Share of the mismatch that a free function of each quantity explains in stretches it was not fitted to. {reading}",
+        f"Share of the mismatch that a free function of each quantity explains, beyond what chance would. {reading}",
     )
 
 

@@ -6,8 +6,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from rhythmid.diagnose.answer.result import Diagnosis, Estimate, Explanation, MissingEffect, Remainder, Scored
+from rhythmid.diagnose.answer.result import Diagnosis, Estimate, MissingEffect, Remainder, Scored
 from rhythmid.diagnose.rejections import Rejection
+from rhythmid.report.hypotheses import grouped, most_weighed
 
 HYPOTHESES_SHOWN = 6
 REJECTIONS_SHOWN = 5
@@ -77,7 +78,7 @@ def _std(value: Estimate) -> str:
 
 def _hypotheses(found: Diagnosis) -> Table:
     shown = found.hypotheses[:HYPOTHESES_SHOWN]
-    weighed = most_weighed(found.hypotheses)
+    weighed = most_weighed([(one.elements, one.probability) for one in found.hypotheses])
     table = Table(
         title=f"the {len(shown)} best of {len(found.hypotheses)} hypotheses, by their predictions of unseen data"
     )
@@ -95,22 +96,6 @@ def _hypotheses(found: Diagnosis) -> Table:
             held,
         )
     return table
-
-
-def most_weighed(hypotheses: Sequence[Explanation]) -> int:
-    """Number of effects beyond which hypotheses have no probability: they are not among those that share the evidence."""
-    return max((len(one.elements) for one in hypotheses if one.probability > 0.0), default=0)
-
-
-def grouped(excluded: Sequence[str]) -> list[str]:
-    """Lines "name: reason", one for each reason with all its names."""
-    names: dict[str, list[str]] = {}
-    for line in excluded:
-        name, _, reason = line.partition(": ")
-        names.setdefault(reason, []).append(name)
-    return [
-        f"{', '.join(group)}: {reason}" if reason else ", ".join(group) for reason, group in names.items()
-    ]
 
 
 def remainder_words(left: Remainder) -> str:
