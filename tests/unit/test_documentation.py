@@ -1,12 +1,16 @@
 """What the documents show works: every YAML block is read by the code that it is meant for."""
 
+import json
 import re
 import shutil
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
 import rhythmid
+from rhythmid.diagnose.answer.result import ANSWER, Diagnosis, schema
+from rhythmid.diagnose.rejections import table
 from rhythmid.experiment import Experiment
 from rhythmid.identify.drive import controlled
 from rhythmid.model import Model
@@ -52,11 +56,40 @@ def test_the_files_of_other_machines_are_read_and_fit_together(machine, tmp_path
     assert model.units.position == signals.channels["output"].unit.removesuffix("/s")
 
 
-@pytest.mark.parametrize("document", ["README.md", "docs/files.md", "docs/machines.md", "docs/real.md"])
+@pytest.mark.parametrize(
+    "document", ["README.md", "docs/files.md", "docs/machines.md", "docs/real.md", "docs/diagnose.md"]
+)
 def test_links_lead_to_files_that_exist(document):
     text = (ROOT / document).read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)#]+)\)", text):
         assert (ROOT / document).parent.joinpath(target).exists(), target
+
+
+def test_the_table_of_rejections_is_the_one_that_the_code_goes_by():
+    page = (ROOT / "docs" / "diagnose.md").read_text(encoding="utf-8")
+    found = re.search(r"<!-- rejections -->\n(.*?)\n<!-- /rejections -->", page, re.DOTALL)
+    assert found is not None and found[1] == table()
+
+
+def test_the_answer_that_is_shown_has_the_fields_of_a_diagnosis_and_no_others():
+    text = (ROOT / "docs" / "files.md").read_text(encoding="utf-8")
+    found = re.search(r"```json\n(.*?)```", text, re.DOTALL)
+    assert found is not None
+    shown = json.loads(found[1])
+    assert ANSWER.validate_python(shown).verdict == "missing_physics"
+    assert set(shown) == {one.name for one in fields(Diagnosis)}
+
+
+def test_the_schema_of_a_diagnosis_is_that_of_its_types():
+    written = (ROOT / "docs" / "schema" / "diagnose.schema.json").read_text(encoding="utf-8")
+    assert json.loads(written) == schema()
+
+
+def test_every_field_of_a_diagnosis_is_explained():
+    page = (ROOT / "docs" / "diagnose.md").read_text(encoding="utf-8")
+    explained = page.partition("## The JSON")[2].partition("\n## ")[0]
+    for one in fields(Diagnosis):
+        assert re.search(rf"`{one.name}[`.\[]", explained), one.name
 
 
 def test_the_packages_agree_about_their_version():

@@ -311,7 +311,7 @@ def test_rejections_stand_with_statistic_threshold_and_reason() -> None:
 
 def test_a_small_remainder_is_told_beside_names_that_stand() -> None:
     html = render(diagnosis_page(findings(result() | {"remainder": REMAINDER})))
-    assert "explains 7\u202f% of what the nominal model leaves" in html
+    assert "The final model leaves 7\u202f% of the mismatch, by more than chance" in html
     assert "The names stand all the same" in html
 
 
