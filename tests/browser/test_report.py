@@ -15,7 +15,7 @@ from rhythmid.report.page import write_page
 CANDIDATES = {"coulomb_friction", "cubic_stiffness", "flight_damping", "sensor_lag"}
 SECTIONS = (
     "Where model and machine part", "What is missing", "How much better it fits", "What is left unexplained",
-    "Harmonics of the cycle and transfer functions", "The ranking", "Parameters", "Delays", "What remains unknown",
+    "Harmonics of the cycle and transfer functions", "The hypotheses", "What is not believed, and why", "Parameters", "Delays", "What remains unknown",
     "The next experiment", "Calibration", "Quality of the records", "How to reproduce this",
 )  # fmt: skip
 EXPERIMENT = """

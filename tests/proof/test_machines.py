@@ -11,7 +11,8 @@ import pytest
 import twins
 from twins import Twin
 
-from rhythmid.diagnose.diagnosis import TIED_SENSOR, Answer, diagnose
+from rhythmid.diagnose.answer.compose_effort import NO_SENSOR
+from rhythmid.diagnose.diagnosis import Answer, diagnose
 from rhythmid.model import Model
 
 NAMED: dict[str, Callable[[], Twin]] = {
@@ -71,12 +72,13 @@ def test_a_machine_that_lacks_nothing_is_told_so(name):
     assert (result.verdict, result.missing) == ("consistent", ())
 
 
-def test_a_machine_that_integrates_is_scored_by_force_and_it_is_said():
+def test_a_machine_that_integrates_is_scored_by_effort_and_it_is_said():
     twin = twins.axis(friction=0.0, count=1, duration=6.0)
     answer = examined(twin)
-    assert "force" in answer.diagnosis.scoring and "integrates" in answer.diagnosis.scoring
-    assert TIED_SENSOR in answer.diagnosis.notes
-    assert answer.diagnosis.heldout == "held out: the last fifth of every record"
+    scored = answer.diagnosis.scoring
+    assert scored.kind == "effort" and scored.bandwidth is not None
+    assert NO_SENSOR in answer.diagnosis.assumptions
+    assert answer.diagnosis.heldout == "held out: every block of the records in its turn"
     assert answer.diagnosis.parameters["inertia.mass"].value == pytest.approx(2.0, rel=1e-3)
     assert answer.diagnosis.parameters["viscous_damper.damping"].value == pytest.approx(8.0, rel=1e-3)
 

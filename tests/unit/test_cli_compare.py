@@ -50,6 +50,9 @@ def test_two_bags_are_enough(rhythmid, bags):
     [
         ((), "give --model NOMINAL.yaml, --sim BAG, or both"),
         (("--sim", "sim", "--save-model", "x.yaml"), "belong to a model"),
+        (("--sim", "sim", "--budget", "10"), "belong to a model"),
+        (("--model", "nominal.yaml", "--budget", "0"), "--budget is a number of seconds greater than 0"),
+        (("--model", "nominal.yaml", "--budget", "nan"), "--budget is a number of seconds greater than 0"),
         (("--sim", "nowhere"), "nowhere: no such file"),
     ],
 )

@@ -1,0 +1,121 @@
+"""What the terminal says of a diagnosis."""
+
+import io
+from dataclasses import replace
+
+import pytest
+from rich.console import Console
+
+from rhythmid.diagnose.answer.printed import rejection_words, remainder_words, scoring_words, show
+from rhythmid.diagnose.answer.result import (
+    Detection,
+    Diagnosis,
+    Estimate,
+    Explanation,
+    FitQuality,
+    Location,
+    MissingEffect,
+    Remainder,
+    Scored,
+)
+from rhythmid.diagnose.hypothesis import Kind
+from rhythmid.diagnose.rejections import Rejection
+
+
+def explanation(
+    elements: tuple[str, ...], worse: float, probability: float, kind: Kind = "effects"
+) -> Explanation:
+    return Explanation(elements, kind, 100.0 - worse, worse, 0.3 * worse, probability, 0.0123)
+
+
+FRICTION = MissingEffect(
+    "coulomb_friction", "force", "F = −F_c sgn v", 0.92, 0.97, {"force": Estimate(0.8, 0.01, "N")}
+)
+LIMIT = Rejection(
+    ("second_mode",), "within_bounds", 0.0, 1e-3, "the effect has become the limit of another one"
+)
+ANSWER = Diagnosis(
+    "missing_physics",
+    "The model lacks coulomb friction.",
+    Detection(1e-9, None, 0.05, 0.004),
+    Location("force", "in the balance of forces on the mass", ()),
+    (FRICTION,),
+    0.97,
+    (),
+    (),
+    (
+        explanation(("coulomb_friction", "position_ripple"), 0.0, 0.0),
+        explanation(("coulomb_friction",), 2.0, 0.97),
+        explanation((), 500.0, 0.0, "nominal"),
+    ),
+    (LIMIT,),
+    Remainder(0.03, True, "velocity", None),
+    {"refitted_nominal": FitQuality(0.05, 0.06), "augmented": FitQuality(0.01, None)},
+    {},
+    {},
+    "a slow reversal [of the speed]",
+    Scored("effort", 12.0, "a controller holds the machine"),
+    assumptions=("The recorded effort is taken to be true in scale.",),
+    excluded=("sensor_lag: not seen", "sensor_drift: not seen"),
+)
+
+
+def printed(answer: Diagnosis = ANSWER) -> str:
+    console = Console(file=io.StringIO(), width=160)
+    show(answer, console)
+    assert isinstance(console.file, io.StringIO)
+    return console.file.getvalue()
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "missing physics: The model lacks coulomb friction.",
+        "probability 97 %, 92 % of the mismatch",
+        "left: 3 % of the mismatch, which goes with velocity",
+        "scored: by the recorded effort below 12 Hz: a controller holds the machine",
+        "assumption: The recorded effort is taken to be true in scale.",
+        "not tried: sensor_lag, sensor_drift: not seen",
+        "not believed: second mode (the effect has become the limit of another one)",
+        "refitted nominal: NRMSE 0.05000 seen, 0.06000 held out",
+        "augmented: NRMSE 0.01000 seen, — held out",
+        "next experiment: a slow reversal [of the speed]",
+    ],
+)
+def test_the_terminal_says(line):
+    assert line in printed()
+
+
+def test_hypotheses_stand_in_a_table_with_differences_and_probabilities():
+    rows = [line for line in printed().splitlines() if line.startswith("│")][1:]
+    best, chosen, nominal = rows
+    assert "coulomb_friction + position_ripple" in best and "best" in best
+    assert "2 ± 0.6" in chosen and "97 %" in chosen
+    assert "nominal model" in nominal and "500 ± 150" in nominal and "< 0.1 %" in nominal
+
+
+def test_hypotheses_that_take_no_share_of_the_evidence_have_no_probability():
+    rows = [line for line in printed().splitlines() if "position_ripple" in line]
+    assert "%" not in rows[0].split("best")[1].split("│")[1]
+
+
+def test_only_a_few_hypotheses_are_shown():
+    many = tuple(explanation((f"effect_{i}",), float(i), 0.01) for i in range(20))
+    text = printed(replace(ANSWER, hypotheses=many))
+    assert "the 6 best of 20 hypotheses" in text and "effect_5" in text and "effect_6" not in text
+
+
+def test_only_a_few_rejections_are_told_and_the_rest_is_counted():
+    rows = [Rejection((f"effect_{i}",), "share_of_rest", 0.0, 0.2, "too small a part") for i in range(8)]
+    told = rejection_words([LIMIT, LIMIT, *rows])
+    assert len(told) == 6 and told[0].startswith("second mode") and told[-1].startswith("and 4 more")
+
+
+def test_nothing_left_and_a_free_run_are_told_in_words():
+    assert "nothing" in remainder_words(Remainder(0.0, False, None, None))
+    assert scoring_words(Scored("free_run", None, "the model follows")) == "in free run: the model follows"
+
+
+def test_several_names_come_with_their_joint_probability():
+    lag = replace(FRICTION, element="actuator_lag")
+    assert "all of these names together: 97 %" in printed(replace(ANSWER, missing=(FRICTION, lag)))

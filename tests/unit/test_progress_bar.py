@@ -1,0 +1,48 @@
+"""The bar on the terminal shows what is known: what is under way, since when, and how much of a budget is spent."""
+
+import io
+
+import pytest
+from rich.console import Console
+from rich.progress import Progress
+
+from rhythmid.progress_bar import SpentColumn, progress, spent_words
+
+
+def test_what_begins_is_printed_with_its_time_and_markup_in_it_stays_text():
+    console = Console(file=io.StringIO(), width=120)
+    with progress(console) as tell:
+        tell("refitting with [red]lags[/]")
+    assert isinstance(console.file, io.StringIO)
+    assert "s  refitting with [red]lags[/]" in console.file.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("elapsed", "words"),
+    [
+        (0.0, "0 % of the budget of 20 s"),
+        (5.0, "25 % of the budget of 20 s"),
+        (20.0, "all 20 s of the budget spent; finishing"),
+        (31.0, "all 20 s of the budget spent; finishing"),
+    ],
+)
+def test_a_budget_is_told_by_the_share_that_is_spent(elapsed, words):
+    assert spent_words(elapsed, 20.0) == words
+
+
+def test_the_bar_is_as_long_as_the_share_that_is_spent_and_never_longer():
+    clock = [0.0]
+    bar = Progress(get_time=lambda: clock[0], auto_refresh=False)
+    bar.add_task("")
+    (task,) = bar.tasks
+    for clock[0], completed in ((0.0, 0.0), (5.0, 5.0), (31.0, 20.0)):
+        shown = SpentColumn(20.0).render(task)
+        assert (shown.total, shown.completed) == (20.0, completed)
+
+
+def test_a_line_with_a_budget_shows_it():
+    console = Console(file=io.StringIO(), width=160, force_terminal=True)
+    with progress(console, 1000.0) as tell:
+        tell("scoring the catalogue")
+    assert isinstance(console.file, io.StringIO)
+    assert "0 % of the budget of 1000 s" in console.file.getvalue()

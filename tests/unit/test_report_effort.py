@@ -1,0 +1,57 @@
+"""The report of an answer by effort: recorded effort beside what the models predict, before and after."""
+
+import numpy as np
+import pytest
+from axes import CATALOGUE, axis, axis_model
+
+from rhythmid.diagnose.answer.present import present
+from rhythmid.diagnose.answer.present_effort import effort_findings
+from rhythmid.diagnose.diagnosis import Answer, diagnose
+from rhythmid.diagnose.effort.run import EffortResult
+from rhythmid.report.findings import Findings
+from rhythmid.report.page import render
+from rhythmid.report.run import error_of
+
+
+@pytest.fixture(scope="module")
+def answer() -> Answer:
+    few = CATALOGUE.without(
+        *[n for n, e in CATALOGUE.items() if e.candidate and n not in ("coulomb_friction", "quadratic_drag")]
+    )
+    return diagnose([axis()], axis_model(), [axis(1)], few)
+
+
+@pytest.fixture(scope="module")
+def found(answer) -> Findings:
+    assert isinstance(answer.result, EffortResult)
+    return effort_findings(answer.diagnosis, answer.result, axis_model(), [axis()], [axis(1)])
+
+
+def test_the_efforts_that_are_drawn_have_the_errors_that_the_answer_states(answer, found):
+    fit = answer.diagnosis.fit
+    for heldout, names in ((False, "train_nrmse"), (True, "heldout_nrmse")):
+        runs = [run for run in found.runs if run.heldout is heldout]
+        for which, key in (("before", "refitted_nominal"), ("after", "augmented")):
+            error = error_of(runs, which)
+            assert error is not None
+            assert error.ratio == pytest.approx(getattr(fit[key], names), rel=0.1)
+
+
+def test_stretches_are_evenly_sampled_and_stuck_samples_do_not_count(found):
+    for run in found.runs:
+        assert np.ptp(np.diff(run.time)) < 1e-9
+        assert 0.5 < run.used.mean() < 1.0
+    assert found.compared.quantity == "effort" and found.compared.unit == "N"
+
+
+def test_what_goes_with_the_speed_is_gone_after(found):
+    speed = next(one for one in found.functions if one.quantity == "velocity")
+    assert speed.force_after is not None
+    assert np.ptp(speed.force_after) < 0.2 * np.ptp(speed.force)
+
+
+def test_the_page_is_made_from_the_answer_alone(answer):
+    html = render(present(answer, axis_model(), [axis()], [axis(1)], "rhythmid diagnose bags", "axis.yaml"))
+    assert "Missing physics: Coulomb friction" in html
+    assert "of the effort" in html and "of the motion" not in html
+    assert "What was assumed" in html and "Harmonics of the cycle" not in html
