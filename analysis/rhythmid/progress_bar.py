@@ -17,14 +17,14 @@ from rich.text import Text
 
 from rhythmid.progress import Tell
 
-BAR = 30  # characters
+BAR = 20  # characters
 
 
 class SpentColumn(ProgressColumn):
     """A bar of the share of `seconds` that has passed, and the share in figures."""
 
     def __init__(self, seconds: float) -> None:
-        super().__init__(Column(no_wrap=True))
+        super().__init__(Column(no_wrap=True, min_width=BAR))
         self._seconds = seconds
 
     def render(self, task: Task) -> ProgressBar:
@@ -36,7 +36,7 @@ class SpentText(ProgressColumn):
     """The share of `seconds` that has passed, in words."""
 
     def __init__(self, seconds: float) -> None:
-        super().__init__(Column(no_wrap=True))
+        super().__init__(Column(no_wrap=True, min_width=len(spent_words(seconds, seconds))))
         self._seconds = seconds
 
     def render(self, task: Task) -> Text:
@@ -47,20 +47,25 @@ class SpentText(ProgressColumn):
 def spent_words(elapsed: float, seconds: float) -> str:
     """How much of a budget [s] is spent after `elapsed` [s]. What is under way when it ends is brought to its end."""
     if elapsed >= seconds:
-        return f"all {seconds:g} s of the budget spent; finishing"
-    return f"{100.0 * elapsed / seconds:.0f} % of the budget of {seconds:g} s"
+        return f"{seconds:g} s spent; finishing"
+    return f"{100.0 * elapsed / seconds:.0f} % of {seconds:g} s spent"
 
 
 @contextmanager
 def progress(console: Console, budget: float | None = None) -> Iterator[Tell]:
     """While this is open, what is told stands in a line with the time since it was opened, and with a `budget` [s] the share of
     it that is spent; each thing that was told is also printed with the time at which it began."""
-    columns: list[ProgressColumn] = [SpinnerColumn(), TimeElapsedColumn()]
+    columns: list[ProgressColumn] = [
+        SpinnerColumn(table_column=Column(min_width=1)),
+        TimeElapsedColumn(table_column=Column(min_width=len("0:00:00"))),
+    ]
     if budget is not None:
         columns += [SpentColumn(budget), SpentText(budget)]
-    columns.append(TextColumn("{task.description}"))
+    columns.append(
+        TextColumn("{task.description}", table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1))
+    )
     began = time.monotonic()
-    with Progress(*columns, console=console, transient=True) as bar:
+    with Progress(*columns, console=console, transient=True, expand=True) as bar:
         task = bar.add_task("", total=None)
 
         def tell(what: str) -> None:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from axes import axis, axis_model
 
 from rhythmid.diagnose.answer.present import present
 from rhythmid.diagnose.diagnosis import diagnose
@@ -88,6 +89,24 @@ def test_nothing_runs_over_the_edge(browser, report: Path, width: int) -> None:
         " && getComputedStyle(e).position !== 'absolute' && !e.closest('thead')).map(e => e.outerHTML.slice(0, 80))"
     )
     assert over == []
+
+
+@pytest.mark.parametrize("width", [320, 1200])
+def test_a_report_by_effort_stays_within_the_page_too(browser, tmp_path: Path, width: int) -> None:
+    catalogue = load_catalogue()
+    others = [
+        n for n, e in catalogue.items() if e.candidate and n not in ("coulomb_friction", "quadratic_drag")
+    ]
+    answer = diagnose([axis()], axis_model(), [axis(1)], catalogue.without(*others))
+    path = tmp_path / "effort.html"
+    write_page(
+        path, present(answer, axis_model(), [axis()], [axis(1)], "rhythmid diagnose bags", "axis.yaml")
+    )
+    browser.open(path, width)
+    assert browser.messages == []
+    assert browser.evaluate("document.querySelector('h1').innerText") == "Missing physics: Coulomb friction"
+    browser.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
+    assert browser.evaluate("document.documentElement.scrollWidth") <= width
 
 
 @pytest.mark.parametrize("width", [390, 1200])

@@ -20,10 +20,10 @@ def test_what_begins_is_printed_with_its_time_and_markup_in_it_stays_text():
 @pytest.mark.parametrize(
     ("elapsed", "words"),
     [
-        (0.0, "0 % of the budget of 20 s"),
-        (5.0, "25 % of the budget of 20 s"),
-        (20.0, "all 20 s of the budget spent; finishing"),
-        (31.0, "all 20 s of the budget spent; finishing"),
+        (0.0, "0 % of 20 s spent"),
+        (5.0, "25 % of 20 s spent"),
+        (20.0, "20 s spent; finishing"),
+        (31.0, "20 s spent; finishing"),
     ],
 )
 def test_a_budget_is_told_by_the_share_that_is_spent(elapsed, words):
@@ -45,4 +45,4 @@ def test_a_line_with_a_budget_shows_it():
     with progress(console, 1000.0) as tell:
         tell("scoring the catalogue")
     assert isinstance(console.file, io.StringIO)
-    assert "0 % of the budget of 1000 s" in console.file.getvalue()
+    assert "0 % of 1000 s spent" in console.file.getvalue()
