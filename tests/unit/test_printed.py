@@ -116,6 +116,17 @@ def test_nothing_left_and_a_free_run_are_told_in_words():
     assert scoring_words(Scored("free_run", None, "the model follows")) == "in free run: the model follows"
 
 
+def test_the_nominal_model_alone_has_no_probability():
+    alone = (explanation((), 0.0, 1.0, "nominal"), explanation(("inertia.mass",), 2.5, 0.0, "freed_value"))
+    rows = [line for line in printed(replace(ANSWER, hypotheses=alone)).splitlines() if "│" in line]
+    assert all("—" in row for row in rows if "nominal model" in row or "inertia.mass" in row)
+
+
+def test_the_verdict_is_not_said_twice():
+    told = printed(replace(ANSWER, verdict="undecided", summary="Undecided: two names do equally well."))
+    assert told.startswith("undecided: two names do equally well.")
+
+
 def test_several_names_come_with_their_joint_probability():
     lag = replace(FRICTION, element="actuator_lag")
     assert "all of these names together: 97 %" in printed(replace(ANSWER, missing=(FRICTION, lag)))

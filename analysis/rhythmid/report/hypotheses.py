@@ -53,8 +53,8 @@ def hypotheses_section(found: Findings) -> Section:
 
 def most_weighed(hypotheses: Sequence[tuple[Sequence[str], float]]) -> int:
     """Number of effects beyond which hypotheses, given as (effects, probability), do not share in the evidence: they have no
-    probability."""
-    return max((len(effects) for effects, chance in hypotheses if chance > 0.0), default=0)
+    probability. Negative where the nominal model stands alone, for its probability among itself says nothing."""
+    return max((len(effects) for effects, chance in hypotheses if chance > 0.0), default=0) or -1
 
 
 def grouped(excluded: Sequence[str]) -> list[str]:

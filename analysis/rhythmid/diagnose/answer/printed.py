@@ -20,7 +20,8 @@ LEAST = 1e-3  # probability, of itself or of the contrary, below which only that
 def show(found: Diagnosis, console: Console) -> None:
     """Print a diagnosis."""
     lines = _Lines(console)
-    lines.told(found.verdict.replace("_", " "), found.summary)
+    verdict = found.verdict.replace("_", " ")
+    lines.told(verdict, found.summary.removeprefix(f"{verdict.capitalize()}: "))
     lines.said("where", found.location.where)
     for effect in found.missing:
         sizes = f"probability {_probability(effect.probability)}, {_percent(effect.share)} of the mismatch"
@@ -35,6 +36,8 @@ def show(found: Diagnosis, console: Console) -> None:
     lines.said("left", remainder_words(found.remainder))
     lines.said("scored", scoring_words(found.scoring))
     for name, fit in found.fit.items():
+        if name == "augmented" and fit == found.refitted_nominal:
+            continue  # nothing was added
         held = NONE if fit.heldout_nrmse is None else f"{fit.heldout_nrmse:.5f}"
         lines.said(name.replace("_", " "), f"NRMSE {fit.train_nrmse:.5f} seen, {held} held out")
     for label, group in (
