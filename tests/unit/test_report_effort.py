@@ -6,6 +6,7 @@ from axes import CATALOGUE, axis, axis_model
 
 from rhythmid.diagnose.answer.present import present
 from rhythmid.diagnose.answer.present_effort import effort_findings
+from rhythmid.diagnose.answer.result import ANSWER
 from rhythmid.diagnose.diagnosis import Answer, diagnose
 from rhythmid.diagnose.effort.run import EffortResult
 from rhythmid.report.findings import Findings
@@ -48,6 +49,12 @@ def test_what_goes_with_the_speed_is_gone_after(found):
     speed = next(one for one in found.functions if one.quantity == "velocity")
     assert speed.force_after is not None
     assert np.ptp(speed.force_after) < 0.2 * np.ptp(speed.force)
+
+
+def test_the_answer_as_json_is_one_that_its_types_read_again(answer):
+    told = answer.diagnosis.to_dict()
+    again = ANSWER.validate_python(told)
+    assert again.to_dict() == told and again.scoring.kind == "effort"
 
 
 def test_the_page_is_made_from_the_answer_alone(answer):

@@ -159,8 +159,18 @@ ANSWER = TypeAdapter(Diagnosis)
 
 
 def schema() -> dict[str, Any]:
-    """JSON schema of `to_dict`, with a null where a number may be infinite."""
-    return ANSWER.json_schema(mode="serialization")
+    """JSON schema of `to_dict`: any number may be null there, for one that is not finite."""
+    return _nullable(ANSWER.json_schema(mode="serialization"))
+
+
+def _nullable(part: Any) -> Any:
+    """A part of a schema in which every number may be null."""
+    if isinstance(part, list):
+        return [_nullable(one) for one in part]
+    if not isinstance(part, dict):
+        return part
+    made = {key: _nullable(value) for key, value in part.items()}
+    return made | {"type": ["number", "null"]} if made.get("type") == "number" else made
 
 
 if __name__ == "__main__":
