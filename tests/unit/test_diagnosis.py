@@ -4,7 +4,9 @@ import json
 
 import pytest
 
+from json_schema import violations
 from machines import CATALOGUE, hopper, records
+from rhythmid.diagnose.answer.result import schema
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.errors import InputError
 
@@ -48,6 +50,10 @@ def test_the_result_is_plain_json_with_the_contract_s_keys(friction):
     assert set(content["detection"]) == {
         "p_value", "nominal_nrmse", "refitted_nominal_nrmse", "noise_floor_nrmse",
     }  # fmt: skip
+
+
+def test_the_result_keeps_to_the_schema(friction):
+    assert violations(friction.diagnosis.to_dict(), schema(), schema()) == []
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.8])
