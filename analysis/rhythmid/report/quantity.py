@@ -3,7 +3,8 @@
 import math
 import re
 
-NORMAL_95 = 1.959963984540054  # standard deviations to either side that hold 95 % of a normal distribution
+from rhythmid.statistics import NORMAL_95
+
 MINUS = "\u2212"
 NONE = "—"
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))

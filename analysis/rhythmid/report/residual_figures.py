@@ -10,6 +10,7 @@ from rhythmid.report.quantity import number, percent, plus_minus, pretty_unit, s
 from rhythmid.report.row_chart import Change, draw_changes
 from rhythmid.report.run import FEWEST, Error, Harmonic, Run, Which, by_phase, density, error_of, harmonics
 from rhythmid.report.state_map import draw_maps, state_map
+from rhythmid.statistics import NORMAL_95
 
 BEFORE, AFTER = "refitted nominal model", "with the added effect"
 HELD_OUT = "held out"
@@ -109,7 +110,7 @@ def _over_cycle(run: Run, factor: float, unit: str) -> Drawing | None:
         if found is None or (which == "after" and run.after is None):
             continue
         phase, mean, std = found
-        mean, half = factor * mean, 1.96 * factor * std
+        mean, half = factor * mean, NORMAL_95 * factor * std
         curves.append(Curve(phase, mean, label, which, low=mean - half, high=mean + half))
     if not curves:
         return None
@@ -248,7 +249,11 @@ def cycle_harmonics(run: Run, unit: str, noise: float) -> Table | None:
     factor, shown = scaled(max(h.before for h in found), unit)
 
     def told(value: float | None, one: Harmonic) -> str:
-        return "—" if value is None else with_unit(plus_minus(factor * value, 1.96 * factor * one.std), shown)
+        return (
+            "—"
+            if value is None
+            else with_unit(plus_minus(factor * value, NORMAL_95 * factor * one.std), shown)
+        )
 
     repaired = run.after is not None
     columns = ("harmonic of the forcing", "measured", "missed before", "missed after")
