@@ -68,7 +68,7 @@ def test_the_mean_over_the_cycle_is_drawn_with_its_95_percent_interval(monkeypat
     residual_figures.residual_grid(noisy, "m")
     found = by_phase(noisy, "before")
     assert found is not None
-    (curve,) = next(chart for chart in charts if "mean residual" in chart.alt).curves
+    curve, _ = next(chart for chart in charts if chart.x_label.startswith("phase")).curves
     unit = float(np.mean(curve.y / found[1]))  # in which it is drawn
     np.testing.assert_allclose(curve.high - curve.low, 2.0 * QUANTILE * unit * found[2], rtol=1e-9)
 

@@ -195,7 +195,7 @@ def test_one_free_law_that_predicts_as_well_as_a_series_of_names_is_unknown_phys
 
 
 @pytest.mark.parametrize(
-    ("left", "expected"), [(0.9, "unknown_physics"), (0.6, "unknown_physics"), (0.01, "missing_physics")]
+    ("left", "expected"), [(0.75, "unknown_physics"), (0.6, "unknown_physics"), (0.01, "missing_physics")]
 )
 def test_names_that_leave_most_of_what_a_free_map_explains_are_unknown_physics(left, expected):
     made = contest(NOMINAL, friction(left), maps={"velocity": predicted(1e-4)})
