@@ -42,13 +42,13 @@ def supposed(
     kind: Kind | None = None,
     free: int | None = None,
     shape: Mapping[str, float] | None = None,
+    richer: Mapping[str, tuple[str, ...]] | None = None,
 ) -> Hypothesis:
     """A hypothesis of effects, whose labels (split at spaces) are their names."""
     labels = tuple(elements.split())
     chosen = kind or ("effects" if labels else "nominal")
-    return Hypothesis(
-        labels, labels, chosen, 5 + len(labels) if free is None else free, prediction, 0.1, shape or {}
-    )
+    count = 5 + len(labels) if free is None else free
+    return Hypothesis(labels, labels, chosen, count, prediction, 0.1, shape or {}, richer or {})
 
 
 def contest(

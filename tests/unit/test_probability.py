@@ -1,5 +1,7 @@
 """Probabilities of names: shares of the evidence, times the chance that the catalogue holds the truth at all."""
 
+from dataclasses import replace
+
 import pytest
 from contests import contest, decided, predicted, supposed
 from hypothesis import given, settings
@@ -35,13 +37,28 @@ def test_weights_sum_to_one_over_all_with_no_more_effects_than_the_chosen_one(le
 
 
 def test_a_joint_probability_is_no_larger_than_that_of_any_of_its_names():
-    score = predicted(0.1).score
-    pairs = [supposed(names, predicted(0.1, score, seed=i)) for i, names in enumerate(("a b", "a c", "b c"))]
+    pairs = [supposed(names, predicted(0.1, seed=i)) for i, names in enumerate(("a b", "a c", "b c"))]
     weights = {one.key: share for one, share in zip(pairs, (0.5, 0.3, 0.2))}
-    assert joint_probability(["a"], pairs, weights) == pytest.approx(0.8)
-    assert joint_probability(["a", "b"], pairs, weights) == pytest.approx(0.5)
-    assert joint_probability(["b", "a"], pairs, weights) == joint_probability(["a", "b"], pairs, weights)
-    assert joint_probability(["d"], pairs, weights) == 0.0
+    made = contest(NOMINAL, *pairs)
+
+    def joint(*names: str) -> float:
+        return joint_probability(names, made, pairs[0], weights)
+
+    assert joint("a") == pytest.approx(0.8) and joint("b") == pytest.approx(0.7)
+    assert joint("a", "b") == joint("b", "a") == pytest.approx(0.5)
+    assert joint("d") == 0.0
+
+
+def test_a_richer_law_that_predicts_no_better_holds_the_name_that_it_contains():
+    score = predicted(0.05).score
+    plain = supposed("friction", predicted(0.05, score), richer={"friction": ("stribeck",)})
+    wide = supposed("stribeck", predicted(0.0499, score + 0.1), free=9)
+    _, decision = decided(contest(NOMINAL, plain, wide))
+    assert (decision.verdict, decision.named) == ("missing_physics", ("friction",))
+    assert decision.probability["friction"] > 0.8
+    assert decision.equivalent == (("friction", "stribeck"),)
+    unrelated = replace(plain, richer={})
+    assert decided(contest(NOMINAL, unrelated, wide))[1].verdict == "undecided"
 
 
 def test_a_name_that_every_likely_hypothesis_holds_is_sure_though_its_company_is_not():
@@ -62,7 +79,6 @@ def test_the_more_is_left_to_a_free_map_the_less_a_name_is_believed(left):
 
 
 def test_no_probability_leaves_zero_to_one_and_none_of_the_names_tops_its_weight():
-    made = contest(NOMINAL, supposed("a", predicted(0.1)), supposed("b", predicted(0.11)))
-    _, decision = decided(made)
+    _, decision = decided(contest(NOMINAL, supposed("a", predicted(0.1)), supposed("b", predicted(0.11))))
     for label, value in decision.probability.items():
         assert 0.0 <= value <= decision.weights[(label,)] + 1e-12

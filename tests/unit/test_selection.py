@@ -54,6 +54,12 @@ def test_of_hypotheses_that_predict_alike_the_one_with_fewer_free_parameters_is_
     assert select(contest(NOMINAL, wide, FRICTION)).chosen is FRICTION
 
 
+def test_predictions_that_are_the_same_are_equivalent():
+    one = supposed("wide", FRICTION.prediction, free=9)
+    assert equivalent(one, FRICTION, 0.2) and equivalent(one, FRICTION, 0.0)
+    assert select(contest(NOMINAL, one, FRICTION)).chosen is FRICTION
+
+
 def test_a_rival_is_equivalent_within_standard_errors_or_but_for_a_small_share_of_what_it_leaves():
     best = supposed("a", predicted(0.1, 100.0, seed=1))
     near = supposed("b", predicted(0.2, 99.0, mood=1.0, seed=2))

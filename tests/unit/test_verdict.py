@@ -74,10 +74,10 @@ def test_a_further_effect_has_to_remove_some_of_the_whole_mismatch(size, expecte
 
 
 @pytest.mark.parametrize("rule", ["within_bounds", "acts_within_records", "own_frequency"])
-def test_an_effect_that_has_lost_its_shape_is_not_named_and_the_next_best_is(rule):
+def test_an_effect_that_has_lost_its_shape_is_no_name_and_the_next_best_comes_in_its_place(rule):
     lost = supposed("play", predicted(0.05), shape={rule: 0.0})
-    assert verdict(contest(NOMINAL, lost, friction())) == NAMED
-    assert verdict(contest(NOMINAL, lost)) == NOTHING
+    assert verdict(contest(NOMINAL, lost, friction()))[1] == ("friction",)
+    assert verdict(contest(NOMINAL, lost))[1] == ()
     kept = replace(lost, shape={rule: 1e3})
     assert verdict(contest(NOMINAL, kept, friction()))[1] == ("play",)
 
@@ -203,6 +203,14 @@ def test_names_that_leave_most_of_what_a_free_map_explains_are_unknown_physics(l
     assert (decision.verdict, decision.named) == (expected, ("friction",))
     assert decision.unexplained.share == pytest.approx(left, abs=0.02)
     assert decision.unexplained.goes_with == "velocity"
+
+
+@pytest.mark.parametrize(("left", "mainly"), [(0.3, True), (0.7, False)])
+def test_names_that_leave_a_part_are_mainly_right_and_such_that_leave_most_are_not(left, mainly):
+    _, decision = decided(contest(NOMINAL, friction(left), maps={"velocity": predicted(1e-4)}))
+    assert (decision.verdict, decision.named) == ("unknown_physics", ("friction",))
+    assert ("mainly" in decision.reason) is mainly
+    assert "velocity" in decision.reason and decision.joint < 0.8
 
 
 def test_a_small_structured_remainder_does_not_take_the_name_away():
