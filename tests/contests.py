@@ -11,14 +11,14 @@ from rhythmid.diagnose.verdict import Decision, decide
 
 BLOCKS = 60
 SAMPLES = 100.0  # of a block
-SIZE = 1.0  # rms of what errors are a share of
+SIZE = 10.0  # rms of what errors are a share of: a nominal model with a mean square of 1 misses a tenth of it
 SEEN = 0.001  # smallest effect that the records would show, as a share of it
 
 
 def predicted(
     mean_square: float, score: float | None = None, mood: float = 0.1, seed: int | None = None
 ) -> Prediction:
-    """A prediction of 60 blocks of 100 samples with this mean squared error [of a motion of rms 1].
+    """A prediction of 60 blocks of 100 samples with this mean squared error.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ from contests import contest, predicted, supposed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhythmid.diagnose.selection import equivalent, select, without_elements
+from rhythmid.diagnose.selection import equivalent, select, special_case, without_elements
 
 NOMINAL = supposed("", predicted(1.0))
 FRICTION = supposed("friction", predicted(0.2))
@@ -52,6 +52,16 @@ def test_of_hypotheses_that_predict_alike_the_one_with_fewer_free_parameters_is_
     score = FRICTION.prediction.score
     wide = supposed("stribeck", predicted(0.2, score + 0.5), free=9)
     assert select(contest(NOMINAL, wide, FRICTION)).chosen is FRICTION
+
+
+def test_of_laws_that_predict_alike_the_special_case_is_chosen_and_not_the_one_that_contains_it():
+    score = FRICTION.prediction.score
+    plain = supposed("friction", predicted(0.2, score), richer={"friction": ("stribeck", "asymmetric")})
+    wide = supposed("stribeck", predicted(0.1999, score + 0.1), free=plain.free - 1)
+    assert special_case(plain, wide) and not special_case(wide, plain)
+    assert select(contest(NOMINAL, plain, wide)).chosen is plain
+    clear = supposed("stribeck", predicted(0.01), free=9)
+    assert select(contest(NOMINAL, plain, clear)).chosen is clear
 
 
 def test_predictions_that_are_the_same_are_equivalent():

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from contests import BLOCKS, contest, decided, predicted, supposed, verdict
+from contests import BLOCKS, SIZE, contest, decided, predicted, supposed, verdict
 
 from rhythmid.diagnose.rejections import RULES
 
@@ -44,7 +44,7 @@ def test_a_gain_that_chance_would_find_among_as_many_candidates_is_none(standard
 def test_an_effect_of_a_thousandth_of_the_motion_is_not_named_and_one_of_a_hundredth_is(share, expected):
     # however sure it is, and although nothing else is to be explained
     quiet = 1e-8
-    nominal = supposed("", predicted(quiet + share**2, 0.0))
+    nominal = supposed("", predicted(quiet + (share * SIZE) ** 2, 0.0))
     assert verdict(contest(nominal, supposed("friction", predicted(quiet, 1e4)))) == expected
 
 
@@ -68,7 +68,7 @@ def test_a_further_effect_has_to_remove_some_of_the_whole_mismatch(size, expecte
         NOMINAL,
         friction(quiet + size, score=200.0),
         supposed("friction cubic", predicted(quiet, 2000.0)),
-        practical=1e-3,
+        practical=1e-5,
     )
     assert verdict(made) == ("missing_physics", ("friction", "cubic")[:expected])
 
@@ -231,13 +231,21 @@ def test_what_no_name_explains_but_a_free_map_does_is_unknown_physics_and_told_b
 def test_what_a_free_map_explains_by_chance_or_of_no_practical_size_is_nothing():
     chance = predicted(0.1, NOMINAL.prediction.score + 5.0, mood=10.0)
     assert verdict(contest(NOMINAL, maps={"velocity": chance})) == NOTHING
-    tiny = supposed("", predicted(1e-8 + 1e-6, 0.0))
+    tiny = supposed("", predicted(1e-8 + (0.001 * SIZE) ** 2, 0.0))
     assert verdict(contest(tiny, maps={"velocity": predicted(1e-8, 1e4)})) == NOTHING
 
 
 @pytest.mark.parametrize(("detectable", "expected"), [(0.001, "consistent"), (0.8, "undecided")])
 def test_records_that_would_not_show_an_effect_decide_nothing(detectable, expected):
     assert verdict(contest(NOMINAL, friction(0.999)), detectable)[0] == expected
+
+
+@pytest.mark.parametrize(("missed", "expected"), [(0.1, "consistent"), (0.5, "undecided")])
+def test_a_model_that_misses_much_is_not_called_consistent_though_nothing_explains_it(missed, expected):
+    nominal = supposed("", predicted((missed * SIZE) ** 2))
+    _, decision = decided(contest(nominal))
+    assert decision.verdict == expected
+    assert ("misses" in decision.reason) is (expected == "undecided")
 
 
 def test_records_that_would_not_show_a_small_effect_still_show_a_large_one():
