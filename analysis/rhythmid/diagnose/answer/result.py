@@ -160,7 +160,17 @@ ANSWER = TypeAdapter(Diagnosis)
 
 def schema() -> dict[str, Any]:
     """JSON schema of `to_dict`, with a null where a number may be infinite."""
-    return ANSWER.json_schema(mode="serialization")
+    return _nullable(ANSWER.json_schema(mode="serialization"))
+
+
+def _nullable(part: Any) -> Any:
+    """Part of a schema with a null where it has a number."""
+    if isinstance(part, list):
+        return [_nullable(one) for one in part]
+    if not isinstance(part, dict):
+        return part
+    found = {key: _nullable(one) for key, one in part.items()}
+    return found | {"type": ["number", "null"]} if found.get("type") == "number" else found
 
 
 if __name__ == "__main__":
