@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from json_schema import conforming
 
 from machines import CATALOGUE, hopper, records
 from rhythmid.diagnose.answer.result import Diagnosis
@@ -26,7 +27,7 @@ TINY = ({"type": "chirp", "amplitude": 0.004, "sweep": 8.0, "band": [0.0, 7.0]},
 def run(
     given: list[Record], model: Model | None = None, catalogue: Catalogue = SMALL, **options
 ) -> Diagnosis:
-    return diagnose(given, model or hopper(), catalogue=catalogue, **options).diagnosis
+    return conforming(diagnose(given, model or hopper(), catalogue=catalogue, **options).diagnosis)
 
 
 @pytest.fixture(scope="module")

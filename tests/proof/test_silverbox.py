@@ -111,10 +111,10 @@ def test_the_augmented_model_runs_free_over_the_official_tests(answer, tmp_path,
     (series,) = prepare([record], block=1)
     series = reconstructed(replace(series, used=np.arange(series.blocks) < START))
     white = NoiseModel(np.empty(0), 1e-4)
-    fit = start_only(answer.model, [series], white, answer.evidence.search.fit.run.max_step)
+    fit = start_only(answer.model, [series], white, answer.result.search.fit.run.max_step)
     error = float(np.sqrt(np.mean(fit.residuals[0][START:] ** 2)))
     assert error < limit
-    linear = answer.evidence.search.nominal.model
+    linear = answer.result.search.nominal.model
     assert error < 0.05 * float(
         np.sqrt(np.mean(start_only(linear, [series], white, 1e-3).residuals[0][START:] ** 2))
     )
