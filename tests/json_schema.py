@@ -1,36 +1,62 @@
-"""A check of JSON data against the parts of JSON Schema that the schema of a diagnosis uses."""
+"""JSON against its schema: the keywords that pydantic writes, and no others."""
 
+import json
+from pathlib import Path
 from typing import Any
 
+from rhythmid.diagnose.answer.result import Diagnosis
+
+SCHEMA = Path(__file__).parents[1] / "docs" / "schema" / "diagnose.schema.json"
 TYPES: dict[str, tuple[type, ...]] = {
-    "null": (type(None),), "number": (int, float), "string": (str,), "boolean": (bool,), "array": (list,), "object": (dict,),
+    "object": (dict,), "array": (list,), "string": (str,), "number": (int, float), "integer": (int,),
+    "boolean": (bool,), "null": (type(None),),
+}  # fmt: skip
+WORDS = {"title", "description", "default", "$defs"}
+KNOWN = {
+    "$ref", "anyOf", "enum", "const", "type", "properties", "required", "additionalProperties", "propertyNames", "items",
+    "prefixItems", "minItems", "maxItems",
 }  # fmt: skip
 
 
-def violations(value: Any, schema: dict[str, Any], root: dict[str, Any], at: str = "$") -> list[str]:
-    """Places at which a value is not what the schema says; `root` holds the definitions."""
+def faults(value: Any, schema: Any, whole: dict[str, Any], place: str = "") -> list[str]:
+    """What a JSON value has that its schema forbids; `whole` holds the definitions. KeyError for a keyword that is not known."""
+    if schema is True:
+        return []
+    for word in set(schema) - WORDS - KNOWN:
+        raise KeyError(word)
     if "$ref" in schema:
-        return violations(value, root["$defs"][schema["$ref"].rpartition("/")[2]], root, at)
+        return faults(value, whole["$defs"][schema["$ref"].rpartition("/")[2]], whole, place)
     if "anyOf" in schema:
-        tried = [violations(value, one, root, at) for one in schema["anyOf"]]
-        return [] if [] in tried else min(tried, key=len)
-    if "enum" in schema and value not in schema["enum"]:
-        return [f"{at}: {value!r} is none of {schema['enum']}"]
-    names = schema.get("type", [])
-    allowed = [kind for name in ([names] if isinstance(names, str) else names) for kind in TYPES[name]]
-    if allowed and not isinstance(value, tuple(allowed)):
-        return [f"{at}: {type(value).__name__} is not {names}"]
+        each = [faults(value, one, whole, place) for one in schema["anyOf"]]
+        return [] if not all(each) else min(each, key=len)
+    if value not in schema.get("enum", [value]) or value != schema.get("const", value):
+        return [f"{place}: {value!r} is no word of the schema"]
+    kinds = schema.get("type", [])
+    allowed = tuple(kind for one in ([kinds] if isinstance(kinds, str) else kinds) for kind in TYPES[one])
+    if allowed and (not isinstance(value, allowed) or (isinstance(value, bool) and bool not in allowed)):
+        return [f"{place}: {value!r} is not of type {kinds}"]
     found: list[str] = []
     if isinstance(value, dict):
-        known, others = schema.get("properties", {}), schema.get("additionalProperties")
-        found += [f"{at}: {name} is missing" for name in schema.get("required", []) if name not in value]
+        own = schema.get("properties", {})
+        found += [f"{place}: lacks {name}" for name in schema.get("required", ()) if name not in value]
         for name, one in value.items():
-            part = known.get(name, others if isinstance(others, dict) else None)
-            if part is not None:
-                found += violations(one, part, root, f"{at}.{name}")
-            elif known:
-                found.append(f"{at}: {name} is unknown")
-    if isinstance(value, list) and isinstance(schema.get("items"), dict):
+            found += faults(
+                one, own.get(name, schema.get("additionalProperties", True)), whole, f"{place}.{name}"
+            )
+            found += faults(name, schema.get("propertyNames", True), whole, f"{place}.{name}")
+    if isinstance(value, list):
+        first = schema.get("prefixItems", [])
+        if not schema.get("minItems", 0) <= len(value) <= schema.get("maxItems", len(value)):
+            found.append(f"{place}: {len(value)} items")
         for index, one in enumerate(value):
-            found += violations(one, schema["items"], root, f"{at}[{index}]")
+            part = first[index] if index < len(first) else schema.get("items", True)
+            found += faults(one, part, whole, f"{place}[{index}]")
     return found
+
+
+def conforming(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis, whose JSON is as the schema in the documentation says."""
+    content = json.loads(json.dumps(diagnosis.to_dict(), allow_nan=False))
+    schema = json.loads(SCHEMA.read_text())
+    assert faults(content, schema, schema) == []
+    return diagnosis

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from json_schema import conforming
 
 from machines import CATALOGUE, hopper, records
 from rhythmid.diagnose.answer.result import Diagnosis
@@ -26,7 +27,7 @@ TINY = ({"type": "chirp", "amplitude": 0.004, "sweep": 8.0, "band": [0.0, 7.0]},
 def run(
     given: list[Record], model: Model | None = None, catalogue: Catalogue = SMALL, **options
 ) -> Diagnosis:
-    return diagnose(given, model or hopper(), catalogue=catalogue, **options).diagnosis
+    return conforming(diagnose(given, model or hopper(), catalogue=catalogue, **options).diagnosis)
 
 
 @pytest.fixture(scope="module")
@@ -53,48 +54,43 @@ def limited(record: Record, share: float) -> Record:
     return replace(record, output=replace(record.output, value=np.minimum(value, np.quantile(value, share))))
 
 
-# undecided
+# poor records
 
 
 @pytest.mark.parametrize("length", [0.6, 2.0])
-def test_short_records_decide_nothing_and_say_how_long_to_record(plain, rubbing, length):
-    for given in (plain, rubbing):
-        found = run([one.cut(2.0, 2.0 + length) for one in given])
-        assert found.verdict == "undecided"
-        assert "too short" in found.summary and "periods" in found.summary
-        assert re.match(r"record at least 2\d s each of chirps", found.next_experiment)
+def test_short_records_get_no_wrong_name(plain, rubbing, length):
+    found = run([one.cut(2.0, 2.0 + length) for one in plain])
+    assert found.verdict != "missing_physics" and found.missing == ()
+    found = run([one.cut(2.0, 2.0 + length) for one in rubbing])
+    assert {effect.element for effect in found.missing} <= {"coulomb_friction"}
 
 
-@pytest.mark.parametrize("protocol", [(CYCLE,), (TINY,), (CYCLE, CYCLE)])
-def test_one_amplitude_decides_nothing_and_asks_for_others(protocol):
+@pytest.mark.parametrize("protocol", [(CYCLE,), (TINY,)])
+def test_one_amplitude_forbids_no_answer(protocol):
     found = run(records(hopper(), protocol, seed=3))
-    assert found.verdict == "undecided"
-    assert "one amplitude throughout" in found.summary
-    assert "0.212, 0.706, 2.12" in found.next_experiment
+    assert found.verdict in ("consistent", "undecided") and found.missing == ()
 
 
-def test_what_one_amplitude_suggests_is_no_more_than_the_best_so_far():
+def test_what_one_amplitude_shows_clearly_is_named():
     machine = hopper().with_element(CATALOGUE["coulomb_friction"], {"force": 0.03, "transition": 0.002})
     found = run(records(machine, (CYCLE,), seed=4))
-    assert found.verdict == "undecided"
-    assert found.summary.endswith("Best so far: coulomb friction.")
+    assert [effect.element for effect in found.missing] == ["coulomb_friction"]
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_records_that_are_mostly_noise_decide_nothing_and_ask_for_more_force():
+def test_records_that_are_mostly_noise_decide_nothing_and_ask_for_more():
     quiet = ({"type": "chirp", "amplitude": 1e-3, "sweep": 8.0, "band": [0.0, 7.0]}, 1e-3)
     found = run(records(hopper(), (quiet,), seed=5))
-    assert found.verdict == "undecided"
-    assert "too quiet" in found.summary
-    assert "times as strongly" in found.next_experiment
+    assert (found.verdict, found.missing) == ("undecided", ())
+    assert re.search(r"misses \d+ % of what was measured", found.summary)
+    assert "larger" in found.next_experiment
 
 
-def test_records_of_different_machines_are_told_with_the_parameter_that_differs(plain):
+def test_records_of_different_machines_get_no_name(plain):
     other = records(hopper().with_values({"linear_spring.stiffness": 400.0}), (STRONG,), seed=6)
     found = run([plain[0], *other])
-    assert found.verdict == "undecided"
-    assert "contradict one another" in found.summary
-    assert "linear_spring.stiffness is 2" in found.summary
+    assert (found.verdict, found.missing) == ("undecided", ())
+    assert "nothing that was tried explains it" in found.summary
 
 
 def test_a_strong_effect_is_not_mistaken_for_two_machines():

@@ -7,8 +7,10 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from contests import contest, predicted, supposed
 
 from rhythmid.commands.proof import Machines
+from rhythmid.diagnose.replay import ledger
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import driven
@@ -91,10 +93,11 @@ def kept(catalogue, tmp_path) -> tuple[Path, Campaign]:
     (out / "seals.txt").write_text(f"2026-01-01T00:00:00  {told}  {task.name}\n")
     folder = out / "cases" / task.name
     folder.mkdir(parents=True)
+    evidence = contest(supposed("", predicted(1.0)), supposed("quadratic_drag", predicted(0.05)))
     answer = {
         "verdict": "missing_physics", "indistinguishable": [], "block": 1, "seconds": 2.0, "processor_seconds": 3.0,
         "missing": [{"element": "quadratic_drag", "slot": "force", "probability": 0.9, "parameters": {}}],
-        "evidence": {"scores": [1.0]},
+        "evidence": ledger(evidence, 0.001),
     }  # fmt: skip
     (folder / "answer.json").write_text(json.dumps(answer))
     return out, campaign

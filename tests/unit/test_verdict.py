@@ -1,288 +1,258 @@
-"""The verdict: what the records cannot tell apart, and which lines in a residual are unknown physics."""
+"""The verdict that a user reads: every rule through it, once where it must act and once where it must not."""
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import cast
 
-import numpy as np
 import pytest
+from contests import BLOCKS, SIZE, contest, decided, predicted, supposed, verdict
 
-from machines import CATALOGUE, hopper
-from rhythmid.diagnose.heldout import HeldOut
-from rhythmid.diagnose.location import Dependence
-from rhythmid.diagnose.search.forward import Search
-from rhythmid.diagnose.search.refit import Trial
-from rhythmid.diagnose.search.round import Round
-from rhythmid.diagnose.search.score_tests import Score
-from rhythmid.diagnose.twins import twins_of
-from rhythmid.diagnose.verdict import verdict_of
-from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.output_error import Fit, normalised_error
-from rhythmid.identify.series import Series
-from rhythmid.model import Model
+from rhythmid.diagnose.rejections import RULES
 
-QUIET = NoiseModel(np.empty(0), 1.0)
-TIME = 5e-3 * np.arange(2000)
-SERIES = Series("made", TIME, np.sin(2 * np.pi * TIME), None, None, 1, np.ones(2000, bool), 5e-3)
+NOMINAL = supposed("", predicted(1.0))
+NAMED = ("missing_physics", ("friction",))
+NOTHING = ("consistent", ())
+LEFT_BY_FRICTION = 0.1
 
 
-def trial(base: Model, name: str, **values: float) -> Trial:
-    """A model with one more element, as if it had been fitted."""
-    model = base.with_element(CATALOGUE[name], values)
-    return Trial((name,), model, (), 100.0, 2000, len(model.free), True, QUIET)
+def friction(mean_square: float = LEFT_BY_FRICTION, **changes):
+    return supposed("friction", predicted(mean_square, changes.pop("score", None)), **changes)
 
 
-def test_flight_damping_beside_a_free_switched_damper_is_a_viscous_damper_too():
-    assert twins_of(trial(hopper(), "flight_damping", damping=0.1), []) == [
-        ("flight_damping", "viscous_damper")
-    ]
+# what is missing
 
 
-def test_flight_damping_has_no_twin_where_the_switched_damper_is_known_or_absent():
-    stance = replace(hopper().parameters["switched_damper.stance"], fixed=True)
-    known = hopper().with_parameters({"switched_damper.stance": stance})
-    for base in (known, hopper().without("switched_damper")):
-        assert twins_of(trial(base, "flight_damping", damping=0.1), []) == []
+def test_an_effect_that_predicts_far_better_than_the_nominal_model_is_named():
+    assert verdict(contest(NOMINAL, friction())) == NAMED
 
 
-def test_a_rival_that_replaces_an_effect_is_its_twin_once_and_never_one_that_contains_it():
-    best = trial(hopper(), "flight_damping", damping=0.1)
+def test_a_nominal_model_that_nothing_beats_is_consistent():
+    assert verdict(contest(NOMINAL, friction(0.999))) == NOTHING
+    assert verdict(contest(NOMINAL)) == NOTHING
+
+
+@pytest.mark.parametrize(
+    ("standard_errors", "expected"), [(1.0, NOTHING), (2.0, NOTHING), (8.0, NAMED), (30.0, NAMED)]
+)
+def test_a_gain_that_chance_would_find_among_as_many_candidates_is_none(standard_errors, expected):
+    # the same moods for all but the gain: a standard error of √60 · 0.1
+    gain = standard_errors * BLOCKS**0.5 * 5.0
+    nominal = supposed("", predicted(1.0, 0.0, mood=0.0))
+    found = supposed("friction", predicted(0.1, gain, mood=5.0))
+    assert verdict(contest(nominal, found)) == expected
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.001, NOTHING), (0.01, NAMED), (0.1, NAMED)])
+def test_an_effect_of_a_thousandth_of_the_motion_is_not_named_and_one_of_a_hundredth_is(share, expected):
+    # however sure it is, and although nothing else is to be explained
+    quiet = 1e-8
+    nominal = supposed("", predicted(quiet + (share * SIZE) ** 2, 0.0))
+    assert verdict(contest(nominal, supposed("friction", predicted(quiet, 1e4)))) == expected
+
+
+@pytest.mark.parametrize(("left", "expected"), [(0.19, 1), (0.05, 2)])
+def test_a_further_effect_has_to_remove_more_than_a_small_part_of_what_can_still_be_explained(left, expected):
+    both = supposed("friction cubic", predicted(left, 400.0))
+    made = contest(
+        NOMINAL,
+        friction(0.2, score=200.0),
+        both,
+        maps={"position": predicted(1e-4, 100.0)},
+    )
+    assert verdict(made) == ("missing_physics", ("friction", "cubic")[:expected])
+
+
+@pytest.mark.parametrize(("size", "expected"), [(1e-4, 1), (0.03, 2)])
+def test_a_further_effect_has_to_remove_some_of_the_whole_mismatch(size, expected):
+    # although it removes all of what is left
+    quiet = 1e-5
+    made = contest(
+        NOMINAL,
+        friction(quiet + size, score=200.0),
+        supposed("friction cubic", predicted(quiet, 2000.0)),
+        practical=1e-5,
+    )
+    assert verdict(made) == ("missing_physics", ("friction", "cubic")[:expected])
+
+
+@pytest.mark.parametrize("rule", ["within_bounds", "acts_within_records", "own_frequency"])
+def test_an_effect_that_has_lost_its_shape_is_no_name_and_the_next_best_comes_in_its_place(rule):
+    lost = supposed("play", predicted(0.05), shape={rule: 0.0})
+    assert verdict(contest(NOMINAL, lost, friction()))[1] == ("friction",)
+    assert verdict(contest(NOMINAL, lost))[1] == ()
+    kept = replace(lost, shape={rule: 1e3})
+    assert verdict(contest(NOMINAL, kept, friction()))[1] == ("play",)
+
+
+def test_every_rule_of_the_table_is_one_whose_effect_on_the_verdict_is_tested():
+    tested = {
+        "predicts_better", "share_of_rest", "share_of_mismatch", "practical_size", "within_bounds", "acts_within_records",
+        "own_frequency",
+    }  # fmt: skip
+    assert {rule.name for rule in RULES} == tested
+
+
+# names that compete
+
+
+def test_effects_that_predict_alike_are_undecided_and_all_listed():
+    score = predicted(0.1).score
     rivals = [
-        trial(hopper(), "viscous_damper", damping=0.1),
-        trial(hopper(), "quadratic_drag", coefficient=0.1),
-        trial(hopper(), "viscoelastic_relaxation", stiffness=1.0, time_constant=0.1),
+        supposed(name, predicted(0.1, score, seed=i)) for i, name in enumerate(("friction", "stribeck"))
     ]
-    assert twins_of(best, rivals) == [("flight_damping", "viscous_damper", "quadratic_drag")]
+    _, decision = decided(contest(NOMINAL, *rivals))
+    assert decision.verdict == "undecided"
+    assert [set(group) for group in decision.equivalent] == [{"friction", "stribeck"}]
+    for one in rivals:
+        assert decision.weights[one.key] == pytest.approx(0.5, abs=0.2)
+
+
+def test_an_effect_that_predicts_clearly_better_than_its_kin_is_named_alone():
+    _, decision = decided(contest(NOMINAL, friction(), supposed("stribeck", predicted(0.4))))
+    assert (decision.verdict, decision.named, decision.equivalent) == (*NAMED, ())
+
+
+def test_kin_that_make_one_law_together_do_not_stand_together():
+    # each explains nearly all; both together correct one another by a part of what is left
+    kin = [supposed(name, predicted(ms)) for name, ms in (("friction", 0.1), ("stribeck", 0.3))]
+    both = supposed("friction stribeck", predicted(0.097, predicted(0.1).score + 50.0))
+    made = contest(NOMINAL, *kin, both, maps={"velocity": predicted(0.08)})
+    assert verdict(made) == NAMED
+
+
+def test_two_effects_of_which_each_explains_its_own_stand_together():
+    alone = [supposed(name, predicted(ms)) for name, ms in (("friction", 0.3), ("cubic", 0.7))]
+    both = supposed("friction cubic", predicted(0.01))
+    assert verdict(contest(NOMINAL, *alone, both)) == ("missing_physics", ("friction", "cubic"))
+
+
+def test_names_come_in_the_order_of_their_shares():
+    alone = [supposed(name, predicted(ms)) for name, ms in (("cubic", 0.7), ("friction", 0.3))]
+    _, decision = decided(contest(NOMINAL, *alone, supposed("cubic friction", predicted(0.01))))
+    assert decision.named == ("friction", "cubic")
+    assert decision.shares["friction"] > decision.shares["cubic"] > 0.0
+
+
+def test_the_simpler_of_two_laws_that_predict_alike_is_chosen():
+    score = predicted(0.1).score
+    wide = friction(score=score, free=9)
+    simple = supposed("plain", predicted(0.1001, score - 0.5), free=6)
+    assert decided(contest(NOMINAL, wide, simple))[0].chosen is simple
+    clear = friction(0.02, free=9)
+    assert decided(contest(NOMINAL, clear, simple))[0].chosen is clear
+
+
+def test_a_second_name_that_is_open_does_not_take_the_first_one_with_it():
+    first = friction(0.2)
+    score = predicted(0.05).score
+    pairs = [
+        supposed(f"friction {name}", predicted(0.05, score, seed=i)) for i, name in enumerate(("a", "b"))
+    ]
+    _, decision = decided(contest(NOMINAL, first, *pairs))
+    assert (decision.verdict, decision.named) == NAMED
+    assert decision.joint >= 0.8
+    assert all(decision.probability[label] < 0.8 for label in ("a", "b") if label in decision.probability)
+
+
+def test_names_that_are_not_stood_by_have_no_high_joint_probability():
+    score = predicted(0.1).score
+    rivals = [supposed(name, predicted(0.1, score, seed=i)) for i, name in enumerate("abc")]
+    _, decision = decided(contest(NOMINAL, *rivals))
+    assert decision.verdict == "undecided" and decision.joint < 0.8
+
+
+# other kinds of explanation
+
+
+@pytest.mark.parametrize(("moved", "expected"), [(0.01, "undecided"), (0.5, "missing_physics")])
+def test_an_effect_that_predicts_better_in_a_place_where_the_catalogue_has_nothing_is_no_name(
+    moved, expected
+):
+    lag = supposed("actuator_lag", predicted(0.1))
+    elsewhere = supposed("actuator_lag_of_the_sensor", predicted(moved), "location")
+    found, decision = decided(contest(NOMINAL, lag, elsewhere))
+    assert decision.verdict == expected
+    assert (found.chosen.kind == "location") is (expected == "undecided")
+
+
+@pytest.mark.parametrize(("freed", "expected"), [(0.01, "undecided"), (0.5, "missing_physics")])
+def test_a_fixed_value_that_explains_more_when_it_is_free_is_told_instead_of_a_name(freed, expected):
+    mass = supposed("inertia.mass", predicted(freed), "freed_value")
+    _, decision = decided(contest(NOMINAL, friction(), mass))
+    assert decision.verdict == expected
+    assert (decision.named == ("friction",)) is (expected == "missing_physics")
 
 
 @pytest.mark.parametrize(
-    ("chi2", "expected"), [(95.0, []), (90.0, [("coulomb_friction", "asymmetric_coulomb_friction")])]
+    ("law", "expected"), [(0.01, "unknown_physics"), (0.5, "missing_physics"), (0.98, "missing_physics")]
 )
-def test_what_contains_an_effect_is_its_twin_where_it_does_better_by_more_than_its_parameters_cost(
-    chi2, expected
-):
-    best = trial(hopper(), "coulomb_friction", force=0.1, transition=0.01)
-    wider = trial(hopper(), "asymmetric_coulomb_friction", force=0.1, asymmetry=0.01, transition=0.01)
-    assert wider.free == best.free + 1  # worth 7.6
-    assert twins_of(best, [replace(wider, chi2=chi2)]) == expected
+def test_one_free_law_that_predicts_as_well_as_a_series_of_names_is_unknown_physics(law, expected):
+    one = supposed("free_force_of_position", predicted(law), "free_map")
+    alone = [supposed(name, predicted(ms)) for name, ms in (("quadratic", 0.4), ("cubic", 0.3))]
+    made = contest(NOMINAL, *alone, supposed("quadratic cubic", predicted(0.0098)), one)
+    assert verdict(made)[0] == expected
 
 
-def several(base: Model, chi2: float = 100.0, **elements: dict[str, float]) -> Trial:
-    """A model with several more elements, as if it had been fitted."""
-    for name, values in elements.items():
-        base = base.with_element(CATALOGUE[name], values)
-    return Trial(tuple(elements), base, (), chi2, 2000, len(base.free), True, QUIET)
-
-
-CURVED = {
-    "cubic_stiffness": {"coefficient": 10.0},
-    "quadratic_stiffness": {"coefficient": 10.0},
-    "quintic_stiffness": {"coefficient": 10.0},
-    "position_ripple": {"amplitude": 5.0, "wavelength": 0.5, "phase": 0.0},
-}
-
-
-CURVED_AND_DRY = {
-    "cubic_stiffness": CURVED["cubic_stiffness"],
-    "coulomb_friction": {"force": 0.1, "transition": 0.01},
-}
-
-
-def test_effects_that_one_element_can_replace_each_are_one_family_and_too_many_models_to_name_one():
-    terms = {name: CURVED[name] for name in ("quadratic_stiffness", "quintic_stiffness")}
-    best = several(hopper(), **terms)
-    ripple = CURVED["position_ripple"]
-    rivals = [several(hopper(), **{name: terms[name]}, position_ripple=ripple) for name in terms]
-    twins = twins_of(best, rivals)
-    assert twins == [("quadratic_stiffness", "quintic_stiffness", "position_ripple")]
-    found = replace(explained(0.1, 0.01), best=best, trials=(best, *rivals))
-    assert verdict_of(found, 1e-9, [], twins, None, [SERIES], 0.0)[0] == "undecided"
-    # one replacement for one of two effects leaves two models: that is an answer
-    twins = twins_of(best, rivals[:1])
-    assert twins == [("quintic_stiffness", "position_ripple")]
-    found = replace(found, best=several(hopper(), **CURVED_AND_DRY))
-    twins = [("cubic_stiffness", "position_ripple")]
-    assert verdict_of(found, 1e-9, [], twins, None, [SERIES], 0.0)[0] == "missing_physics"
+# what is left
 
 
 @pytest.mark.parametrize(
-    ("terms", "better", "expected"),
-    [
-        (("quadratic_stiffness", "quintic_stiffness"), 0.0, "undecided"),
-        (
-            ("quadratic_stiffness", "position_ripple"),
-            0.0,
-            "undecided",
-        ),  # of two families: one law all the same
-        (("quadratic_stiffness", "quintic_stiffness"), 100.0, "unknown_physics"),
-        (("quadratic_stiffness", "quintic_stiffness", "position_ripple"), 0.0, "unknown_physics"),
-        (("cubic_stiffness", "coulomb_friction"), 100.0, "missing_physics"),
-        (("cubic_stiffness", "faint_quadratic"), 100.0, "missing_physics"),  # which corrects the cubic one
-    ],
+    ("left", "expected"), [(0.75, "unknown_physics"), (0.6, "unknown_physics"), (0.01, "missing_physics")]
 )
-def test_laws_of_one_quantity_that_leave_more_to_say_or_are_many_are_a_series_and_not_named(
-    terms, better, expected
-):
-    values = CURVED | {"coulomb_friction": {"force": 0.1, "transition": 0.01}}
-    given = {name: values[name] for name in terms if name in values}
-    if "faint_quadratic" in terms:
-        given["quadratic_stiffness"] = {"coefficient": 1.0}
-    best = several(hopper(), **given)
-    kink = {"change": 1.0, "kink": 0.5}  # two parameters more cost 15
-    richer = several(hopper(), best.chi2 - better, **given, bilinear_stiffness=kink)
-    found = replace(explained(0.1, 0.01), best=best, trials=(best, richer))
-    verdict, why = verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)
-    assert verdict == expected
-    assert ("a series for one law of the position" in why) is (expected == "unknown_physics")
-    assert ("one law of the position that the catalogue does not have" in why) is (expected == "undecided")
+def test_names_that_leave_most_of_what_a_free_map_explains_are_unknown_physics(left, expected):
+    made = contest(NOMINAL, friction(left), maps={"velocity": predicted(1e-4)})
+    _, decision = decided(made)
+    assert (decision.verdict, decision.named) == (expected, ("friction",))
+    assert decision.unexplained.share == pytest.approx(left, abs=0.02)
+    assert decision.unexplained.goes_with == "velocity"
 
 
-@pytest.mark.parametrize(("size", "expected"), [(0.25, "missing_physics"), (1.0, "unknown_physics")])
-def test_a_leading_law_with_more_than_one_correction_is_named_only_where_these_are_faint(size, expected):
-    """Of the sum of the three the corrections together are 5 % and 24 %: of one correction both would be borne."""
-    best = several(
-        hopper(),
-        cubic_stiffness=CURVED["cubic_stiffness"],
-        quadratic_stiffness={"coefficient": size},
-        quintic_stiffness={"coefficient": -0.5 * size},
-    )
-    found = replace(explained(0.1, 0.01), best=best, trials=(best,))
-    assert verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)[0] == expected
+@pytest.mark.parametrize(("left", "mainly"), [(0.3, True), (0.7, False)])
+def test_names_that_leave_a_part_are_mainly_right_and_such_that_leave_most_are_not(left, mainly):
+    _, decision = decided(contest(NOMINAL, friction(left), maps={"velocity": predicted(1e-4)}))
+    assert (decision.verdict, decision.named) == ("unknown_physics", ("friction",))
+    assert ("mainly" in decision.reason) is mainly
+    assert "velocity" in decision.reason and decision.joint < 0.8
 
 
-def fit_of(rest: float, line: float) -> Fit:
-    """A fit that leaves noise of size `rest`, as a share of the motion, and in it a line of this size, at 3.7 Hz."""
-    noise = rest * np.random.default_rng(2).standard_normal(len(TIME))
-    residuals = (np.std(SERIES.value) * (noise + np.sqrt(2.0) * line * np.sin(2 * np.pi * 3.7 * TIME)),)
-    run, power = SimpleNamespace(series=(SERIES,)), float(np.sum(residuals[0] ** 2))
-    made = SimpleNamespace(
-        run=run,
-        residuals=residuals,
-        chi2=power,
-        std={},
-        nrmse=lambda: normalised_error(residuals, run.series),
-    )
-    return cast(Fit, made)
+def test_a_small_structured_remainder_does_not_take_the_name_away():
+    made = contest(NOMINAL, friction(0.02), maps={"position": predicted(0.01)})
+    _, decision = decided(made)
+    assert (decision.verdict, decision.named) == NAMED
+    assert decision.unexplained.significant and 0.0 < decision.unexplained.share < 0.02
+    assert decision.probability["friction"] >= 0.8
 
 
-@pytest.mark.parametrize(("unexplained", "expected"), [(0.1, "missing_physics"), (0.0125, "unknown_physics")])
-def test_a_line_is_unknown_physics_unless_it_is_faint_beside_what_was_explained(unexplained, expected):
-    best = trial(hopper(), "coulomb_friction", force=0.1, transition=0.01)
-    found = Search(fit_of(unexplained, 0.0), best, fit_of(0.01, 0.005), QUIET, (best,), (), ())
-    verdict, why = verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)
-    assert verdict == expected
-    assert ("a line at 3.7 Hz remains" in why) is (expected == "unknown_physics")
+def test_what_no_name_explains_but_a_free_map_does_is_unknown_physics_and_told_by_its_quantity():
+    maps = {"position": predicted(0.5), "velocity": predicted(0.1)}
+    _, decision = decided(contest(NOMINAL, friction(0.999), maps=maps))
+    assert (decision.verdict, decision.named) == ("unknown_physics", ())
+    assert "velocity" in decision.reason and decision.unexplained.goes_with == "velocity"
 
 
-def explained(nominal: float, left: float, held: float = 0.0) -> Search:
-    """A search whose one effect takes the error from `nominal` to `left`; both leave a line of size `held` where nothing was fitted."""
-    best = trial(hopper(), "coulomb_friction", force=0.1, transition=0.01)
-    fits = []
-    for size in (nominal, left):
-        residual = np.std(SERIES.value) * size * np.random.default_rng(3).standard_normal(len(TIME))
-        used = TIME < 7.0
-        residual[~used] += (
-            np.std(SERIES.value) * (held + nominal - left) * np.sqrt(2) * np.sin(6 * TIME[~used])
-        )
-        series = replace(SERIES, used=used, hidden=~used)
-        chi2 = float(np.sum((residual[used] / (0.01 * np.std(SERIES.value))) ** 2))
-        run = SimpleNamespace(series=(series,))
-        made = {
-            "run": run,
-            "residuals": (residual,),
-            "chi2": chi2,
-            "nrmse": lambda size=size: size,
-            "std": {},
-        }
-        fits.append(SimpleNamespace(**made))
-    return Search(cast(Fit, fits[0]), best, cast(Fit, fits[1]), QUIET, (best,), (), ())
+def test_what_a_free_map_explains_by_chance_or_of_no_practical_size_is_nothing():
+    chance = predicted(0.1, NOMINAL.prediction.score + 5.0, mood=10.0)
+    assert verdict(contest(NOMINAL, maps={"velocity": chance})) == NOTHING
+    tiny = supposed("", predicted(1e-8 + (0.001 * SIZE) ** 2, 0.0))
+    assert verdict(contest(tiny, maps={"velocity": predicted(1e-8, 1e4)})) == NOTHING
 
 
-@pytest.mark.parametrize(("share", "expected"), [(0.002, "missing_physics"), (0.02, "unknown_physics")])
-def test_effects_that_leave_a_structured_remainder_are_not_named_unless_it_is_faint(share, expected):
-    found = explained(0.1, 0.01)
-    gain = share * (found.nominal.chi2 - found.fit.chi2)
-    remains = [Dependence("position", 0.5, 1e-30, gain, np.empty(0), np.empty(0))]
-    verdict, why = verdict_of(found, 1e-9, remains, [], None, [SERIES], 0.0)
-    assert verdict == expected
-    assert ("structured remainder" in why) is (expected == "unknown_physics")
+@pytest.mark.parametrize(("detectable", "expected"), [(0.001, "consistent"), (0.8, "undecided")])
+def test_records_that_would_not_show_an_effect_decide_nothing(detectable, expected):
+    assert verdict(contest(NOMINAL, friction(0.999)), detectable)[0] == expected
 
 
-@pytest.mark.parametrize(
-    ("share", "p_value", "added", "expected"),
-    [
-        (0.004, 1e-6, ("coulomb_friction",), "unknown_physics"),
-        (0.001, 1e-6, ("coulomb_friction",), "missing_physics"),  # no more than real machines leave
-        (0.004, 0.02, ("coulomb_friction",), "missing_physics"),  # may be chance
-        (0.004, 1e-6, (), "missing_physics"),  # from before the effect was there
-        (0.004, 1e-6, ("second_mode", "bilinear_stiffness"), "missing_physics"),  # that stood in its place
-    ],
-)
-def test_effects_that_leave_what_a_further_one_explains_in_part_are_not_named(
-    share, p_value, added, expected
-):
-    found = explained(0.1, 0.01)
-    statistic = share * (found.nominal.chi2 - found.fit.chi2)
-    score = Score(0, CATALOGUE["quadratic_drag"], {"coefficient": 0.1}, statistic, 1.0)
-    found = replace(found, rounds=(Round((score,), p_value), Round((score,), p_value, added)))
-    assert verdict_of(found, 1e-9, [], [], None, [SERIES], 0.0)[0] == expected
+@pytest.mark.parametrize(("missed", "expected"), [(0.1, "consistent"), (0.5, "undecided")])
+def test_a_model_that_misses_much_is_not_called_consistent_though_nothing_explains_it(missed, expected):
+    nominal = supposed("", predicted((missed * SIZE) ** 2))
+    _, decision = decided(contest(nominal))
+    assert decision.verdict == expected
+    assert ("misses" in decision.reason) is (expected == "undecided")
 
 
-def test_effects_that_do_not_hold_on_held_out_data_are_not_named():
-    verdict, why = verdict_of(explained(0.1, 0.01), 1e-9, [], [], None, [SERIES], 0.2)
-    assert verdict == "unknown_physics"
-    assert "20 % of what is missing on held-out data remains" in why
+def test_records_that_would_not_show_a_small_effect_still_show_a_large_one():
+    assert verdict(contest(NOMINAL, friction()), 0.8) == NAMED
 
 
-def test_what_noise_leaves_on_held_out_data_is_nothing_and_what_stays_is_told_as_a_share():
-    found = explained(0.1, 0.01)
-    calm = replace(found, fit=explained(0.01, 0.01).fit)
-    assert HeldOut(calm, None).uncarried() == 0.0
-    left = replace(found, fit=explained(0.01, 0.01, 0.05).fit)
-    assert HeldOut(left, None).uncarried() == pytest.approx(0.05**2 / (0.1**2 + 0.09**2), rel=0.2)
-
-
-@pytest.mark.parametrize(("p_value", "expected"), [(3e-3, "undecided"), (1e-9, "unknown_physics")])
-def test_more_than_repeats_show_is_unknown_physics_only_where_the_catalogue_sees_it_too(p_value, expected):
-    """Rounding repeats with the motion, so that repeats can show less noise than there is."""
-    nothing = replace(
-        explained(0.01, 0.01),
-        best=replace(trial(hopper(), "coulomb_friction", force=0.1, transition=0.01), added=()),
-    )
-    repeats = NoiseModel(np.empty(0), 0.8 * 0.01 * float(np.std(SERIES.value)))
-    verdict, _ = verdict_of(nothing, p_value, [], [], repeats, [SERIES], 0.0)
-    assert verdict == expected
-
-
-@pytest.mark.parametrize(("rounded", "expected"), [(False, "unknown_physics"), (True, "missing_physics")])
-def test_what_rounding_may_leave_is_no_unknown_physics(rounded, expected):
-    """A remainder of a hundredth of the motion, of which repeats show a quarter; rounding to 4 % leaves as much."""
-    step = 0.04 * float(np.std(SERIES.value))
-    value = step * np.round(SERIES.value / step) if rounded else SERIES.value
-    repeats = NoiseModel(np.empty(0), 0.25 * 0.01 * float(np.std(SERIES.value)))
-    seen = [replace(SERIES, value=value, used=TIME < 7.0)]
-    assert verdict_of(explained(0.1, 0.01), 1e-9, [], [], repeats, seen, 0.0)[0] == expected
-
-
-@pytest.mark.parametrize(
-    ("share", "worth", "expected"),
-    [
-        (0.003, 180.0, "unknown_physics"),
-        (0.003, 1e4, "missing_physics"),
-        (0.001, 180.0, "missing_physics"),  # as a real machine leaves
-    ],
-)
-def test_effects_are_not_named_where_a_tenth_remains_of_what_the_least_of_them_explains(
-    share, worth, expected
-):
-    found = explained(0.1, 0.01)
-    two = replace(
-        found.best,
-        added=("coulomb_friction", "freeplay"),
-        model=found.best.model.with_element(CATALOGUE["freeplay"], {"gap": 1e-3}),
-    )
-    one = replace(found.best, chi2=two.chi2 + worth)
-    found = replace(found, best=two, trials=(two, one))
-    gain = share * (found.nominal.chi2 - found.fit.chi2)
-    remains = [Dependence("position", 0.2, 1e-30, gain, np.empty(0), np.empty(0))]
-    assert verdict_of(found, 1e-9, remains, [], None, [SERIES], 0.0)[0] == expected
+def test_every_verdict_but_consistent_and_missing_physics_has_a_reason_in_words():
+    made = contest(NOMINAL, friction(0.6), maps={"velocity": predicted(1e-4)})
+    assert decided(made)[1].reason
+    assert decided(contest(NOMINAL), 0.8)[1].reason

@@ -95,8 +95,8 @@ def check_comparable(series: Sequence[Series]) -> None:
     """Raise InputError when records cannot come from one machine in one set of units."""
     spread = [float(np.std(one.averaged)) for one in series]
     level = [float(np.mean(one.averaged)) for one in series]
-    for one, size in zip(series, spread):
-        if size == 0.0:
+    for one in series:
+        if np.ptp(one.averaged) == 0.0:
             raise InputError(f"{one.name}: the output never changes; nothing can be learnt from it")
     for i, one in enumerate(series):
         for j in range(i):

@@ -47,8 +47,6 @@ STATED = 0.8
 EXPLAINED = 0.8
 # the same, from which the names are the main part of it
 MAINLY = 0.5
-# quantile of the normal distribution that 95 % intervals reach to
-COVERAGE = 1.959963984540054
 # of a bound, or of an effect, within which a value is taken to be there: rounding of a descent that stopped at it
 EDGE = 1e-3
 # chance that the catalogue holds the truth, as a function of what the names leave of all that anything explains: half at

@@ -5,7 +5,6 @@ beyond the ends it stays as it is there. "Unknown physics" is such a map in the 
 laws of the same quantity are a series for one law: the map says whether one would do.
 """
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -15,6 +14,8 @@ from rhythmid.elements.element import Element, Parameter, Slot
 
 Array = NDArray[np.float64]
 COEFFICIENTS = 10
+MARGIN = 0.05  # of the range of its quantity, by which a map reaches further on either side
+LEAST = 1e-9  # range of a map whose quantity never changes, as a share of its size
 
 
 def _force(x, v, t, f, low, high, share, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9):
@@ -75,5 +76,5 @@ FREE_MAPS: Mapping[str, Element] = {
 def first_guess(values: Array) -> dict[str, float]:
     """Values of a map over the range of a quantity (n,), zero everywhere."""
     low, high = (float(end) for end in np.quantile(values, [0.0, 1.0]))
-    margin = 0.05 * max(high - low, math.ulp(1.0))
+    margin = max(MARGIN * (high - low), LEAST * max(abs(low), abs(high)), LEAST**2)
     return {"low": low - margin, "high": high + margin} | {f"c{i}": 0.0 for i in range(COEFFICIENTS)}

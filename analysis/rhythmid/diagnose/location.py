@@ -160,18 +160,67 @@ def _frequency(known: Trajectories) -> float:
     return velocity / max(2.0 * math.pi * position, 1e-300)
 
 
-def beside(fit: Fit, base: Linearised, one: FreeMap, rows: Rows) -> Linearised:
-    """The fit with a free map beside it, to first order. Separate held-out records are predicted as without it."""
-    seen = []
-    for index, (parts, basis) in enumerate(zip(rows.seen, fit.linearisation.bases)):
+@dataclass(frozen=True)
+class Reach:
+    """What parameters and the initial state do to whitened rows of one series that its fit does not see.
+
+    Without it a free map would be predicted with parameters that were fitted without it. `parameters` (h, p), with the initial
+    state fitted again; `starts` (h, q), and (n, q) of the rows that the fit sees as `seen`.
+    """
+
+    parameters: Array
+    starts: Array
+    seen: Array
+
+    def refitted(self, seen: Array, hidden: Array) -> Array:
+        """What is left of changes of the hidden rows (h, k) once the initial state is fitted to those of the seen ones (n, k)."""
+        norms = np.linalg.norm(self.seen, axis=0)
+        norms[norms == 0.0] = 1.0
+        taken = np.linalg.lstsq(self.seen / norms, seen, rcond=1e-7)[0]
+        return hidden - self.starts / norms @ taken
+
+
+def _white(rows: Rows, values: Array, parts: Sequence[slice]) -> Array:
+    return np.concatenate([rows.noise.whiten(values[part]) for part in parts] or [values[:0]])
+
+
+def reach_of(fit: Fit, rows: Rows, pool: ThreadPoolExecutor | None = None) -> list[Reach]:
+    """How each series' hidden rows depend on the fit's parameters and starts."""
+    model, (steps, state_steps) = fit.model, (fit.linearisation.steps, fit.linearisation.state_steps)
+    moved = [model.with_values({name: model.value(name) + step}) for name, step in zip(fit.names, steps)]
+    cases = [(one, fit.starts) for one in moved]
+    cases += [(model, tuple(start + shift for start in fit.starts)) for shift in np.diag(state_steps)]
+    outputs = fit.run.many(cases, pool)
+    scale, p = np.concatenate([steps, state_steps]), len(fit.names)
+    found = []
+    for index, (series, residual) in enumerate(zip(fit.run.series, fit.residuals)):
+        change = np.zeros((series.blocks, len(scale)))
+        for column, output in enumerate(outputs):
+            if output is not None:
+                change[:, column] = (output[index] - series.averaged - residual) / scale[column]
+        seen, hidden = (_white(rows, change, which[index]) for which in (rows.seen, rows.hidden))
+        plain = Reach(hidden[:, :p], hidden[:, p:], seen[:, p:])
+        found.append(Reach(plain.refitted(seen[:, :p], hidden[:, :p]), plain.starts, plain.seen))
+    return found
+
+
+def following(base: Linearised, rows: Rows, reach: Sequence[Reach]) -> Linearised:
+    """The fit whose parameters reach the hidden rows, too; separate held-out records are predicted as it stands."""
+    jacobian = base.jacobian.copy()
+    hidden = np.concatenate([one.parameters for one in reach])
+    jacobian[rows.fitted : rows.fitted + len(hidden)] = hidden
+    return Linearised(base.residual, jacobian, base.precision, base.departure)
+
+
+def beside(fit: Fit, base: Linearised, one: FreeMap, rows: Rows, reach: Sequence[Reach]) -> Linearised:
+    """The fit, which reaches the hidden rows, with a free map beside it, to first order. Separate held-out records are predicted
+    as without it."""
+    seen, hidden = [], []
+    for index, basis in enumerate(fit.linearisation.bases):
         columns = np.column_stack([column[index] for column in one.columns])
-        white = np.concatenate([rows.noise.whiten(columns[part]) for part in parts] or [columns[:0]])
+        white = _white(rows, columns, rows.seen[index])
         seen.append(white - basis @ (basis.T @ white))
-    hidden = [
-        rows.noise.whiten(np.column_stack([column[index][part] for column in one.columns]))
-        for index, parts in enumerate(rows.hidden)
-        for part in parts
-    ]
+        hidden.append(reach[index].refitted(white, _white(rows, columns, rows.hidden[index])))
     added = np.concatenate([*seen, *hidden])
     wide = np.zeros((len(base.residual), added.shape[1]))
     wide[: len(added)] = added
@@ -188,13 +237,14 @@ def beside(fit: Fit, base: Linearised, one: FreeMap, rows: Rows) -> Linearised:
 def dependences(known: Trajectories, rows: Rows, pool: ThreadPoolExecutor | None = None) -> list[Dependence]:
     """Dependence of what a fit leaves on each quantity, the one that predicts best first."""
     fit = known.fit
-    base = linearised(fit, rows)
+    reach = reach_of(fit, rows, pool)
+    base = following(linearised(fit, rows), rows, reach)
     alone = cross_validate(base, rows.blocks)
     before = float(np.sum(alone.error**2))
     n = len(alone.error)
     found: list[Dependence] = []
     for one in free_maps(known, pool):
-        wide = beside(fit, base, one, rows)
+        wide = beside(fit, base, one, rows, reach)
         predicted = cross_validate(wide, rows.blocks)
         coefficients = _coefficients(wide, rows.fitted)[-len(one.columns) :]
         left = float(np.sum(predicted.error**2))

@@ -124,7 +124,7 @@ def equivalent(other: Hypothesis, best: Hypothesis, floor: float) -> bool:
     gain, error = difference(best.prediction, other.prediction)
     left = other.prediction.mean_square - floor
     removed = other.prediction.mean_square - best.prediction.mean_square
-    return gain < EQUIVALENT * error or removed < REST * left
+    return gain <= EQUIVALENT * error or removed <= REST * left
 
 
 def without_elements(contest: Contest, gone: Sequence[str]) -> Contest:

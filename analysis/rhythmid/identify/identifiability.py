@@ -27,11 +27,11 @@ from rhythmid.identify.series import dominant_frequency
 from rhythmid.ltp.limit_cycle import limit_cycle
 from rhythmid.ltp.pumping import pumping_of
 from rhythmid.simulation.simulate import physical_times
+from rhythmid.statistics import NORMAL_95
 
 Array = NDArray[np.float64]
 Forcing = Literal["on_robot", "delayed", "clock_unknown"]
 CERTAIN = 4.0  # standard deviations
-COVER = 1.96  # standard deviations on either side of a 95 % interval
 SEEN = 1e-3  # of the limit cycle's fundamental, from which a harmonic of it counts
 
 
@@ -319,12 +319,12 @@ def _intervals(
     first: Estimate, second: Estimate, total: Estimate, offset: Offset | None
 ) -> dict[str, tuple[float, float]]:
     """95 % intervals of the delays from causality (neither is negative) and from bounds on the clock offset."""
-    spread = COVER * (total.std or 0.0)
+    spread = NORMAL_95 * (total.std or 0.0)
     longest = max((total.value or 0.0) + spread, 0.0)
     whole = (0.0, longest)
     if offset is None or first.value is None or second.value is None:
         return {"input": whole, "measurement": whole}
-    wide = (COVER * (first.std or 0.0), COVER * (second.std or 0.0))
+    wide = (NORMAL_95 * (first.std or 0.0), NORMAL_95 * (second.std or 0.0))
     ranges = (
         (first.value + offset.low - wide[0], first.value + offset.high + wide[0]),
         (second.value - offset.high - wide[1], second.value - offset.low + wide[1]),

@@ -7,8 +7,7 @@ import numpy as np
 
 from rhythmid.identify.output_error import Fit
 from rhythmid.record.record import Record
-
-COVER = 1.959964  # standard deviations on either side of a 95 % interval
+from rhythmid.statistics import NORMAL_95
 
 
 @dataclass(frozen=True)
@@ -45,5 +44,5 @@ def scatter(found: Sequence[Drawn], name: str, truth: float) -> Scatter:
     """Scatter of the parameter `name` over fits of independent noise about its true value."""
     values = np.array([one.values[name] for one in found])
     stds = np.array([one.std[name] for one in found])
-    covered = np.abs(values - truth) < COVER * stds
+    covered = np.abs(values - truth) < NORMAL_95 * stds
     return Scatter(float(values.std(ddof=1)), float(values.mean() - truth), float(covered.mean()))

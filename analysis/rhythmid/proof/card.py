@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from rhythmid.proof.rate import NORMAL_95, Rate, rate
+from rhythmid.proof.rate import Rate, rate
 from rhythmid.proof.reliability import reliability, reliability_lines
 from rhythmid.proof.score import SURE, Estimated, Score
+from rhythmid.statistics import NORMAL_95
 
 BINS = ((0.3, 1.0), (1.0, 3.0), (3.0, math.inf))
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rhythmid.proof.score import Score
-
-NORMAL_95 = 1.959964
+from rhythmid.statistics import NORMAL_95
 
 
 @dataclass(frozen=True)

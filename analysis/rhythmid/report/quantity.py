@@ -3,7 +3,8 @@
 import math
 import re
 
-NORMAL_95 = 1.959963984540054  # standard deviations to either side that hold 95 % of a normal distribution
+from rhythmid.statistics import NORMAL_95
+
 MINUS = "\u2212"
 NONE = "—"
 RARE = 1e-3  # probability below which only that is told

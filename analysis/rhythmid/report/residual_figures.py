@@ -21,6 +21,7 @@ from rhythmid.report.run import (
     harmonics,
 )
 from rhythmid.report.state_map import draw_maps, state_map
+from rhythmid.statistics import NORMAL_95
 
 HELD_OUT = "held out"
 MOST_SHOWN = 12  # records drawn in full; all are in the table
@@ -122,7 +123,7 @@ def _over_cycle(run: Run, factor: float, unit: str) -> Drawing | None:
         if found is None or (which == "after" and run.after is None):
             continue
         phase, mean, std = found
-        mean, half = factor * mean, 1.96 * factor * std
+        mean, half = factor * mean, NORMAL_95 * factor * std
         curves.append(Curve(phase, mean, label, which, low=mean - half, high=mean + half))
     if not curves:
         return None
@@ -261,7 +262,11 @@ def cycle_harmonics(run: Run, unit: str, noise: float) -> Table | None:
     factor, shown = scaled(max(h.before for h in found), unit)
 
     def told(value: float | None, one: Harmonic) -> str:
-        return "—" if value is None else with_unit(plus_minus(factor * value, 1.96 * factor * one.std), shown)
+        return (
+            "—"
+            if value is None
+            else with_unit(plus_minus(factor * value, NORMAL_95 * factor * one.std), shown)
+        )
 
     repaired = run.after is not None
     columns = ("harmonic of the forcing", "measured", "missed before", "missed after")

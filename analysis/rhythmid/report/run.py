@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from rhythmid.report.state_map import state_map
+from rhythmid.statistics import NORMAL_95
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -113,7 +114,7 @@ def error_of(runs: Sequence[Run], which: Which, hidden: bool = False) -> Error |
     half = None
     if len(parts) >= SEGMENTS and joined.mean() > 0.0:
         scatter = float(np.std(parts, ddof=1)) / math.sqrt(len(parts))
-        half = 1.96 * 0.5 * ratio * scatter / float(joined.mean())
+        half = NORMAL_95 * 0.5 * ratio * scatter / float(joined.mean())
     return Error(math.sqrt(float(joined.mean())), ratio, half)
 
 

@@ -7,7 +7,8 @@ from typing import Any
 
 from rhythmid import __version__
 from rhythmid.report.blocks import Block, Code, Fold, Paragraph, Section, Table
-from rhythmid.report.quantity import NONE, NORMAL_95, estimate, number, pretty_name, scaled, with_unit
+from rhythmid.report.quantity import NONE, estimate, number, pretty_name, scaled, with_unit
+from rhythmid.statistics import NORMAL_95
 
 PACKAGES = ("numpy", "scipy", "numba", "rosbags")
 DELAYS = {"input": "input delay τ_u", "measurement": "measurement delay τ_y", "sum": "sum τ_u + τ_y"}

@@ -24,6 +24,8 @@ from rhythmid.simulation.signal import spline, zero_order_hold
 Array = NDArray[np.float64]
 HIGHEST = 0.4  # of the sample rate
 LENGTH = 30.0  # periods of the dominant motion
+NONE = "none needed for these records; a larger and more varied excitation would exclude smaller effects"
+MORE = "repeat the records with a larger and more varied excitation"
 
 
 @dataclass(frozen=True)
@@ -129,12 +131,10 @@ def next_experiment(found: Search, rivals: Sequence[Trial], series: Sequence[Ser
     if not others:
         others = [t for t in found.trials if set(t.added) != set(best.added)]
     if not others or (verdict == "consistent" and len(found.trials) < 2):
-        return (
-            "none needed for these records; a larger and more varied excitation would exclude smaller effects"
-        )
+        return MORE if verdict == "undecided" else NONE
     menu = separation(best, others[0], series, found.noise.variance, found.fit.run.max_step)
     if not menu:
-        return "repeat the records with a larger and more varied excitation"
+        return MORE
     top = menu[0]
     versus = " + ".join(others[0].added) or "the nominal model"
     mine = " + ".join(best.added) or "the nominal model"

@@ -1,0 +1,70 @@
+"""Contests made by hand: hypotheses whose predictions are plain numbers, for tests of what is decided on them."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from rhythmid.diagnose.constants import PRACTICAL
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
+from rhythmid.diagnose.selection import Contest, Selection, select
+from rhythmid.diagnose.verdict import Decision, decide
+
+BLOCKS = 60
+SAMPLES = 100.0  # of a block
+SIZE = 10.0  # rms of what errors are a share of: a nominal model with a mean square of 1 misses a tenth of it
+SEEN = 0.001  # smallest effect that the records would show, as a share of it
+
+
+def predicted(
+    mean_square: float, score: float | None = None, mood: float = 0.1, seed: int | None = None
+) -> Prediction:
+    """A prediction of 60 blocks of 100 samples with this mean squared error.
+
+    Parameters
+    ----------
+    score : log predictive density of all blocks; by default that of Gaussian errors of this size, of which a hundredth count.
+    mood : standard deviation with which a block's log density departs from the mean, no part of the score.
+    seed : of these departures; by default they are of a size of their own for every mean square.
+    """
+    rng = np.random.default_rng(int(1e9 * mean_square) % 2**31 if seed is None else seed)
+    departures = rng.standard_normal(BLOCKS)
+    departures -= departures.mean()
+    departures *= mood / departures.std(ddof=1)
+    if score is None:
+        score = -0.5 * BLOCKS * float(np.log(mean_square))
+    blocks = np.full(BLOCKS, SAMPLES)
+    return Prediction(score / BLOCKS + departures, mean_square * blocks, blocks)
+
+
+def supposed(
+    elements: str,
+    prediction: Prediction,
+    kind: Kind | None = None,
+    free: int | None = None,
+    shape: Mapping[str, float] | None = None,
+    richer: Mapping[str, tuple[str, ...]] | None = None,
+) -> Hypothesis:
+    """A hypothesis of effects, whose labels (split at spaces) are their names."""
+    labels = tuple(elements.split())
+    chosen = kind or ("effects" if labels else "nominal")
+    count = 5 + len(labels) if free is None else free
+    return Hypothesis(labels, labels, chosen, count, prediction, 0.1, shape or {}, richer or {})
+
+
+def contest(
+    *hypotheses: Hypothesis, maps: Mapping[str, Prediction] | None = None, practical: float = PRACTICAL
+) -> Contest:
+    """The contest of these hypotheses, of thirty effects that were looked at."""
+    return Contest(hypotheses, maps or {}, 30, SIZE, practical)
+
+
+def decided(made: Contest, detectable: float = SEEN) -> tuple[Selection, Decision]:
+    """What is selected and decided, as an answer has it."""
+    chosen = select(made)
+    return chosen, decide(made, chosen, detectable)
+
+
+def verdict(made: Contest, detectable: float = SEEN) -> tuple[str, tuple[str, ...]]:
+    """The verdict that a user reads, and the names that come with it."""
+    decision = decided(made, detectable)[1]
+    return decision.verdict, decision.named

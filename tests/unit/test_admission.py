@@ -1,0 +1,103 @@
+"""Admission: which records a diagnosis can use, what is left out of them, and what is said of that."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from machines import SHORT, hopper, records
+from rhythmid.diagnose.admission import admitted, check_comparable, check_driven, without_clipped
+from rhythmid.errors import InputError
+from rhythmid.identify.series import prepare
+from rhythmid.model import Model
+from rhythmid.record.record import Channel, Record
+
+FREE = Model.from_text("""
+inertia: {mass: {value: 1.0, unit: kg}}
+force:
+  - linear_spring: {stiffness: {value: 180.0, unit: N/m}, rest_length: {value: 0.0, unit: m}}
+  - viscous_damper: {damping: {value: 0.4, unit: N*s/m}}
+""")
+TIME = 1e-3 * np.arange(8000)
+
+
+@pytest.fixture(scope="module")
+def given() -> list[Record]:
+    return records(hopper(), SHORT[:2])
+
+
+def limited(record: Record, share: float) -> Record:
+    """The record of a sensor that goes no further than this quantile."""
+    value = record.output.value
+    return replace(record, output=replace(record.output, value=np.minimum(value, np.quantile(value, share))))
+
+
+def swing(decay: float) -> Record:
+    """A free swing at 2 Hz whose size falls with this rate [1/s]."""
+    return Record("swing", Channel(TIME, 0.05 * np.exp(-decay * TIME) * np.cos(4.0 * np.pi * TIME), "m"))
+
+
+def test_tidy_records_are_admitted_as_they_are_without_a_word(given):
+    found = admitted(given[:1], given[1:], hopper())
+    assert found.notes == ()
+    for before, after in zip(given, found.records):
+        np.testing.assert_array_equal(before.output.value, after.output.value)
+
+
+def test_records_come_before_held_out_ones(given):
+    assert [one.name for one in admitted(given[1:], given[:1], hopper()).records] == ["record 1", "record 0"]
+
+
+def test_outliers_are_left_out_and_told_once_a_record(given):
+    value = given[0].output.value.copy()
+    value[500::900] += 0.5
+    found = admitted([replace(given[0], output=replace(given[0].output, value=value))], (), hopper())
+    assert found.records[0].output.value.max() < 0.4
+    assert len(found.notes) == 1 and given[0].name in found.notes[0]
+
+
+def test_clipped_samples_and_their_neighbours_are_left_out_and_counted(given):
+    clipped = limited(given[1], 0.97)
+    kept, (note,) = without_clipped(clipped)
+    assert (kept.output.value == clipped.output.value.max()).sum() < 20  # shorter runs are peaks
+    gone = len(clipped.output.value) - len(kept.output.value)
+    count = int(note.split(": ")[1].split()[0])
+    assert 200 < count <= gone <= 3 * count
+
+
+def test_what_was_not_clipped_stays_itself(given):
+    assert without_clipped(given[0]) == (given[0], ())
+
+
+def test_a_sensor_that_is_clipped_most_of_the_time_is_refused(given):
+    with pytest.raises(InputError, match=r"% of the output is clipped at .* wider range"):
+        without_clipped(limited(given[0], 0.3))
+
+
+def test_a_free_decay_needs_no_input_and_motion_that_goes_on_does():
+    assert check_driven([swing(0.4)], FREE) is None
+    with pytest.raises(InputError, match="has no input channel, and the motion does not decay"):
+        check_driven([swing(0.0)], FREE)
+
+
+def test_records_of_which_only_the_forcing_is_known_are_used_with_a_remark(given):
+    alone = [replace(one, input=None) for one in given]
+    said = check_driven(alone, hopper())
+    assert said is not None and "counts as missing physics" in said
+    assert check_driven(given, hopper()) is None
+
+
+@pytest.mark.parametrize("factor", [1000.0, 0.001])
+def test_records_in_units_a_thousand_apart_are_refused_by_name(given, factor):
+    other = replace(given[1], output=replace(given[1].output, value=factor * given[1].output.value))
+    with pytest.raises(InputError, match="record 0 and record 1 do not look like one machine in one unit"):
+        check_comparable(prepare([given[0], other]))
+    check_comparable(prepare(given))
+
+
+def test_an_output_that_never_changes_is_refused(given):
+    still = replace(
+        given[0], output=replace(given[0].output, value=np.full(len(given[0].output.value), 0.15))
+    )
+    with pytest.raises(InputError, match="the output never changes"):
+        check_comparable(prepare([still]))

@@ -1,0 +1,84 @@
+"""Probabilities of names: shares of the evidence, times the chance that the catalogue holds the truth at all."""
+
+from dataclasses import replace
+
+import pytest
+from contests import contest, decided, predicted, supposed
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rhythmid.diagnose.probability import adequacy, joint_probability, weights_of
+from rhythmid.diagnose.selection import select
+
+NOMINAL = supposed("", predicted(1.0))
+SHARES = st.floats(0.0, 1.0)
+
+
+@given(SHARES, SHARES)
+def test_the_catalogue_is_the_more_adequate_the_more_the_names_explain(one, other):
+    low, high = sorted((one, other))
+    assert 0.0 <= adequacy(low) <= adequacy(high) <= 1.0
+
+
+def test_names_that_explain_all_are_believed_and_such_that_explain_little_are_not():
+    assert adequacy(1.0) > 0.99 and adequacy(0.5) < 0.5 and adequacy(0.0) < 0.1
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.dictionaries(st.sampled_from(["a", "b", "c", "a b", "a c", "b c"]), st.floats(0.01, 1.0), min_size=1)
+)
+def test_weights_sum_to_one_over_all_with_no_more_effects_than_the_chosen_one(left):
+    made = contest(NOMINAL, *[supposed(elements, predicted(share)) for elements, share in left.items()])
+    found = select(made)
+    weights = weights_of(made, found)
+    assert sum(weights.values()) == pytest.approx(1.0)
+    assert all(len(key) <= len(found.chosen.elements) for key in weights)
+
+
+def test_a_joint_probability_is_no_larger_than_that_of_any_of_its_names():
+    pairs = [supposed(names, predicted(0.1, seed=i)) for i, names in enumerate(("a b", "a c", "b c"))]
+    weights = {one.key: share for one, share in zip(pairs, (0.5, 0.3, 0.2))}
+    made = contest(NOMINAL, *pairs)
+
+    def joint(*names: str) -> float:
+        return joint_probability(names, made, pairs[0], weights)
+
+    assert joint("a") == pytest.approx(0.8) and joint("b") == pytest.approx(0.7)
+    assert joint("a", "b") == joint("b", "a") == pytest.approx(0.5)
+    assert joint("d") == 0.0
+
+
+def test_a_richer_law_that_predicts_no_better_holds_the_name_that_it_contains():
+    score = predicted(0.05).score
+    plain = supposed("friction", predicted(0.05, score), richer={"friction": ("stribeck",)})
+    wide = supposed("stribeck", predicted(0.0499, score + 0.1), free=9)
+    _, decision = decided(contest(NOMINAL, plain, wide))
+    assert (decision.verdict, decision.named) == ("missing_physics", ("friction",))
+    assert decision.probability["friction"] > 0.8
+    assert decision.equivalent == (("friction", "stribeck"),)
+    unrelated = replace(plain, richer={})
+    assert decided(contest(NOMINAL, unrelated, wide))[1].verdict == "undecided"
+
+
+def test_a_name_that_every_likely_hypothesis_holds_is_sure_though_its_company_is_not():
+    score = predicted(0.01).score
+    pairs = [supposed(names, predicted(0.01, score, seed=i)) for i, names in enumerate(("a b", "a c"))]
+    _, decision = decided(contest(NOMINAL, supposed("a", predicted(0.3)), *pairs))
+    assert decision.probability["a"] > 0.9
+    assert all(decision.probability[name] < 0.9 for name in decision.probability if name != "a")
+
+
+@pytest.mark.parametrize("left", [0.02, 0.2, 0.4, 0.7])
+def test_the_more_is_left_to_a_free_map_the_less_a_name_is_believed(left):
+    def believed(rest: float) -> float:
+        made = contest(NOMINAL, supposed("a", predicted(rest)), maps={"velocity": predicted(1e-4)})
+        return decided(made)[1].probability["a"]
+
+    assert believed(left) < believed(0.5 * left) <= 1.0
+
+
+def test_no_probability_leaves_zero_to_one_and_none_of_the_names_tops_its_weight():
+    _, decision = decided(contest(NOMINAL, supposed("a", predicted(0.1)), supposed("b", predicted(0.11))))
+    for label, value in decision.probability.items():
+        assert 0.0 <= value <= decision.weights[(label,)] + 1e-12

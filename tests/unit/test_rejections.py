@@ -1,0 +1,75 @@
+"""Rejections: one table of rows, each with its statistic, its threshold and its reason."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from contests import SIZE, predicted, supposed
+
+from rhythmid.diagnose.rejections import RULES, Claim, rejections_of, significance, table
+from rhythmid.diagnose.selection import SHAPE_RULES
+
+NOMINAL = supposed("", predicted(1.0))
+GOOD = Claim(supposed("friction", predicted(0.01)), NOMINAL, NOMINAL, 0.01, 30, SIZE, 0.01)
+
+
+def rejected(claim: Claim) -> list[str]:
+    return [row.name for row in rejections_of(claim)]
+
+
+def test_nothing_speaks_against_an_effect_that_explains_all():
+    assert rejected(GOOD) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "claim"),
+    [
+        ("predicts_better", replace(GOOD, hypothesis=supposed("friction", predicted(0.01, 1.0, mood=5.0)))),
+        ("share_of_rest", replace(GOOD, without=supposed("cubic", predicted(0.011, -100.0)), floor=0.0)),
+        ("share_of_mismatch", replace(GOOD, nominal=supposed("", predicted(1e6)))),
+        ("practical_size", replace(GOOD, practical=2.0)),
+        ("within_bounds", replace(GOOD, hypothesis=replace(GOOD.hypothesis, shape={"within_bounds": 0.0}))),
+        (
+            "acts_within_records",
+            replace(GOOD, hypothesis=replace(GOOD.hypothesis, shape={"acts_within_records": 0.0})),
+        ),
+        ("own_frequency", replace(GOOD, hypothesis=replace(GOOD.hypothesis, shape={"own_frequency": 0.1}))),
+    ],
+)
+def test_each_row_rejects_what_it_is_for(name, claim):
+    assert name in rejected(claim)
+    (row,) = [row for row in rejections_of(claim) if row.name == name]
+    assert row.statistic < row.threshold and row.hypothesis == ("friction",)
+
+
+def test_every_row_is_told_and_not_only_the_first():
+    worse = replace(GOOD, hypothesis=supposed("friction", predicted(2.0), shape={"within_bounds": 0.0}))
+    assert rejected(worse) == [
+        "predicts_better", "share_of_rest", "share_of_mismatch", "practical_size", "within_bounds",
+    ]  # fmt: skip
+
+
+def test_a_statistic_that_is_no_number_rejects():
+    broken = replace(GOOD, hypothesis=replace(GOOD.hypothesis, shape={"within_bounds": math.nan}))
+    assert rejected(broken) == ["within_bounds"]
+
+
+def test_more_candidates_and_fewer_blocks_ask_for_more():
+    one = GOOD.hypothesis.prediction
+    few = replace(one, log_density=one.log_density[:6])
+    assert significance(one, 1) < significance(one, 30) < significance(few, 30)
+    assert significance(one, 0) == significance(one, 1)
+
+
+def test_predictions_that_agree_to_the_last_digit_gain_nothing():
+    same = replace(GOOD, hypothesis=replace(GOOD.hypothesis, prediction=NOMINAL.prediction))
+    assert "practical_size" in rejected(same) and "share_of_rest" in rejected(same)
+
+
+def test_names_of_rows_are_their_own_and_the_documentation_has_them_all():
+    names = [rule.name for rule in RULES]
+    assert len(set(names)) == len(names) and set(SHAPE_RULES) <= set(names)
+    lines = table().splitlines()
+    assert len(lines) == 2 + len(RULES)
+    for rule, line in zip(RULES, lines[2:]):
+        assert f"`{rule.name}`" in line and rule.says in line and rule.reason in line

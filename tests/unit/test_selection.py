@@ -1,0 +1,110 @@
+"""Selection: effects are granted their places one after the other, and whatever speaks against others is told."""
+
+import pytest
+from contests import contest, predicted, supposed
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rhythmid.diagnose.selection import equivalent, select, special_case, without_elements
+
+NOMINAL = supposed("", predicted(1.0))
+FRICTION = supposed("friction", predicted(0.2))
+CUBIC = supposed("cubic", predicted(0.6))
+BOTH = supposed("friction cubic", predicted(0.01))
+
+
+def test_places_are_granted_from_the_nominal_model_on():
+    found = select(contest(NOMINAL, CUBIC, FRICTION, BOTH))
+    assert found.grown == (NOMINAL, FRICTION, BOTH) and found.chosen is BOTH
+
+
+def test_the_chosen_hypothesis_is_rejected_by_no_rule_and_every_other_reason_is_told():
+    faint = supposed("drag", predicted(0.999))
+    found = select(contest(NOMINAL, CUBIC, FRICTION, faint, BOTH))
+    rejected = {row.hypothesis for row in found.rejections}
+    assert ("drag",) in rejected and found.chosen.elements not in rejected
+    assert all(row.statistic < row.threshold and row.reason for row in found.rejections)
+
+
+def test_a_place_that_is_not_granted_ends_the_growth_and_larger_hypotheses_are_still_judged():
+    useless = supposed("friction drag", predicted(0.1999, FRICTION.prediction.score))
+    three = supposed("friction drag cubic", predicted(0.2, FRICTION.prediction.score - 10.0))
+    found = select(contest(NOMINAL, FRICTION, useless, three))
+    assert found.chosen is FRICTION
+    assert {row.hypothesis for row in found.rejections} == {useless.elements, three.elements}
+
+
+def test_what_has_lost_its_shape_leaves_its_place_to_the_next_best():
+    lost = supposed("play", predicted(0.05), shape={"acts_within_records": 0.0})
+    found = select(contest(NOMINAL, lost, FRICTION))
+    assert found.chosen is FRICTION
+    assert [row.name for row in found.rejections if row.hypothesis == ("play",)] == ["acts_within_records"]
+
+
+@pytest.mark.parametrize("kind", ["freed_value", "delay", "location", "free_map"])
+def test_other_kinds_of_explanation_compete_for_the_same_place(kind):
+    other = supposed("other", predicted(0.01), kind)
+    assert select(contest(NOMINAL, FRICTION, other)).chosen is other
+    assert select(contest(NOMINAL, FRICTION, supposed("other", predicted(0.5), kind))).chosen is FRICTION
+
+
+def test_of_hypotheses_that_predict_alike_the_one_with_fewer_free_parameters_is_chosen():
+    score = FRICTION.prediction.score
+    wide = supposed("stribeck", predicted(0.2, score + 0.5), free=9)
+    assert select(contest(NOMINAL, wide, FRICTION)).chosen is FRICTION
+
+
+def test_of_laws_that_predict_alike_the_special_case_is_chosen_and_not_the_one_that_contains_it():
+    score = FRICTION.prediction.score
+    plain = supposed("friction", predicted(0.2, score), richer={"friction": ("stribeck", "asymmetric")})
+    wide = supposed("stribeck", predicted(0.1999, score + 0.1), free=plain.free - 1)
+    assert special_case(plain, wide) and not special_case(wide, plain)
+    assert select(contest(NOMINAL, plain, wide)).chosen is plain
+    clear = supposed("stribeck", predicted(0.01), free=9)
+    assert select(contest(NOMINAL, plain, clear)).chosen is clear
+
+
+def test_predictions_that_are_the_same_are_equivalent():
+    one = supposed("wide", FRICTION.prediction, free=9)
+    assert equivalent(one, FRICTION, 0.2) and equivalent(one, FRICTION, 0.0)
+    assert select(contest(NOMINAL, one, FRICTION)).chosen is FRICTION
+
+
+def test_a_rival_is_equivalent_within_standard_errors_or_but_for_a_small_share_of_what_it_leaves():
+    best = supposed("a", predicted(0.1, 100.0, seed=1))
+    near = supposed("b", predicted(0.2, 99.0, mood=1.0, seed=2))
+    assert equivalent(near, best, 0.0)
+    clear_but_small = supposed("b", predicted(0.101, 50.0, seed=2))
+    assert equivalent(clear_but_small, best, 0.0)
+    assert not equivalent(supposed("b", predicted(0.3, 50.0, seed=2)), best, 0.0)
+    assert not equivalent(clear_but_small, best, 0.0999)  # where what is left is nearly all explained
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.dictionaries(
+        st.sampled_from(["a", "b", "c", "a b", "a c", "b c", "a b c"]),
+        st.floats(1e-3, 1.0),
+        max_size=7,
+    ),
+    st.randoms(use_true_random=False),
+)
+def test_a_selection_does_not_depend_on_the_order_of_the_hypotheses(left, random):
+    made = [supposed(elements, predicted(share)) for elements, share in left.items()]
+    shuffled = random.sample(made, len(made))
+    one, other = (select(contest(NOMINAL, *every)) for every in (made, shuffled))
+    assert one.chosen.key == other.chosen.key
+    assert set(one.rejections) == set(other.rejections)
+    assert [len(step.elements) for step in one.grown] == list(range(len(one.grown)))
+
+
+def test_the_floor_is_the_best_prediction_of_all_free_maps_included():
+    assert contest(NOMINAL, FRICTION).floor == pytest.approx(0.2)
+    assert contest(NOMINAL, FRICTION, maps={"time": predicted(0.05)}).floor == pytest.approx(0.05)
+
+
+def test_a_contest_without_some_elements_keeps_the_others():
+    assert without_elements(contest(NOMINAL, FRICTION, CUBIC, BOTH), ["cubic"]).hypotheses == (
+        NOMINAL,
+        FRICTION,
+    )
