@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from axes import CATALOGUE, axis, axis_model
-from json_schema import violations
+from json_schema import faults
 
 from rhythmid.diagnose.answer.present import present
 from rhythmid.diagnose.answer.present_effort import effort_findings
@@ -54,9 +54,9 @@ def test_what_goes_with_the_speed_is_gone_after(found):
 
 def test_the_answer_as_json_keeps_to_the_schema(answer):
     told = answer.diagnosis.to_dict()
-    assert violations(told, schema(), schema()) == []
+    assert faults(told, schema(), schema()) == []
     broken = told | {"verdict": "perhaps", "scoring": "effort"}
-    assert len(violations(broken, schema(), schema())) == 2
+    assert len(faults(broken, schema(), schema())) == 2
 
 
 def test_the_page_is_made_from_the_answer_alone(answer):
