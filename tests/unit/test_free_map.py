@@ -15,6 +15,7 @@ VALUES = {f"c{i}": float(c) for i, c in enumerate(RNG.standard_normal(COEFFICIEN
 def drawn(name: str, z: float, low: float = -1.0, high: float = 2.0) -> float:
     """The map of a force, or the change that a map of a signal makes, at one value of its quantity."""
     element = FREE_MAPS[name]
+    assert element.kernel is not None
     coefficients = list(VALUES.values())
     if element.slot == "force":
         share = element.parameter("share").default
@@ -42,6 +43,7 @@ def test_a_force_takes_the_quantity_that_its_name_says():
     for name, other in (("position", (0.3, 5.0)), ("velocity", (5.0, 0.3))):
         element = FREE_MAPS[f"{name}"]
         share = element.parameter("share").default
+        assert element.kernel is not None
         found = element.kernel(*other, 0.0, 0.0, *values[0], share, *values[1])
         assert found == pytest.approx(drawn(name, 0.3))
 
