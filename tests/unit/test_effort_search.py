@@ -9,7 +9,6 @@ from axes import CATALOGUE, arm_model, axis, axis_model, frame, frame_model
 from rhythmid.diagnose.effort.held_out import HeldOut
 from rhythmid.diagnose.effort.remainder import remainder_of
 from rhythmid.diagnose.effort.search import EffortSearch, kin, search_effort
-from rhythmid.diagnose.evidence import probabilities
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import size_of
 
@@ -129,12 +128,3 @@ def test_effort_of_a_record_that_no_fit_has_seen_is_predicted(friction):
     unseen = HeldOut.of([axis(7, amplitude=0.5)], axis_model(), friction.balance)
     assert unseen.error(friction.chosen) < 0.06  # the noise is a twentieth of the effort
     assert unseen.error(friction.nominal) > 2.0 * unseen.error(friction.chosen)
-
-
-def test_hypotheses_weigh_against_each_other_as_all_others_do(friction):
-    pairs = zip(friction.hypotheses, friction.predictions, strict=True)
-    made = [one.hypothesis(prediction) for one, prediction in pairs]
-    probability = probabilities(made)
-    rubs = [any("friction" in name for name in one.names) for one in made]
-    assert probability[rubs].sum() > 0.95
-    assert made[friction.hypotheses.index(friction.chosen)].names == ("coulomb_friction",)

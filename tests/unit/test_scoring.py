@@ -51,7 +51,7 @@ def test_what_the_first_scoring_leaves_without_a_name_is_tried_in_the_second(mon
     made = [SimpleNamespace(verdict=one, missing=()) for one in verdicts]
     left = list(made)
     fit = SimpleNamespace(fit=SimpleNamespace(model=hopper()))
-    monkeypatch.setattr(module, "settle", lambda *_: [SimpleNamespace(kind="windows")] * 2)
+    monkeypatch.setattr(module, "settle", lambda *_, **__: [SimpleNamespace(kind="windows")] * 2)
     monkeypatch.setattr(module, "free_run", lambda *_: SimpleNamespace(search=fit))
     monkeypatch.setattr(module, "compose", lambda *_: left.pop(0))
     assert diagnose(records(hopper(), SHORT[1:2]), hopper(), catalogue=CATALOGUE).diagnosis is made[kept]

@@ -336,7 +336,7 @@ def _could_pay(now: Round, best: Trial, margin: float, current: Fit) -> bool:
     """Whether the best score, which can understate what a refit gains, is of the order that an element has to earn, and that an
     effect of practical size has."""
     series, noise = current.run.series, current.noise
-    if current.nrmse() < PRACTICAL:
+    if current.nrmse() ** 2 < UNDERSTATED * PRACTICAL**2:
         return False
     power = sum(one.power(one.used) for one in series)  # the number of samples times the motion's mean square
     practical = PRACTICAL**2 * power / max(noise.variance, noise.long_run_variance)
