@@ -153,7 +153,7 @@ def _not_tried(nominal: Fit, catalogue: Catalogue, first: Round) -> list[tuple[t
     reasons = dict(known.not_tried) | dict.fromkeys(
         lost, "with every first guess the model diverges, or does as without it"
     )
-    return [((name,), f"not tried: {why}") for name, why in reasons.items()]
+    return [((name,), why) for name, why in reasons.items()]
 
 
 def _proposals(
