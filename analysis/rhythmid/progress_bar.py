@@ -65,11 +65,18 @@ def progress(console: Console, budget: float | None = None) -> Iterator[Tell]:
         TextColumn("{task.description}", table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1))
     )
     began = time.monotonic()
+
+    def printed(what: str) -> None:
+        console.print(f"[dim]{time.monotonic() - began:6.1f} s  {escape(what)}[/]")
+
+    if not console.is_interactive:  # a bar would leave an empty line there
+        yield printed
+        return
     with Progress(*columns, console=console, transient=True, expand=True) as bar:
         task = bar.add_task("", total=None)
 
         def tell(what: str) -> None:
             bar.update(task, description=escape(what))
-            console.print(f"[dim]{time.monotonic() - began:6.1f} s  {escape(what)}[/]")
+            printed(what)
 
         yield tell

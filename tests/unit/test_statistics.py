@@ -65,7 +65,7 @@ def test_the_mean_over_the_cycle_is_drawn_with_its_95_percent_interval(monkeypat
     noisy = run(1e-4 * np.random.default_rng(0).standard_normal(len(TIME)))
     charts: list[Chart] = []
     monkeypatch.setattr(residual_figures, "drawing", lambda _title, chart, _caption: charts.append(chart))
-    residual_figures.residual_grid(noisy, "m")
+    residual_figures.residual_grid(noisy, "m", "m")
     found = by_phase(noisy, "before")
     assert found is not None
     curve, _ = next(chart for chart in charts if chart.x_label.startswith("phase")).curves

@@ -181,6 +181,14 @@ def test_a_fixed_value_that_explains_more_when_it_is_free_is_told_instead_of_a_n
     assert (decision.named == ("friction",)) is (expected == "missing_physics")
 
 
+@pytest.mark.parametrize(("late", "expected"), [(0.01, "undecided"), (0.5, "missing_physics")])
+def test_a_longer_delay_is_a_parameter_and_no_name_of_an_effect(late, expected):
+    delay = supposed("input_delay.delay", predicted(late), "delay")
+    _, decision = decided(contest(NOMINAL, friction(), delay))
+    assert decision.verdict == expected
+    assert ("longer delay" in decision.reason) is (expected == "undecided")
+
+
 @pytest.mark.parametrize(
     ("law", "expected"), [(0.01, "unknown_physics"), (0.5, "missing_physics"), (0.98, "missing_physics")]
 )

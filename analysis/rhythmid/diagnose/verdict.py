@@ -153,6 +153,8 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
         return answer(
             "undecided", "a value that the nominal model holds fixed explains the records when it is free"
         )
+    if chosen.kind == "delay":
+        return answer("undecided", "a longer delay of the input than was given explains the records")
     if explained < MAINLY:
         return answer(
             "unknown_physics",

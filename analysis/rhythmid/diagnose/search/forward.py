@@ -40,6 +40,7 @@ from rhythmid.diagnose.search.score_tests import (
     trajectories,
     under,
 )
+from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import accurate
@@ -144,6 +145,17 @@ def _one_round(
     return Round(tuple(scores), p_value(scores), added), fit
 
 
+def _not_tried(nominal: Fit, catalogue: Catalogue, first: Round) -> list[tuple[tuple[str, ...], str]]:
+    """Candidates of the catalogue that the first round could not score, each with the reason."""
+    known = candidates(catalogue, nominal.model.setting, sizes_along(trajectories(nominal)))
+    scored = {score.element.name for score in first.scores}
+    lost = dict.fromkeys(element.name for element, _ in known.tried if element.name not in scored)
+    reasons = dict(known.not_tried) | dict.fromkeys(
+        lost, "with every first guess the model diverges, or does as without it"
+    )
+    return [((name,), why) for name, why in reasons.items()]
+
+
 def _proposals(
     base: Model, added: tuple[str, ...], scores: Sequence[Score], count: int, chi2: float
 ) -> tuple[list[Proposal], list[float]]:
@@ -222,7 +234,7 @@ def search(
     trials: dict[tuple[str, ...], Trial] = {(): base}
     # the same model under the noise that it leaves, and under a round's, out of which the catalogue's guesses are taken
     best = here = base
-    rounds, excluded = [first], []
+    rounds, excluded = [first], _not_tried(nominal, catalogue, first)
     now = first
     gained = 0.0
     while (
@@ -254,8 +266,8 @@ def search(
         near = [t for t in found if t.bic() - found[0].bic() < NEAR]
         margin = max(WORTH, SHARE * gained)
         hopeful = [[t] for t in found[len(near) :] if here.bic() - t.bic() > PLAIN][:SECOND]
-        for candidates in (near, *hopeful):
-            top = _most_likely(candidates, series, here.noise, step, floor)
+        for group in (near, *hopeful):
+            top = _most_likely(group, series, here.noise, step, floor)
             fit = whole_fit(top, series, here.noise, step, pool=pool)
             finer = accurate(fit.run, fit.model, fit.starts, ROUGH * fit.noise.variance**0.5, 2)
             if finer.max_step < 0.45 * fine_enough(top.model, step):
@@ -267,7 +279,7 @@ def search(
             ):  # and once more beside what came after it
                 fit = ticks_sought(fit, floor, pool)
                 sought = replace(top, model=fit.model, starts=fit.starts, converged=False)
-            others = [trial for trial in candidates if trial.added != top.added]
+            others = [trial for trial in group if trial.added != top.added]
             settled = noise_of(fit.residuals, series, floor)
             compared = under_noise([sought, *others, best], series, settled, step)
             trials |= {tuple(sorted(t.added)): t for t in compared}
