@@ -236,7 +236,10 @@ def test_a_candidate_that_blows_the_simulation_up_is_reported_as_excluded(plain,
 @pytest.mark.parametrize(
     ("spoilt", "said"),
     [
-        (lambda topics: topics | {"joint_states": still(topics["joint_states"])}, "never changes; nothing can be learnt"),
+        (
+            lambda topics: topics | {"joint_states": still(topics["joint_states"])},
+            "never changes; nothing can be learnt",
+        ),
         (lambda topics: {"joint_states": topics["joint_states"]}, "does not decay"),
     ],
 )

@@ -14,7 +14,7 @@ from rhythmid.proof.rate import Rate
 from rhythmid.report import residual_figures
 from rhythmid.report.chart import Chart
 from rhythmid.report.quantity import estimate, plus_minus
-from rhythmid.report.run import SEGMENTS, Run, by_phase, error_of, harmonics
+from rhythmid.report.run import SEGMENTS, Compared, Run, by_phase, error_of, harmonics
 from rhythmid.statistics import NORMAL_95
 
 QUANTILE = float(norm.ppf(0.975))
@@ -65,7 +65,7 @@ def test_the_mean_over_the_cycle_is_drawn_with_its_95_percent_interval(monkeypat
     noisy = run(1e-4 * np.random.default_rng(0).standard_normal(len(TIME)))
     charts: list[Chart] = []
     monkeypatch.setattr(residual_figures, "drawing", lambda _title, chart, _caption: charts.append(chart))
-    residual_figures.residual_grid(noisy, "m", "m")
+    residual_figures.residual_grid(noisy, Compared("motion", "m"), "m")
     found = by_phase(noisy, "before")
     assert found is not None
     curve, _ = next(chart for chart in charts if chart.x_label.startswith("phase")).curves
