@@ -18,7 +18,7 @@ from rhythmid.diagnose.selection import Contest, Selection
 def weights_of(contest: Contest, selection: Selection) -> dict[tuple[str, ...], float]:
     """Weight of each hypothesis, by its key, among those with no more effects than the chosen one."""
     most = len(selection.chosen.elements)
-    rivals = [one for one in contest.hypotheses if len(one.elements) <= most]
+    rivals = [one for one in contest.hypotheses if len(one.elements) <= most and selection.sound(one)]
     return {one.key: float(weight) for one, weight in zip(rivals, probabilities(rivals))}
 
 

@@ -73,6 +73,12 @@ class Selection:
     grown: tuple[Hypothesis, ...]
     rejections: tuple[Rejection, ...]
 
+    def sound(self, hypothesis: Hypothesis) -> bool:
+        """Whether a hypothesis' effects have kept their shape, so that it is a rival at all."""
+        return not any(
+            row.hypothesis == hypothesis.elements and row.name in SHAPE_RULES for row in self.rejections
+        )
+
 
 def select(contest: Contest) -> Selection:
     """Grant effects their places. Hypotheses whose effects have lost their shape take no part."""

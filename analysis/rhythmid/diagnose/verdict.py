@@ -78,7 +78,7 @@ def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
 def _further(other: Hypothesis, chosen: Hypothesis) -> str:
     """In words, the effects of another hypothesis that the chosen one does not have."""
     more = [name for name in other.names if name not in chosen.names]
-    return f"what {' and '.join(more).replace('_', ' ')} would add"
+    return f"further effects ({', '.join(more).replace('_', ' ')})"
 
 
 def shares_of(contest: Contest, chosen: Hypothesis) -> dict[str, float]:
@@ -93,8 +93,9 @@ def shares_of(contest: Contest, chosen: Hypothesis) -> dict[str, float]:
     return found
 
 
-def _groups(contest: Contest, chosen: Hypothesis) -> tuple[tuple[str, ...], ...]:
+def _groups(contest: Contest, selection: Selection) -> tuple[tuple[str, ...], ...]:
     """Names that replace one another in hypotheses which predict as well as the chosen one."""
+    chosen = selection.chosen
     groups = []
     for label, name in zip(chosen.elements, chosen.names):
         rest = set(chosen.elements) - {label}
@@ -105,6 +106,7 @@ def _groups(contest: Contest, chosen: Hypothesis) -> tuple[tuple[str, ...], ...]
             and len(one.elements) == len(chosen.elements)
             and rest < set(one.elements)
             and one.key != chosen.key
+            and selection.sound(one)
             and equivalent(one, chosen, contest.floor)
         ]
         if others:
@@ -128,7 +130,7 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     each = {label: sure * joint_probability([names[label]], contest, chosen, weights) for label in labels}
     stated = _stated(labels, names, contest, chosen, weights, sure)
     joint = sure * joint_probability([names[label] for label in stated or labels], contest, chosen, weights)
-    groups = _groups(contest, chosen)
+    groups = _groups(contest, selection)
 
     def answer(verdict: Verdict, reason: str, named: tuple[str, ...] = labels) -> Decision:
         return Decision(verdict, reason, named, shares, each, joint, weights, groups, left, explained)
