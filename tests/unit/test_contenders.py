@@ -148,3 +148,13 @@ def test_without_held_out_rows_there_is_no_error_on_them(given):
     rows = rows_of(given, [], NOISE)
     assert heldout_error(np.full(len(rows.record), rows.size), rows) == pytest.approx(1.0)
     assert math.isfinite(rows.size)
+
+
+def test_a_model_that_diverges_on_held_out_records_predicts_nothing_there_and_stays(given, separate, plain):
+    rows = rows_of(given, separate, NOISE)
+    wild = replace(plain, model=plain.model.with_values({"linear_spring.stiffness": 1e13}))
+    with np.errstate(all="ignore"):
+        found = linearised(wild, rows)
+    last = sum(one.blocks for one in separate)
+    assert np.isfinite(found.residual).all()
+    assert np.std(found.residual[-last:]) > 10.0 * np.std(found.residual[: rows.fitted])

@@ -21,6 +21,7 @@ from rhythmid.diagnose.evidence import (
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, names_of, richer_of
 from rhythmid.diagnose.search.refit import Trial, fine_enough, whole_fit
+from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import record_of
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, start_only
@@ -67,13 +68,9 @@ class Rows:
 
 def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseModel) -> Rows:
     """The rows of these series and of separate held-out ones, under a noise model."""
-
-    def stretches(one: Series, hidden: bool) -> tuple[slice, ...]:
-        return tuple(s for s in runs(one.counted(hidden)) if s.stop - s.start > noise.order + 1)
-
-    seen = tuple(stretches(one, False) for one in series)
-    hidden = tuple(stretches(one, True) for one in series)
-    others = tuple(stretches(one, False) for one in unseen)
+    seen = tuple(_long_enough(one, noise) for one in series)
+    hidden = tuple(_long_enough(one, noise, True) for one in series)
+    others = tuple(_long_enough(one, noise) for one in unseen)
     names = list(dict.fromkeys(record_of(one) for one in series))
     lengths: list[tuple[int, int]] = []
     power, total = 0.0, 0
@@ -109,10 +106,7 @@ def _stretched(rows: Rows, values: Sequence[Array], which: tuple[tuple[slice, ..
 
 def linearised(fit: Fit, rows: Rows) -> Linearised:
     """A fit on the rows: what it leaves of each, and how what it saw depends on its parameters."""
-    unseen: list[Array] = []
-    if rows.unseen:
-        other = start_only(fit.model, rows.unseen, rows.noise, fine_enough(fit.model, fit.run.max_step))
-        unseen = [other.linearisation.residual]
+    unseen = [_of_unseen(fit, rows)] if rows.unseen else []
     hidden = [rows.noise.whiten(part) for part in _stretched(rows, fit.residuals, rows.hidden)]
     residual = np.concatenate([fit.linearisation.residual, *hidden, *unseen])
     jacobian = np.zeros((len(residual), len(fit.names)))
@@ -124,6 +118,27 @@ def linearised(fit: Fit, rows: Rows) -> Linearised:
         np.array([0.0 if one is None else one.std**-2 for one in priors]),
         np.array([0.0 if one is None else v - one.mean for one, v in zip(priors, fit.values)]),
     )
+
+
+def _of_unseen(fit: Fit, rows: Rows) -> Array:
+    """What a fit leaves of separate held-out records, only their initial states estimated; of a model that diverges there, which
+    predicts nothing, the motion itself."""
+    try:
+        step = fine_enough(fit.model, fit.run.max_step)
+        return start_only(fit.model, rows.unseen, rows.noise, step).linearisation.residual
+    except InputError:
+        return np.concatenate(
+            [
+                rows.noise.whiten(one.averaged[part] - one.averaged.mean())
+                for one in rows.unseen
+                for part in _long_enough(one, rows.noise)
+            ]
+        )
+
+
+def _long_enough(one: Series, noise: NoiseModel, hidden: bool = False) -> tuple[slice, ...]:
+    """Stretches of a series that are long enough to be whitened."""
+    return tuple(s for s in runs(one.counted(hidden)) if s.stop - s.start > noise.order + 1)
 
 
 @dataclass(frozen=True)
@@ -150,7 +165,7 @@ def measured_errors(error: Array, rows: Rows) -> Array:
 def contend(
     trials: Sequence[tuple[Trial, Kind]], series: Sequence[Series], rows: Rows, step: float
 ) -> list[Contender]:
-    """Contenders of these trials, in their order; those that diverge on held-out records are left out."""
+    """Contenders of these trials, in their order; those that diverge are left out."""
 
     def one(case: tuple[Trial, Kind]) -> tuple[CrossValidated, Array]:
         fit = whole_fit(case[0], series, rows.noise, step)
