@@ -19,7 +19,6 @@ from rhythmid.model import Model
 NAMED: dict[str, Callable[[], Twin]] = {
     "axis under a controller, sticking and slipping, driven by its motor's effort": twins.axis,
     "joint driven by a current, velocity measured": twins.joint,
-    "joint driven by a current, velocity measured, with a heavy link": lambda: twins.joint(0.0, weight=0.5),
     "pendulum driven through large swings": twins.pendulum,
     "servo of which only command and motion are known": twins.servo,
     "free decay without any input": twins.decay,

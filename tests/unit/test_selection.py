@@ -66,18 +66,27 @@ def test_of_laws_that_predict_alike_the_special_case_is_chosen_and_not_the_one_t
 
 def test_predictions_that_are_the_same_are_equivalent():
     one = supposed("wide", FRICTION.prediction, free=9)
-    assert equivalent(one, FRICTION, 0.2) and equivalent(one, FRICTION, 0.0)
+    assert equivalent(one, FRICTION, contest(NOMINAL, one, FRICTION, practical=0.0))
     assert select(contest(NOMINAL, one, FRICTION)).chosen is FRICTION
 
 
 def test_a_rival_is_equivalent_within_standard_errors_or_but_for_a_small_share_of_what_it_leaves():
     best = supposed("a", predicted(0.1, 100.0, seed=1))
     near = supposed("b", predicted(0.2, 99.0, mood=1.0, seed=2))
-    assert equivalent(near, best, 0.0)
-    clear_but_small = supposed("b", predicted(0.101, 50.0, seed=2))
-    assert equivalent(clear_but_small, best, 0.0)
-    assert not equivalent(supposed("b", predicted(0.3, 50.0, seed=2)), best, 0.0)
-    assert not equivalent(clear_but_small, best, 0.0999)  # where what is left is nearly all explained
+    small = supposed("c", predicted(0.101, 50.0, seed=2))
+    large = supposed("d", predicted(0.3, 50.0, seed=2))
+    everything = {"position": predicted(1e-6, 200.0)}
+    much_is_left = contest(NOMINAL, best, near, small, large, maps=everything, practical=0.0)
+    assert equivalent(near, best, much_is_left) and equivalent(small, best, much_is_left)
+    assert not equivalent(large, best, much_is_left)
+    little_is_left = contest(NOMINAL, best, small, practical=0.0)
+    assert not equivalent(small, best, little_is_left)
+
+
+def test_what_a_law_gains_below_practical_size_does_not_set_it_above_a_simpler_one():
+    best, small = supposed("a", predicted(0.1, 100.0, seed=1)), supposed("c", predicted(0.101, 50.0, seed=2))
+    for practical, same in ((0.0, False), (1.0, True)):
+        assert equivalent(small, best, contest(NOMINAL, best, small, practical=practical)) == same
 
 
 @settings(max_examples=40, deadline=None)

@@ -5,19 +5,20 @@ searched for what the nominal model lacks, the hypotheses are weighed on data th
 it is.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from rhythmid.diagnose.admission import admitted
+from rhythmid.diagnose.admission import Admitted, admitted
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.baseline import causal
 from rhythmid.diagnose.case import Budget, Case
+from rhythmid.diagnose.constants import LEFT
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST
 from rhythmid.diagnose.free_run import FreeRunResult, free_run
@@ -90,30 +91,63 @@ def diagnose(
         known = catalogue or load_catalogue()
         case = Case(model, given.records[:count], given.records[count:], known, pool, tell, Budget(budget))
         effort = applicable(case.records, model)
-        answers: list[Answer] = []
-        if effort.applies and not effort.free_run_means_something:
-            return _by_effort(case, effort, given.notes)
-        series = prepare(given.records)
-        check_units(model, series[:count], pool)
-        ways = settle(model, series[:count], series[count:], known, pool, tell, windows=not effort.applies)
-        if not ways:  # in free run the model loses the machine, but the effort shows what it lacks
-            answers.append(_by_effort(case, effort, given.notes))
-            if answers[0].stands:
-                return answers[0]
-            ways = settle(model, series[:count], series[count:], known, pool, tell)
-        for scoring in ways:
-            if answers:
-                tell(f"no name found; scoring in {scoring.kind.replace('_', ' ')}")
-            result = free_run(case, scoring)
-            diagnosis = compose(case, result, given.notes)
-            answers.append(Answer(diagnosis, causal(result.search.fit.model), result))
-            if answers[-1].stands:
+        made: list[Answer] = []
+        answers = _answers(case, effort, count, given)
+        while not made or not made[-1].stands:
+            try:
+                answer = next(answers, None)
+            except InputError:
+                if not made:
+                    raise
+                break  # another way to score could not follow the machine
+            if answer is None:
                 break
-        chosen = next((one for one in answers if one.stands), answers[0])
-        compare = effort.applies and chosen.stands and isinstance(answers[0].result, FreeRunResult)
+            made.append(answer)
+        chosen = next((one for one in made if one.stands), made[0])
+        compare = effort.applies and chosen.stands and isinstance(made[0].result, FreeRunResult)
         if compare and not case.budget.spent:
             return _compared(chosen, _by_effort(case, effort, (), 1))
         return chosen
+
+
+def _answers(case: Case, effort: Applicability, count: int, given: Admitted) -> Iterator[Answer]:
+    """Answers of all ways to score that apply, the most telling way first; they are worked out as they are asked for.
+
+    A free run that follows the machine comes first. Else the recorded effort does where it is at least as large as the
+    inertial force, so that it moves the machine against other forces, and windows where the machine swings by itself.
+    """
+    driven = effort.applies and effort.effort_share >= 1.0
+    if effort.applies and not effort.free_run_means_something:
+        answer = _by_effort(case, effort, given.notes)
+        yield answer
+        if answer.diagnosis.augmented.train_nrmse < LEFT:
+            return
+    series = prepare(given.records)
+    check_units(case.nominal, series[:count], case.pool)
+
+    def by_motion(windows: bool) -> Iterator[Answer]:
+        ways = settle(
+            case.nominal, series[:count], series[count:], case.catalogue, case.pool, case.tell, windows
+        )
+        for scoring in ways:
+            result = free_run(case, scoring)
+            diagnosis = compose(case, result, given.notes)
+            yield Answer(diagnosis, causal(result.search.fit.model), result)
+
+    if not effort.applies or not effort.free_run_means_something:
+        yield from by_motion(windows=True)
+        return
+    told = 0
+    for answer in by_motion(windows=False):
+        told += 1
+        yield answer
+    if told:
+        return
+    if driven:
+        yield _by_effort(case, effort, given.notes)
+    yield from by_motion(windows=True)
+    if not driven:
+        yield _by_effort(case, effort, given.notes)
 
 
 def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST) -> Answer:

@@ -49,7 +49,7 @@ class Contest:
     def of_size(self, count: int) -> list[Hypothesis]:
         """Hypotheses with so many effects, the one that predicts best first."""
         found = [one for one in self.hypotheses if len(one.elements) == count]
-        return sorted(found, key=lambda one: -one.prediction.score)
+        return sorted(found, key=lambda one: (-one.prediction.score, one.key))
 
     def claim(self, hypothesis: Hypothesis, without: Hypothesis) -> Claim:
         """A hypothesis and what it has to be better than."""
@@ -96,7 +96,7 @@ def select(contest: Contest) -> Selection:
         if not going or not sound:
             going = False
             continue
-        best = _simplest(sound, contest.floor)
+        best = _simplest(sound, contest)
         if any(row.hypothesis == best.elements for row in told):
             going = False
             continue
@@ -104,13 +104,13 @@ def select(contest: Contest) -> Selection:
     return Selection(grown[-1], tuple(grown), tuple(told))
 
 
-def _simplest(ranked: Sequence[Hypothesis], floor: float) -> Hypothesis:
+def _simplest(ranked: Sequence[Hypothesis], contest: Contest) -> Hypothesis:
     """Of the hypotheses that the best one does not clearly beat, one that no other is a special case of, with the fewest free
     parameters."""
     best = ranked[0]
-    close = [best, *(one for one in ranked[1:] if equivalent(one, best, floor))]
+    close = [best, *(one for one in ranked[1:] if equivalent(one, best, contest))]
     plain = [one for one in close if not any(special_case(other, one) for other in close)]
-    return min(plain or close, key=lambda one: (one.free, -_basic(one), -one.prediction.score))
+    return min(plain or close, key=lambda one: (one.free, -_basic(one), -one.prediction.score, one.key))
 
 
 def _basic(one: Hypothesis) -> int:
@@ -124,13 +124,14 @@ def special_case(first: Hypothesis, second: Hypothesis) -> bool:
     return len(mine) == len(other) == 1 and other <= set(first.richer.get(next(iter(mine)), ()))
 
 
-def equivalent(other: Hypothesis, best: Hypothesis, floor: float) -> bool:
-    """Whether another hypothesis predicts as well as the better one: within standard errors, or but for a small share of
-    what either leaves."""
+def equivalent(other: Hypothesis, best: Hypothesis, contest: Contest) -> bool:
+    """Whether another hypothesis predicts as well as the better one: within standard errors, or but for a small share of what it
+    leaves, or for what is of no practical size."""
     gain, error = difference(best.prediction, other.prediction)
-    left = other.prediction.mean_square - floor
+    left = other.prediction.mean_square - contest.floor
+    practical = (contest.practical * contest.size) ** 2
     removed = other.prediction.mean_square - best.prediction.mean_square
-    return gain <= EQUIVALENT * error or removed <= REST * left
+    return gain <= EQUIVALENT * error or removed < max(REST * left, practical)
 
 
 def without_elements(contest: Contest, gone: Sequence[str]) -> Contest:

@@ -107,7 +107,7 @@ def _groups(contest: Contest, selection: Selection) -> tuple[tuple[str, ...], ..
             and rest < set(one.elements)
             and one.key != chosen.key
             and selection.sound(one)
-            and equivalent(one, chosen, contest.floor)
+            and equivalent(one, chosen, contest)
         ]
         if others:
             groups.append((name, *dict.fromkeys(others)))
