@@ -86,6 +86,15 @@ def _shooting_start(model: Model, series: Sequence[Series], pool: ThreadPoolExec
     return estimate(model, chosen, iterations=12, pool=pool).model
 
 
+def check_free(model: Model) -> None:
+    """Raise InputError for a model of which nothing is estimated."""
+    if not model.free:
+        raise InputError(
+            "every parameter of the nominal model is fixed, so a wrong value could not be told from missing physics; "
+            "free those that are not known exactly (drop 'fixed: true')"
+        )
+
+
 def calibrate(
     model: Model,
     series: Sequence[Series],
@@ -94,11 +103,7 @@ def calibrate(
     tell: Tell = lambda _: None,
 ) -> Calibration:
     """Refit the nominal model. Raises InputError when it has nothing to fit, or diverges whatever is tried."""
-    if not model.free:
-        raise InputError(
-            "every parameter of the nominal model is fixed, so a wrong value could not be told from missing physics; "
-            "free those that are not known exactly (drop 'fixed: true')"
-        )
+    check_free(model)
     model = with_delays(model, series, catalogue)
     notes: tuple[str, ...] = ()
     if REST_LENGTH in model.free and any(one.measured != "position" for one in series):

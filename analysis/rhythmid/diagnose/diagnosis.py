@@ -16,7 +16,7 @@ from rhythmid.diagnose.admission import Admitted, admitted
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
-from rhythmid.diagnose.baseline import causal
+from rhythmid.diagnose.baseline import causal, check_free
 from rhythmid.diagnose.case import Budget, Case
 from rhythmid.diagnose.constants import LEFT
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
@@ -84,6 +84,7 @@ def diagnose(
     if not records:
         raise InputError("no record is given; name at least one bag or table")
     model = with_declared(model, (*records, *holdout))
+    check_free(model)
     given = admitted(records, holdout, model)
     count = len(records)
     # the matrices are tall and thin, and workers run side by side: threads inside linear algebra only get in the way
