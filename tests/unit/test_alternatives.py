@@ -147,15 +147,17 @@ def test_a_delay_of_many_samples_that_a_prior_held_near_none_is_found():
     assert found[INPUT_DELAY,].model.value(INPUT_DELAY) == pytest.approx(0.03, abs=1e-3)
 
 
-def test_one_free_law_stands_for_several_effects_of_the_same_quantity_only(monkeypatch, plain):
+def test_one_free_law_stands_for_three_effects_of_the_same_quantity_only(monkeypatch, plain):
     model = plain.model.with_element(CATALOGUE["cubic_stiffness"], {"coefficient": 100.0})
     model = model.with_element(CATALOGUE["quintic_stiffness"], {"coefficient": 1e4})
+    model = model.with_element(CATALOGUE["quadratic_stiffness"], {"coefficient": 10.0})
     model = model.with_element(CATALOGUE["coulomb_friction"], {"force": 0.05})
     chosen = replace(plain, model=model)
-    labels = ("cubic_stiffness", "quintic_stiffness", "coulomb_friction")
+    labels = ("cubic_stiffness", "quintic_stiffness", "quadratic_stiffness", "coulomb_friction")
     kept = proposed(monkeypatch, plain, chosen, CATALOGUE, *labels)
     laws = [one.added for one in kept if any(label.startswith("free_") for label in one.added)]
     assert laws == [("coulomb_friction", "free_force_of_position")]
-    single = replace(plain, model=model.without("quintic_stiffness"))
-    kept = proposed(monkeypatch, plain, single, CATALOGUE, "cubic_stiffness", "coulomb_friction")
+    two = replace(plain, model=model.without("quintic_stiffness"))
+    left = ("cubic_stiffness", "quadratic_stiffness", "coulomb_friction")
+    kept = proposed(monkeypatch, plain, two, CATALOGUE, *left)
     assert not any(label.startswith("free_") for one in kept for label in one.added)

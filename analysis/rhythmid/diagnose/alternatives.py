@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 SIGNALS: tuple[Slot, ...] = ("command", "actuator", "sensor")  # what a law with times acts on
 CLOCKS: tuple[Slot, ...] = ("command", "timing")  # what has a delay that may drift
 LONGER = (2.0, 5.0, 12.0, 30.0)  # samples, at which a longer delay is sought
+SERIES = 3  # laws of one quantity that are more likely a series for one law than causes of their own; two of them real springs have
 LONGEST = 0.25  # periods of the motion: a longer one is another minimum of the same
 
 
@@ -115,7 +116,7 @@ def _one_law(chosen: Trial, known: Trajectories, sizes: Scales) -> Iterator[Prop
     """The chosen model with a free map in the place of several effects that are laws of the same quantity."""
     for (slot, quantity), laws in laws_of(chosen, sizes).items():
         name = {"actuator": "effort", "sensor": "signal"}.get(slot, quantity)
-        if len(laws) < 2 or name not in FREE_MAPS:
+        if len(laws) < SERIES or name not in FREE_MAPS:
             continue
         values: list[Array] = {
             "position": [path.position for path in known.legs],

@@ -21,6 +21,7 @@ from rhythmid.diagnose.case import Budget, Case
 from rhythmid.diagnose.constants import LEFT
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST
+from rhythmid.diagnose.free_map import without_free_maps
 from rhythmid.diagnose.free_run import FreeRunResult, free_run
 from rhythmid.diagnose.replay import ledger
 from rhythmid.diagnose.scoring import settle
@@ -133,7 +134,7 @@ def _answers(case: Case, effort: Applicability, count: int, given: Admitted) -> 
         for scoring in ways:
             result = free_run(case, scoring)
             diagnosis = compose(case, result, given.notes)
-            yield Answer(diagnosis, causal(result.search.fit.model), result)
+            yield Answer(diagnosis, causal(without_free_maps(result.search.fit.model)), result)
 
     if not effort.applies or not effort.free_run_means_something:
         yield from by_motion(windows=True)

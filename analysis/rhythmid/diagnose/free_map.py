@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.elements.element import Element, Parameter, Slot
+from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 COEFFICIENTS = 10
@@ -78,3 +79,11 @@ def first_guess(values: Array) -> dict[str, float]:
     low, high = (float(end) for end in np.quantile(values, [0.0, 1.0]))
     margin = max(MARGIN * (high - low), LEAST * max(abs(low), abs(high)), LEAST**2)
     return {"low": low - margin, "high": high + margin} | {f"c{i}": 0.0 for i in range(COEFFICIENTS)}
+
+
+def without_free_maps(model: Model) -> Model:
+    """The model without free maps, which no model file can name."""
+    for term in model.terms:
+        if term.element in FREE_MAPS.values():
+            model = model.without(term.label)
+    return model
