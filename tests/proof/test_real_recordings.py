@@ -41,7 +41,7 @@ force:
   - coulomb_friction: {{force: {{value: {coulomb}, fixed: true}}, transition: {{value: 0.02, fixed: true}}}}
   - constant_force: {{force: {{value: {push}, fixed: true}}}}
 """
-NAMED_LATER = pytest.mark.skip(reason="the diagnosis does not score by evidence yet")
+NAMED_LATER = pytest.mark.skip(reason="long, or not reached yet: see docs/real.md")
 
 
 def present(name: str) -> pytest.MarkDecorator:
@@ -225,7 +225,6 @@ def test_friction_comes_first_in_a_frictionless_pendulum_and_its_inertia_is_foun
     assert pendulum_told.after < 0.5 * pendulum_told.before
 
 
-@NAMED_LATER
 @present("pendulum")
 def test_a_frictionless_pendulum_is_told_that_it_lacks_friction(pendulum_told):
     assert pendulum_told.verdict == "missing_physics" and sum(pendulum_told.probabilities[:1]) >= 0.8
