@@ -146,7 +146,7 @@ def test_without_held_out_rows_there_is_no_error_on_them(given):
     rows = rows_of(whole, [], NOISE)
     assert heldout_error(np.ones(len(rows.record)), rows) is None
     rows = rows_of(given, [], NOISE)
-    assert heldout_error(np.full(len(rows.record), rows.size), rows) == pytest.approx(1.0)
+    assert heldout_error(np.full(len(rows.record), rows.heldout_size), rows) == pytest.approx(1.0)
     assert math.isfinite(rows.size)
 
 

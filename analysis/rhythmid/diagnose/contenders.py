@@ -45,6 +45,7 @@ class Rows:
     record : (n,) record of each row: the seen rows first, then the hidden ones, then those of separate series.
     blocks : blocks of the rows.
     size : rms of what errors are a share of, over all rows.
+    heldout_size : the same over the rows that no fit sees; 0 without any.
     """
 
     seen: tuple[tuple[slice, ...], ...]
@@ -54,6 +55,7 @@ class Rows:
     record: Whole
     blocks: Blocks
     size: float
+    heldout_size: float = 0.0
 
     @property
     def fitted(self) -> int:
@@ -73,7 +75,7 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
     others = tuple(_long_enough(one, noise) for one in unseen)
     names = list(dict.fromkeys(record_of(one) for one in series))
     lengths: list[tuple[int, int]] = []
-    power, total = 0.0, 0
+    power, total, held_power, held_total = 0.0, 0, 0.0, 0
     for parts, group, first in (
         (seen, series, 0),
         (hidden, series, len(names)),
@@ -87,6 +89,8 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
             for part in slices:
                 mask[part] = True
             power, total = power + one.power(mask), total + count
+            if group is unseen or parts is hidden:
+                held_power, held_total = held_power + one.power(mask), held_total + count
     record = np.concatenate([np.full(count, number, dtype=np.int64) for number, count in lengths])
     held = np.arange(len(names), 2 * len(names) + len(unseen))
     return Rows(
@@ -97,6 +101,7 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
         record,
         Blocks.of(record, noise.order, held),
         float(np.sqrt(power / max(total, 1))),
+        float(np.sqrt(held_power / max(held_total, 1))),
     )
 
 
@@ -206,6 +211,6 @@ def remembered(contenders: Sequence[Contender], rows: Rows) -> float:
 def heldout_error(error: Array, rows: Rows) -> float | None:
     """Rms of the errors (n,) on held-out rows, as a share of what errors are a share of; None where nothing is held out."""
     held = rows.heldout
-    if not held.any() or rows.size == 0.0:
+    if not held.any() or rows.heldout_size == 0.0:
         return None
-    return float(np.sqrt(np.mean(error[held] ** 2))) / rows.size
+    return float(np.sqrt(np.mean(error[held] ** 2))) / rows.heldout_size
