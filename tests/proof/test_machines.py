@@ -23,6 +23,13 @@ NAMED: dict[str, Callable[[], Twin]] = {
     "servo of which only command and motion are known": twins.servo,
     "free decay without any input": twins.decay,
 }
+# named before the effort was scored by inverse dynamics: the position, integrated from the speed, drifts along the gravity
+UNNAMED: dict[str, Callable[[], Twin]] = {
+    "joint driven by a current, velocity measured, with a heavy link": lambda: twins.joint(0.0, weight=0.5),
+}
+NOT_YET = pytest.mark.xfail(
+    strict=True, reason="gravity is not seen in the effort where only the speed is recorded"
+)
 NULLS: dict[str, Callable[[], Twin]] = {
     "joint": lambda: twins.joint(friction=0.0),
     "rig on a shaken base": lambda: twins.rig(cubic=0.0),
@@ -55,9 +62,9 @@ def examined(twin: Twin) -> Answer:
     return answer
 
 
-@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("name", [*NAMED, *(pytest.param(name, marks=NOT_YET) for name in UNNAMED)])
 def test_the_missing_effect_is_named_and_measured(name):
-    twin = NAMED[name]()
+    twin = (NAMED | UNNAMED)[name]()
     result = examined(twin).diagnosis
     assert result.verdict == "missing_physics"
     assert [effect.element for effect in result.missing] == [twin.lacks]
@@ -79,8 +86,9 @@ def test_a_machine_that_integrates_is_scored_by_its_effort_and_it_is_said():
     told = answer.diagnosis
     assert told.scoring.kind == "effort" and told.scoring.bandwidth > 0.0 and told.scoring.reason
     assert NO_SENSOR in told.assumptions
-    assert told.parameters["inertia.mass"].value == pytest.approx(2.0, rel=0.01)
-    assert told.parameters["viscous_damper.damping"].value == pytest.approx(8.0, rel=0.02)
+    assert told.heldout == "held out: every block of the records in its turn"
+    assert told.parameters["inertia.mass"].value == pytest.approx(2.0, rel=1e-3)
+    assert told.parameters["viscous_damper.damping"].value == pytest.approx(8.0, rel=1e-3)
 
 
 def main(names: list[str]) -> None:

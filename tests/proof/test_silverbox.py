@@ -105,7 +105,19 @@ def test_decoys_are_rejected(answer):
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(("name", "limit"), [("multisine", 0.33e-3), ("arrow", 0.40e-3)])
+@pytest.mark.parametrize(
+    ("name", "limit"),
+    [
+        pytest.param(
+            "multisine",
+            0.30e-3,
+            marks=pytest.mark.xfail(
+                strict=True, reason="quadratic drag is below practical size and no longer named: 0.308 mV"
+            ),
+        ),
+        ("arrow", 0.40e-3),
+    ],
+)
 def test_the_augmented_model_runs_free_over_the_official_tests(answer, tmp_path, name, limit):
     (record,) = records(tmp_path, {name: TESTS[name]})
     (series,) = prepare([record], block=1)
