@@ -13,21 +13,18 @@ from scipy.signal import lfilter
 from scipy.stats import t as student
 
 from rhythmid.diagnose import evidence
-from rhythmid.diagnose.constants import BLOCKS_OF_A_RECORD, FOLDS, STUDENT
+from rhythmid.diagnose.constants import BLOCKS_OF_A_RECORD, FOLDS
 from rhythmid.diagnose.evidence import (
     UNSEEN,
     Blocks,
     Linearised,
-    autocorrelation_time,
     cross_validate,
     difference,
-    log_density,
     predict,
     prediction,
     probabilities,
-    scale_of,
-    weights,
 )
+from rhythmid.identify.student import DEGREES, autocorrelation_time, log_density, scale_of, weights_of
 
 LENGTHS = st.lists(st.integers(1, 900), min_size=1, max_size=5)
 SEEDS = st.integers(0, 2**31)
@@ -43,7 +40,7 @@ def line(rows: int, columns: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray
     """A regression: measurements (n,) of a sum of columns (n, p) with noise of Student's t."""
     rng = np.random.default_rng(seed)
     design = rng.standard_normal((rows, columns))
-    noise = student.rvs(STUDENT, size=rows, random_state=rng)
+    noise = student.rvs(DEGREES, size=rows, random_state=rng)
     return design @ rng.standard_normal(columns) + noise, design
 
 
@@ -111,15 +108,15 @@ def test_held_out_records_are_seen_by_no_fold_and_predicted_by_all():
 
 def test_the_density_is_students_and_its_weights_are_those_of_its_maximum():
     error = np.linspace(-5.0, 5.0, 101)
-    np.testing.assert_allclose(log_density(error, 0.7), student.logpdf(error, STUDENT, scale=0.7), rtol=1e-12)
+    np.testing.assert_allclose(log_density(error, 0.7), student.logpdf(error, DEGREES, scale=0.7), rtol=1e-12)
     slope = np.gradient(log_density(error, 0.7), error, edge_order=2)
-    np.testing.assert_allclose(slope, -weights(error, 0.7) * error / 0.7**2, atol=0.03)
+    np.testing.assert_allclose(slope, -weights_of(error, 0.7) * error / 0.7**2, atol=0.03)
 
 
 @FEW
 @given(SEEDS, st.floats(1e-6, 1e6))
 def test_the_scale_is_the_most_likely_one_in_any_unit(seed, unit):
-    error = unit * student.rvs(STUDENT, size=400, random_state=np.random.default_rng(seed))
+    error = unit * student.rvs(DEGREES, size=400, random_state=np.random.default_rng(seed))
     best = minimize(
         lambda s: -log_density(error, unit * math.exp(s[0])).sum(), [0.0], method="Nelder-Mead"
     ).x[0]
@@ -157,7 +154,7 @@ def test_what_a_linear_model_predicts_is_what_refits_without_each_block_predict(
             scale_of(least_squares(measured, design).residual[seen]),
         )
         for _ in range(evidence.REWEIGHTED):
-            root = np.sqrt(weights(design[seen] @ values - measured[seen], scale))
+            root = np.sqrt(weights_of(design[seen] @ values - measured[seen], scale))
             values = np.linalg.lstsq(design[seen] * root[:, None], measured[seen] * root, rcond=None)[0]
             scale = scale_of(design[seen] @ values - measured[seen])
         np.testing.assert_allclose(found.error[out], design[out] @ values - measured[out], atol=1e-8)

@@ -14,9 +14,6 @@ ROWS_OF_A_BLOCK = 12
 FOLDS = 6
 # blocks of each record at least, so that none is left out as a whole or decides alone
 BLOCKS_OF_A_RECORD = 3
-# degrees of freedom of Student's t, in the fit and in the predictive density: rare outliers, and what no model explains,
-# weigh little (K. L. Lange, R. J. A. Little, J. M. G. Taylor, J. Am. Stat. Assoc. 84 (1989) 881)
-STUDENT = 4.0
 # passes of reweighted least squares in each fold: from the fit of all folds one moves the weights, two settle them
 REWEIGHTED = 3
 # draws of the Bayesian bootstrap: probabilities to about 0.01 (Y. Yao et al., Bayesian Analysis 13 (2018) 917)

@@ -15,7 +15,6 @@ from rhythmid.diagnose.evidence import (
     CrossValidated,
     Linearised,
     Whole,
-    autocorrelation_time,
     cross_validate,
     prediction,
 )
@@ -26,6 +25,7 @@ from rhythmid.identify.multiple_shooting import record_of
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.series import Series
+from rhythmid.identify.student import autocorrelation_time
 from rhythmid.parallel import fork_map
 
 Array = NDArray[np.float64]

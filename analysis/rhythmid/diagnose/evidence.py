@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
 
 from rhythmid.diagnose.constants import (
     BLOCKS,
@@ -25,9 +24,9 @@ from rhythmid.diagnose.constants import (
     FOLDS,
     REWEIGHTED,
     ROWS_OF_A_BLOCK,
-    STUDENT,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
+from rhythmid.identify.student import autocorrelation_time, log_density, scale_of, weights_of
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -119,62 +118,6 @@ class Blocks:
         return out, seen if seen.any() else ~out & (of_row != UNSEEN)
 
 
-def log_density(error: Array, scale: float) -> Array:
-    """Logarithm of Student's t density (n,) of errors (n,), for its scale."""
-    constant = gammaln(0.5 * (STUDENT + 1.0)) - gammaln(0.5 * STUDENT) - 0.5 * math.log(STUDENT * math.pi)
-    return constant - math.log(scale) - 0.5 * (STUDENT + 1.0) * np.log1p((error / scale) ** 2 / STUDENT)
-
-
-def weights(error: Array, scale: float) -> Array:
-    """Weights (n,) of reweighted least squares for Student's t."""
-    return (STUDENT + 1.0) / (STUDENT + (error / scale) ** 2)
-
-
-def scale_of(error: Array) -> float:
-    """Maximum-likelihood scale of Student's t errors (n,); the smallest positive number where there is no error."""
-    square = error**2
-    scale = float(np.median(np.abs(error)) / 0.741) or float(np.sqrt(np.mean(square)))
-    if scale == 0.0:
-        return 1e-300
-    for _ in range(20):
-        new = math.sqrt(float(np.mean((STUDENT + 1.0) * square / (STUDENT + square / scale**2))))
-        if abs(new - scale) < 1e-3 * scale:
-            return new
-        scale = new
-    return scale
-
-
-def autocorrelation_time(error: Array, record: Whole) -> float:
-    """Integrated autocorrelation time of errors (n,) in samples, at least 1, over the records that the rows belong to.
-
-    Sums of neighbouring autocorrelations are added as long as they are positive and fall (C. J. Geyer, Statistical Science 7
-    (1992) 473).
-    """
-    power, correlation = 0.0, np.zeros(0)
-    parts = [error[record == number] for number in range(int(record.max(initial=-1)) + 1)]
-    parts = [part - part.mean() for part in parts if len(part) > 8]
-    if not parts:
-        return 1.0
-    longest = max(len(part) for part in parts)
-    correlation = np.zeros(longest)
-    for part in parts:
-        length = 2 * len(part)
-        spectrum = np.abs(np.fft.rfft(part, length)) ** 2
-        correlation[: len(part)] += np.fft.irfft(spectrum, length)[: len(part)]
-        power += float(part @ part)
-    if power == 0.0:
-        return 1.0
-    rho = correlation / power
-    total, previous = 0.0, math.inf
-    for lag in range(0, longest - 1, 2):
-        pair = float(rho[lag] + rho[lag + 1])
-        if pair <= 0.0:
-            break
-        previous = min(pair, previous)
-        total += previous
-    return max(2.0 * total - 1.0, 1.0)
-
-
 @dataclass(frozen=True)
 class CrossValidated:
     """Errors (n,) of prediction of every row by the fit that did not see it, and the scale (n,) that the fit expected.
@@ -200,7 +143,7 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
         step = np.zeros(columns.shape[1])
         now, spread = left, scale_of(left)
         for _ in range(REWEIGHTED if columns.shape[1] else 0):
-            weight = weights(now, spread) / spread**2
+            weight = weights_of(now, spread) / spread**2
             normal = (columns * weight[:, None]).T @ columns + np.diag(precision)
             step = -np.linalg.lstsq(normal, columns.T @ (weight * left) + pull, rcond=1e-12)[0]
             now = left + columns @ step

@@ -19,7 +19,7 @@ from rhythmid.diagnose.contenders import (
     remembered,
     rows_of,
 )
-from rhythmid.diagnose.evidence import autocorrelation_time, prediction
+from rhythmid.diagnose.evidence import prediction
 from rhythmid.diagnose.fine_steps import finely_stepped
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
 from rhythmid.diagnose.intervals import profiled
@@ -36,6 +36,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.sample_clock.tick_interval import ticks_followed
 from rhythmid.identify.series import Series, scales
+from rhythmid.identify.student import autocorrelation_time
 
 
 @dataclass(frozen=True)

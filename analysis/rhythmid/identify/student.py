@@ -1,4 +1,4 @@
-"""Student's t errors: scale, weights of reweighted least squares, and how long a residual remembers.
+"""Student's t errors: scale, density, weights of reweighted least squares, and how long a residual remembers.
 
 Rare outliers, and what no model explains, weigh little (K. L. Lange, R. J. A. Little, J. M. G. Taylor, J. Am. Stat. Assoc. 84
 (1989) 881).
@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gammaln
 
 Array = NDArray[np.float64]
 DEGREES = 4.0  # degrees of freedom: the lowest for which the fourth moment is not finite; Lange et al. use 4 where it is not estimated
@@ -34,6 +35,12 @@ def weights_of(error: Array, scale: float) -> Array:
     return (DEGREES + 1.0) / (DEGREES + (error / scale) ** 2)
 
 
+def log_density(error: Array, scale: float) -> Array:
+    """Logarithm of the density (n,) of errors (n,) at this scale."""
+    constant = gammaln(0.5 * (DEGREES + 1.0)) - gammaln(0.5 * DEGREES) - 0.5 * math.log(DEGREES * math.pi)
+    return constant - math.log(scale) - 0.5 * (DEGREES + 1.0) * np.log1p((error / scale) ** 2 / DEGREES)
+
+
 def cost_of(error: Array, scale: float) -> float:
     """Negative log likelihood of errors (n,) at this scale, but for a constant."""
     return len(error) * math.log(scale) + 0.5 * (DEGREES + 1.0) * float(
@@ -41,7 +48,7 @@ def cost_of(error: Array, scale: float) -> float:
     )
 
 
-def correlation_time(error: Array, record: NDArray[np.int64]) -> float:
+def autocorrelation_time(error: Array, record: NDArray[np.int64]) -> float:
     """Integrated autocorrelation time [rows] of errors (n,) in the records that the rows belong to (n,), at least 1.
 
     Neighbouring autocorrelations are summed while their sum is positive and falls (C. J. Geyer, Statistical Science 7 (1992) 473).

@@ -16,7 +16,6 @@ from rhythmid.diagnose.evidence import (
     Blocks,
     CrossValidated,
     Linearised,
-    autocorrelation_time,
     cross_validate,
     prediction,
 )
@@ -26,6 +25,7 @@ from rhythmid.diagnose.verdict import Decision, decide
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.estimate import size_of
+from rhythmid.identify.student import autocorrelation_time
 
 Array = NDArray[np.float64]
 

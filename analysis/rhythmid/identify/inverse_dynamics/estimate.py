@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.student import correlation_time, cost_of, scale_of, weights_of
+from rhythmid.identify.student import autocorrelation_time, cost_of, scale_of, weights_of
 from rhythmid.model import INERTIA, Model, Prior
 
 Array = NDArray[np.float64]
@@ -181,7 +181,7 @@ def fit_effort(
         if gained < SETTLED * len(residual):
             break
     scale = scale_of(residual)
-    time = correlation_time(residual, balance.record)
+    time = autocorrelation_time(residual, balance.record)
     weight = weights_of(residual, scale) / scale**2
     normal = (jacobian * weight[:, None]).T @ jacobian / time + np.diag(precision)
     scaling = 1.0 / np.sqrt(np.diag(normal))
