@@ -5,7 +5,7 @@ from contests import contest, predicted, supposed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhythmid.diagnose.selection import equivalent, select, special_case, without_elements
+from rhythmid.diagnose.selection import equivalent, select, special_case
 
 NOMINAL = supposed("", predicted(1.0))
 FRICTION = supposed("friction", predicted(0.2))
@@ -110,10 +110,3 @@ def test_a_selection_does_not_depend_on_the_order_of_the_hypotheses(left, random
 def test_the_floor_is_the_best_prediction_of_all_free_maps_included():
     assert contest(NOMINAL, FRICTION).floor == pytest.approx(0.2)
     assert contest(NOMINAL, FRICTION, maps={"time": predicted(0.05)}).floor == pytest.approx(0.05)
-
-
-def test_a_contest_without_some_elements_keeps_the_others():
-    assert without_elements(contest(NOMINAL, FRICTION, CUBIC, BOTH), ["cubic"]).hypotheses == (
-        NOMINAL,
-        FRICTION,
-    )

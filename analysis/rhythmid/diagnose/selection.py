@@ -6,7 +6,7 @@ where no row of the table of rejections speaks against the best of them.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from rhythmid.diagnose.constants import EQUIVALENT, REST
 from rhythmid.diagnose.evidence import difference
@@ -132,9 +132,3 @@ def equivalent(other: Hypothesis, best: Hypothesis, contest: Contest) -> bool:
     practical = (contest.practical * contest.size) ** 2
     removed = other.prediction.mean_square - best.prediction.mean_square
     return gain <= EQUIVALENT * error or removed < max(REST * left, practical)
-
-
-def without_elements(contest: Contest, gone: Sequence[str]) -> Contest:
-    """The contest without hypotheses that hold one of these elements."""
-    kept = tuple(one for one in contest.hypotheses if not set(one.names) & set(gone))
-    return replace(contest, hypotheses=kept)

@@ -26,7 +26,6 @@ from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-HOLD = "command_hold"  # what the search takes for the one element with a clock
 DELAY = "input_delay.delay"
 COARSE = 50  # rates of the coarse scan
 # of the way from the best to the middling cost of the coarse scan, up to which a rate is in the band
