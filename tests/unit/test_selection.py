@@ -104,7 +104,21 @@ def test_a_selection_does_not_depend_on_the_order_of_the_hypotheses(left, random
     one, other = (select(contest(NOMINAL, *every)) for every in (made, shuffled))
     assert one.chosen.key == other.chosen.key
     assert set(one.rejections) == set(other.rejections)
-    assert [len(step.elements) for step in one.grown] == list(range(len(one.grown)))
+    places = [len(step.elements) for step in one.grown]
+    assert places[0] == 0 and all(more > fewer for fewer, more in zip(places, places[1:]))
+
+
+def test_two_effects_that_mask_one_another_are_granted_together():
+    alone = supposed("a", predicted(0.99, 0.5, seed=3))
+    together = supposed("a b", predicted(0.01, 300.0, seed=3))
+    chosen = select(contest(NOMINAL, alone, together))
+    assert [step.elements for step in chosen.grown] == [(), ("a", "b")]
+
+
+def test_a_second_effect_that_adds_nothing_to_a_refused_one_is_not_granted_with_it():
+    alone = supposed("a", predicted(0.2, 100.0, mood=60.0, seed=3))
+    together = supposed("a b", predicted(0.19, 101.0, mood=60.0, seed=4))
+    assert select(contest(NOMINAL, alone, together)).chosen.elements == ()
 
 
 def test_the_floor_is_the_best_prediction_of_all_free_maps_included():

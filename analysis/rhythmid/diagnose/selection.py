@@ -81,26 +81,29 @@ class Selection:
 
 
 def select(contest: Contest) -> Selection:
-    """Grant effects their places. Hypotheses whose effects have lost their shape take no part."""
+    """Grant effects their places. Hypotheses whose effects have lost their shape take no part.
+
+    Where one effect alone is refused, two together may still be granted, if they predict better than the best one alone: of
+    two that mask one another neither does much by itself.
+    """
     told: list[Rejection] = []
-    grown = [contest.nominal]
+    grown, smaller = [contest.nominal], contest.nominal
     most = max(len(one.elements) for one in contest.hypotheses)
-    going = True
     for count in range(1, most + 1):
         sound: list[Hypothesis] = []
         for one in contest.of_size(count):
-            against = rejections_of(contest.claim(one, grown[-1]))
+            against = rejections_of(contest.claim(one, smaller))
             told += against
             if not any(row.name in SHAPE_RULES for row in against):
                 sound.append(one)
-        if not going or not sound:
-            going = False
+        if not sound:
             continue
         best = _simplest(sound, contest)
         if any(row.hypothesis == best.elements for row in told):
-            going = False
-            continue
-        grown.append(best)
+            smaller = max(smaller, best, key=lambda one: one.prediction.score)
+        else:
+            grown.append(best)
+            smaller = best
     return Selection(grown[-1], tuple(grown), tuple(told))
 
 

@@ -115,19 +115,16 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
 
 def _indistinguishable(model: Model, decision: Decision) -> tuple[tuple[str, ...], ...]:
     """Groups of names that these records cannot separate: those that the evidence does not, and those that make one model."""
-    groups = [list(group) for group in decision.equivalent]
+    groups = list(decision.equivalent)
     for label in decision.named:
         term = model.term(label)
         if term is None:
             continue
         same = [*term.element.same_as]
         same += [other for beside, other in term.element.same_beside.items() if _estimated(model, beside)]
-        known = next((group for group in groups if term.element.name in group), None)
-        if known is not None:
-            known += [name for name in same if name not in known]
-        elif same:
-            groups.append([term.element.name, *same])
-    return tuple(tuple(group) for group in groups)
+        if same:
+            groups.append((term.element.name, *same))
+    return tuple(groups)
 
 
 def _estimated(model: Model, name: str) -> bool:

@@ -358,15 +358,12 @@ def _could_pay(now: Round, best: Trial, margin: float, current: Fit) -> bool:
 
 
 def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial) -> list[Trial]:
-    """The models worth comparing at the end: the nominal one, the best of each number of effects, and the chosen one with what
-    it is without each of its effects."""
+    """The models worth comparing at the end: the nominal one, the best of each number of effects, and the chosen one with all
+    that it is without some of its effects: what each of them brings is judged against these."""
     ranked = sorted(trials.values(), key=lambda t: t.bic())
     kept = {tuple(sorted(t.added)): t for t in [trials[()], best]}
     for count in {len(t.added) for t in ranked if t.added}:
         same = [t for t in ranked if len(t.added) == count][:RIVALS]
         kept = {tuple(sorted(t.added)): t for t in same} | kept
-    for label in best.added:
-        rest = tuple(sorted(name for name in best.added if name != label))
-        if rest in trials:
-            kept.setdefault(rest, trials[rest])
-    return list(kept.values())
+    parts = {key: t for key, t in trials.items() if set(key) < set(best.added)}
+    return list((parts | kept).values())
