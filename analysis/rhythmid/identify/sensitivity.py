@@ -71,11 +71,8 @@ class Problem:
         self.hidden = []
         for index, start in enumerate(starts):
             rows = self.run.rows(model, index, start)
-            states = (
-                rows[len(rows) // 4 :, 2 : self.run.states]
-                if rows is not None
-                else np.zeros((1, self.run.states - 2))
-            )
+            # all of the run: a free decay is at its largest where it begins
+            states = rows[:, 2 : self.run.states] if rows is not None else np.zeros((1, self.run.states - 2))
             self.hidden.append((states.mean(axis=0), 3.0 * states.std(axis=0) + 1e-12))
 
     def departure(self, index: int, start: Array) -> Array:
