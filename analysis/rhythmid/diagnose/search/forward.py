@@ -28,10 +28,8 @@ from rhythmid.diagnose.search.refit import (
     under_noise,
     whole_fit,
 )
-from rhythmid.diagnose.search.round import Round, distinct
+from rhythmid.diagnose.search.round import Round, distinct, not_tried, one_round
 from rhythmid.diagnose.search.score_tests import (
-    Change,
-    Score,
     changes_of,
     guesses,
     p_value,
@@ -40,11 +38,10 @@ from rhythmid.diagnose.search.score_tests import (
     trajectories,
     under,
 )
-from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import accurate
-from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
+from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, minimise, noise_of
 from rhythmid.identify.sample_clock.clock import has_clock
 from rhythmid.identify.sample_clock.tick_likelihood import ticks_sought
@@ -62,6 +59,9 @@ SHARE = 5e-4  # of what is explained already, below which a further effect is an
 LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
 # elements of a round that are refitted; the right one was among the first five in all of 234 trials
 REFITTED = 6
+# elements of a round that are refitted because they score best in windows: of free decays and pendulums the right one was
+# the first or the second there, and the seventh to twelfth along the whole records
+LOCAL = 3
 # difference of the criterion within which models are compared again under the noise that they leave
 NEAR = 60.0
 # gain in the criterion from which a model is worth a second look where a better one does not hold under the noise that it
@@ -72,9 +72,6 @@ MOST = 3  # effects at once
 RIVALS = 4  # models of each number of effects that are compared at the end
 OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
-MISFIT = 0.1  # error, as a share of the motion, and
-# power of the residual over what its own past leaves of it, beyond both of which it is no noise
-PREDICTED = 25.0
 # of the noise: integration error of an element with corners beyond which all steps are made finer
 ROUGH = 0.1
 
@@ -97,77 +94,21 @@ class Search:
     excluded: tuple[tuple[tuple[str, ...], str], ...]
 
 
-def noise_without(fit: Fit, changes: Sequence[Change], most: int = 60) -> NoiseModel:
-    """Noise model of the residual less what the catalogue's best guesses together explain of it.
-
-    The residual of a model that lacks something is not noise: a regular motion that is missed can be predicted from its
-    own past, so it would pass for colour and be whitened away. Where nothing is missing the guesses take out no more
-    than their number of degrees of freedom, which is given back.
-    """
-    samples = sum(int(one.used.sum()) for one in fit.run.series)
-    ranked = score(fit, changes)[: min(most, samples // 50)]
-    residuals = [r.copy() for r in fit.residuals]
-    share = 1.0
-    if ranked:
-        by_key = {change.key: change for change in changes}
-        picked = [by_key[one.key] for one in ranked]
-        used = [one.used for one in fit.run.series]
-        design = np.concatenate(
-            [np.column_stack([c.outputs[i][u] for c in picked]) for i, u in enumerate(used)]
-        )
-        norms = np.linalg.norm(design, axis=0)
-        norms[norms == 0.0] = 1.0
-        target = np.concatenate([r[u] for r, u in zip(residuals, used)])
-        solution, _, rank, _ = np.linalg.lstsq(design / norms, -target, rcond=1e-6)
-        solution = solution / norms
-        share = samples / max(samples - int(rank), 1)
-        for i, r in enumerate(residuals):
-            r += np.column_stack([c.outputs[i] for c in picked]) @ solution
-    stretches = [r[s] * math.sqrt(share) for r, one in zip(residuals, fit.run.series) for s in runs(one.used)]
-    return estimate_noise(stretches, floor=fit.noise.std * 1e-6)
-
-
-def _one_round(
-    fit: Fit, added: tuple[str, ...], catalogue: Catalogue, pool: ThreadPoolExecutor | None
-) -> tuple[Round, Fit]:
-    """Score the catalogue at a fit, under the noise that its best guesses leave; returns the fit under that noise, too.
-
-    What is missing, such as a slow drift, would otherwise pass for the colour of the noise, in later rounds as in the first.
-    """
-    known = trajectories(fit)
-    changes = changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
-    noise = noise_without(fit, changes)
-    if fit.nrmse() > MISFIT and noise.variance > PREDICTED * noise.std**2:
-        # motion that is missed, not noise: do not whiten it away
-        noise = NoiseModel(np.empty(0), noise.variance**0.5)
-    fit = under(fit, noise, pool)
-    scores = score(fit, changes)
-    return Round(tuple(scores), p_value(scores), added), fit
-
-
-def _not_tried(nominal: Fit, catalogue: Catalogue, first: Round) -> list[tuple[tuple[str, ...], str]]:
-    """Candidates of the catalogue that the first round could not score, each with the reason."""
-    known = candidates(catalogue, nominal.model.setting, sizes_along(trajectories(nominal)))
-    scored = {score.element.name for score in first.scores}
-    lost = dict.fromkeys(element.name for element, _ in known.tried if element.name not in scored)
-    reasons = dict(known.not_tried) | dict.fromkeys(
-        lost, "with every first guess the model diverges, or does as without it"
-    )
-    return [((name,), why) for name, why in reasons.items()]
-
-
-def _proposals(
-    base: Model, added: tuple[str, ...], scores: Sequence[Score], count: int, chi2: float
-) -> tuple[list[Proposal], list[float]]:
-    """Structures worth a refit, with chi2 below which one start of each is enough."""
-    chosen = distinct(scores, count)
+def _proposals(base: Model, now: Round, count: int, chi2: float) -> tuple[list[Proposal], list[float]]:
+    """Structures worth a refit, with chi2 below which one start of each is enough: the elements that score best along the whole
+    records, and those that do in windows."""
     made, enough = [], []
-    for best, group in chosen:
+    local = {best.element.name: group for best, group in distinct(now.local, LOCAL)}
+    for best, group in distinct(now.scores, count):
         starts = [one.start for one in group[: 3 if len(group) > MANY else 2]]
         if not 0.2 < abs(best.size) < 5.0:  # far from the guess that was scored, the size is an extrapolation
             starts.insert(1, dict(best.values))
-        made.append(propose(base, best.element, starts[:3], added, chi2))
+        starts = [*[one.start for one in local.pop(best.element.name, [])[:1]], *starts][:3]
+        made.append(propose(base, best.element, starts, now.added, chi2))
         enough.append(chi2 - 0.8 * best.statistic)
+    for group in local.values():
+        made.append(propose(base, group[0].element, [one.start for one in group[:2]], now.added, chi2))
+        enough.append(-math.inf)
     return made, enough
 
 
@@ -187,7 +128,7 @@ def _from_given(
     except InputError:
         return []
     scores = score(fit, changes_of(known, guesses(catalogue, model, sizes_along(known)), pool))
-    return _proposals(model, (), scores, REFITTED, chi2)[0]
+    return _proposals(model, Round(tuple(scores), p_value(scores)), REFITTED, chi2)[0]
 
 
 def _better_of(trials: Sequence[Trial]) -> list[Trial]:
@@ -215,7 +156,7 @@ def search(
     step = nominal.run.max_step
     floor = 1e-9 * max(float(np.std(one.averaged)) for one in series)
     tell("scoring the catalogue")
-    first, nominal = _one_round(nominal, (), catalogue, pool)
+    first, nominal = one_round(nominal, (), catalogue, pool)
     current, noise = nominal, nominal.noise
     base = Trial(
         (),
@@ -234,7 +175,7 @@ def search(
     trials: dict[tuple[str, ...], Trial] = {(): base}
     # the same model under the noise that it leaves, and under a round's, out of which the catalogue's guesses are taken
     best = here = base
-    rounds, excluded = [first], _not_tried(nominal, catalogue, first)
+    rounds, excluded = [first], not_tried(nominal, catalogue, first)
     now = first
     gained = 0.0
     while (
@@ -247,7 +188,7 @@ def search(
             excluded.append((tuple(untried), "not tried, for the time given was spent"))
             break
         count = REFITTED if not best.added else REFITTED - 2
-        proposals, enough = _proposals(here.model, here.added, now.scores, count, here.chi2)
+        proposals, enough = _proposals(here.model, replace(now, added=here.added), count, here.chi2)
         tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
         found, failed = run_trials(
             proposals, series, here.starts, current.run.compiled.layout.states, here.noise, step, enough
@@ -298,7 +239,7 @@ def search(
         current = whole_fit(best, series, noise, step, pool=pool)
         if len(best.added) >= MOST:
             break
-        now, current = _one_round(current, best.added, catalogue, pool)
+        now, current = one_round(current, best.added, catalogue, pool)
         here = under_noise([best], series, current.noise, step, 0)[0]
         rounds.append(now)
     if best.added and not budget.spent:

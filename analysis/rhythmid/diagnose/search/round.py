@@ -1,19 +1,55 @@
-"""One round of the search: scores of the whole catalogue at a fit."""
+"""One round of the search: scores of the whole catalogue at a fit, along whole records and in short windows of them."""
 
+import math
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-from rhythmid.diagnose.search.score_tests import Score
+import numpy as np
+
+from rhythmid.diagnose.search.score_tests import (
+    Change,
+    Score,
+    changes_of,
+    guesses,
+    p_value,
+    score,
+    sizes_along,
+    trajectories,
+    under,
+)
+from rhythmid.elements.candidates import candidates
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.errors import InputError
+from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.multiple_shooting import periods_long, windows
+from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
+from rhythmid.identify.output_error import Fit, minimise
+
+MISFIT = 0.1  # error, as a share of the motion, and
+# power of the residual over what its own past leaves of it, beyond both of which it is no noise
+PREDICTED = 25.0
+# windows in which the catalogue is scored: enough to see every amplitude, few enough to cost less than the records
+WINDOWS = 40
 
 
 @dataclass(frozen=True)
 class Round:
-    """One round of the search: the scores, best first, and the probability of such a best score by chance; `added` are the
-    labels of the effects that the scored model had already."""
+    """One round of the search.
+
+    Parameters
+    ----------
+    scores : scores along the whole records, best first.
+    p_value : probability of such a best score by chance.
+    added : labels of the effects that the scored model had already.
+    local : scores in short windows, best first. A score is linear in what is missing. Along a whole record a wrong force
+        adds up to a wrong phase, which is not; in a window it cannot get far.
+    """
 
     scores: tuple[Score, ...]
     p_value: float
     added: tuple[str, ...] = ()
+    local: tuple[Score, ...] = ()
 
 
 def distinct(scores: Sequence[Score], count: int) -> list[tuple[Score, list[Score]]]:
@@ -24,3 +60,80 @@ def distinct(scores: Sequence[Score], count: int) -> list[tuple[Score, list[Scor
             continue
         found.setdefault(one.element.name, []).append(one)
     return [(group[0], group) for group in list(found.values())[:count]]
+
+
+def noise_without(fit: Fit, changes: Sequence[Change], most: int = 60) -> NoiseModel:
+    """Noise model of the residual less what the catalogue's best guesses together explain of it.
+
+    The residual of a model that lacks something is not noise: a regular motion that is missed can be predicted from its
+    own past, so it would pass for colour and be whitened away. Where nothing is missing the guesses take out no more
+    than their number of degrees of freedom, which is given back.
+    """
+    samples = sum(int(one.used.sum()) for one in fit.run.series)
+    ranked = score(fit, changes)[: min(most, samples // 50)]
+    residuals = [r.copy() for r in fit.residuals]
+    share = 1.0
+    if ranked:
+        by_key = {change.key: change for change in changes}
+        picked = [by_key[one.key] for one in ranked]
+        used = [one.used for one in fit.run.series]
+        design = np.concatenate(
+            [np.column_stack([c.outputs[i][u] for c in picked]) for i, u in enumerate(used)]
+        )
+        norms = np.linalg.norm(design, axis=0)
+        norms[norms == 0.0] = 1.0
+        target = np.concatenate([r[u] for r, u in zip(residuals, used)])
+        solution, _, rank, _ = np.linalg.lstsq(design / norms, -target, rcond=1e-6)
+        solution = solution / norms
+        share = samples / max(samples - int(rank), 1)
+        for i, r in enumerate(residuals):
+            r += np.column_stack([c.outputs[i] for c in picked]) @ solution
+    stretches = [r[s] * math.sqrt(share) for r, one in zip(residuals, fit.run.series) for s in runs(one.used)]
+    return estimate_noise(stretches, floor=fit.noise.std * 1e-6)
+
+
+def one_round(
+    fit: Fit, added: tuple[str, ...], catalogue: Catalogue, pool: ThreadPoolExecutor | None
+) -> tuple[Round, Fit]:
+    """Score the catalogue at a fit, under the noise that its best guesses leave; returns the fit under that noise, too.
+
+    What is missing, such as a slow drift, would otherwise pass for the colour of the noise, in later rounds as in the first.
+    """
+    known = trajectories(fit)
+    changes = changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
+    noise = noise_without(fit, changes)
+    if fit.nrmse() > MISFIT and noise.variance > PREDICTED * noise.std**2:
+        # motion that is missed, not noise: do not whiten it away
+        noise = NoiseModel(np.empty(0), noise.variance**0.5)
+    fit = under(fit, noise, pool)
+    scores = score(fit, changes)
+    return Round(tuple(scores), p_value(scores), added, tuple(scored_in_windows(fit, catalogue, pool))), fit
+
+
+def not_tried(nominal: Fit, catalogue: Catalogue, first: Round) -> list[tuple[tuple[str, ...], str]]:
+    """Candidates of the catalogue that the first round could not score, each with the reason."""
+    known = candidates(catalogue, nominal.model.setting, sizes_along(trajectories(nominal)))
+    scored = {score.element.name for score in first.scores}
+    lost = dict.fromkeys(element.name for element, _ in known.tried if element.name not in scored)
+    reasons = dict(known.not_tried) | dict.fromkeys(
+        lost, "with every first guess the model diverges, or does as without it"
+    )
+    return [((name,), why) for name, why in reasons.items()]
+
+
+def scored_in_windows(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> list[Score]:
+    """Scores of the catalogue in short windows of the records, the model refitted there; none where the fit is of such windows
+    already, or where the model diverges."""
+    length = float(np.median([periods_long(one) for one in fit.run.series]))
+    cut = windows(fit.run.series, length)
+    if len(cut) < 2 * len(fit.run.series):
+        return []
+    cut = cut[:: math.ceil(len(cut) / WINDOWS)]
+    try:
+        run = prepare_run(fit.model, cut, fit.run.max_step)
+        local = minimise(fit.model, run, fit.names, fit.noise, None, 10, pool)
+        known = trajectories(local)
+        changes = changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
+        return score(under(local, noise_without(local, changes), pool), changes)
+    except InputError:
+        return []
