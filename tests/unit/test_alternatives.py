@@ -1,5 +1,6 @@
 """Other explanations than the search's effects: a freed value, a longer delay, another place, one law for several."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,8 @@ from rhythmid.diagnose.alternatives import LONGEST, alternatives, fixed_values
 from rhythmid.diagnose.baseline import INPUT_DELAY
 from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.diagnose.search.refit import Proposal, Trial
-from rhythmid.diagnose.search.score_tests import trajectories
+from rhythmid.diagnose.search.round import Round
+from rhythmid.diagnose.search.score_tests import changes_of, guesses, score, sizes_along, trajectories
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate
@@ -19,6 +21,7 @@ from rhythmid.identify.series import dominant_frequency, prepare
 from rhythmid.model import INERTIA, Model, Prior
 
 NOISE = NoiseModel(np.empty(0), 0.5e-4)  # of averages of four samples
+LAGS = ("actuator_lag", "command_lag", "sensor_lag")
 LAG, DRIFT = {"time_constant": 0.03}, {"rate": 2e-3}
 
 
@@ -27,13 +30,25 @@ def fitted(begin: Model, truth: Model, delays: tuple[float, float] = (0.0203, 0.
     return estimate(begin, series, noise=NOISE, max_step=1e-3)
 
 
+def rounds_of(fit: Fit) -> list[Round]:
+    """A round of scores of the lags at a fit."""
+    lags = Catalogue({name: CATALOGUE[name] for name in LAGS})
+    known = trajectories(fit)
+    scores = score(fit, changes_of(known, guesses(lags, fit.model, sizes_along(known))))
+    return [Round(tuple(scores), 0.0)]
+
+
 def others(
-    nominal: Fit, chosen: Fit, catalogue: Catalogue = CATALOGUE, *labels: str
+    nominal: Fit,
+    chosen: Fit,
+    catalogue: Catalogue = CATALOGUE,
+    *labels: str,
+    rounds: Sequence[Round] = (),
 ) -> list[tuple[Trial, Kind]]:
     """The alternatives to a search that chose the effects with these labels."""
     base, trial = search_of(nominal).best, search_of(chosen, *labels).best
-    series = list(chosen.run.series)
-    return alternatives(base, trial, series, catalogue, NOISE, 1e-3, trajectories(chosen))
+    series, known = list(chosen.run.series), trajectories(chosen)
+    return alternatives(base, trial, series, catalogue, NOISE, 1e-3, known, rounds, [base, trial])
 
 
 def proposed(monkeypatch: pytest.MonkeyPatch, *given, **options) -> list[Proposal]:
@@ -105,6 +120,24 @@ def test_what_is_in_another_place_than_the_catalogue_has_it_fits_better_there(
     chosen = fitted(hopper().with_element(CATALOGUE[named], values), machine)
     found = {trial.added: trial for trial, kind in others(plain, chosen, known, named) if kind == "location"}
     assert found[f"{named}_of_the_{place}",].chi2 < chosen.chi2 - 100.0
+
+
+def test_kin_of_the_chosen_effect_are_fitted_in_its_place(plain):
+    machine = hopper().with_element(CATALOGUE["sensor_lag"], LAG)
+    nominal = fitted(hopper(), machine)
+    chosen = fitted(hopper().with_element(CATALOGUE["actuator_lag"], LAG), machine)
+    made = others(nominal, chosen, CATALOGUE, "actuator_lag", rounds=rounds_of(nominal))
+    kin = {trial.added: trial for trial, kind in made if kind == "effects"}
+    assert set(kin) == {("sensor_lag",), ("command_lag",)}
+    assert kin["sensor_lag",].chi2 < chosen.chi2 - 100.0
+    assert kin["sensor_lag",].model.value("sensor_lag.time_constant") == pytest.approx(0.03, rel=0.05)
+
+
+def test_kin_begin_where_the_family_has_ended(monkeypatch, plain):
+    chosen = replace(plain, model=plain.model.with_element(CATALOGUE["actuator_lag"], LAG))
+    kept = proposed(monkeypatch, plain, chosen, CATALOGUE, "actuator_lag", rounds=rounds_of(plain))
+    kin = next(one for one in kept if one.added == ("sensor_lag",))
+    assert any(guess.get("sensor_lag.time_constant") == LAG["time_constant"] for guess in kin.guesses)
 
 
 def test_places_for_which_the_catalogue_has_something_have_been_searched(monkeypatch, plain):

@@ -130,14 +130,15 @@ def test_a_hypothesis_that_fails_is_left_out_and_the_others_keep_their_order(giv
     assert [one.trial for one in found] == [good]
 
 
-def test_free_starts_of_an_effects_own_states_have_their_price(given, rubbing):
+def test_every_felt_start_of_an_effects_own_states_costs_one_of_log_density_at_most(given, plain):
     rows = rows_of(given, [], NOISE)
-    trial = search_of(rubbing, "coulomb_friction").best
-    cheap, dear = contend(
-        [(replace(trial, start_cost=cost), "effects") for cost in (0.0, 50.0)], given, rows, 1e-3
+    lagging = fitted(
+        hopper().with_element(CATALOGUE["actuator_lag"], {"time_constant": 0.02}, fixed=True), given
     )
-    one, other = (h.prediction.score for h in hypotheses_of([cheap, dear], rows, lambda _: {}))
-    assert one > other
+    trials = [(search_of(plain).best, "nominal"), (search_of(lagging, "actuator_lag").best, "effects")]
+    stateless, with_states = contend(trials, given, rows, 1e-3)
+    assert stateless.found.penalty == 0.0
+    assert 0.0 < with_states.found.penalty * rows.fitted <= len(given)
 
 
 def test_without_held_out_rows_there_is_no_error_on_them(given):

@@ -12,7 +12,7 @@ from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.series import Series, prepare
-from rhythmid.identify.start_cost import start_cost
+from rhythmid.identify.start_cost import start_cost, start_freedom
 from rhythmid.model import INERTIA, Model
 
 NOISE = NoiseModel(np.empty(0), 0.5e-4)  # of averages of four samples
@@ -28,9 +28,22 @@ def cost_of(fit: Fit) -> float:
     return start_cost(fit.model, fit.run, fit.noise, fit.starts, fit.residuals, fit.differences[1])
 
 
+def freedom_of(fit: Fit) -> float:
+    return start_freedom(fit.model, fit.run, fit.noise, fit.starts, fit.residuals, fit.differences[1])
+
+
 def test_a_model_without_states_of_elements_pays_nothing():
     series = prepare(records(hopper(), SHORT[:1]), 4)
-    assert cost_of(started(hopper().with_values(DELAYS), series)) == 0.0
+    plain = started(hopper().with_values(DELAYS), series)
+    assert cost_of(plain) == freedom_of(plain) == 0.0
+
+
+def test_starts_that_are_felt_are_parameters_and_those_that_are_not_are_none():
+    lag = hopper().with_values(DELAYS).with_element(CATALOGUE["actuator_lag"], {"time_constant": 0.03})
+    series = prepare(records(lag, SHORT), 4)
+    assert freedom_of(started(lag, series)) == pytest.approx(len(series), abs=0.2)
+    fast = lag.with_values({"actuator_lag.time_constant": 1e-6})
+    assert freedom_of(started(fast, series)) == pytest.approx(0.0, abs=0.01)
 
 
 def test_the_cost_is_that_of_the_likelihood_averaged_over_the_starts_by_brute_force():

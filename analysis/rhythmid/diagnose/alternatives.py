@@ -1,7 +1,8 @@
 """Other kinds of explanation beside the search's effects: a wrong fixed value, a longer delay, an effect in another place.
 
 A mass that is given wrongly is missed like physics, and a lag is one law wherever in the path it sits, though the catalogue may
-have it in one place only. Each is a hypothesis like any other, fitted and scored in the same way.
+have it in one place only. Kin of a chosen effect (the other lags, the other laws of friction) explain the same by other means.
+Each is a hypothesis like any other, fitted and scored in the same way.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,7 +15,8 @@ from rhythmid.diagnose.baseline import INPUT_DELAY
 from rhythmid.diagnose.free_map import FREE_MAPS, first_guess
 from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.diagnose.search.refit import Proposal, Trial, propose, run_trials
-from rhythmid.diagnose.search.score_tests import Trajectories
+from rhythmid.diagnose.search.round import Round
+from rhythmid.diagnose.search.score_tests import Score, Trajectories
 from rhythmid.diagnose.static_law import laws_of
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales, Slot
@@ -40,11 +42,17 @@ def alternatives(
     noise: NoiseModel,
     step: float,
     known: Trajectories,
+    rounds: Sequence[Round],
+    weighed: Sequence[Trial],
 ) -> list[tuple[Trial, Kind]]:
-    """Fitted trials of other kinds, for the nominal model and in the place of the chosen effects; `known` is the chosen run."""
+    """Fitted trials of other kinds, for the nominal model and in the place of the chosen effects.
+
+    `known` is the chosen run, `rounds` are the search's scores, and `weighed` the models that are hypotheses already.
+    """
     sizes = scales(series, chosen.model)
     freed: list[Proposal] = list(_freed(nominal))
     moved: list[Proposal] = []
+    kin: list[Proposal] = []
     for label in chosen.added:
         rest = tuple(name for name in chosen.added if name != label)
         beside = _base(chosen, rest)
@@ -52,6 +60,7 @@ def alternatives(
             freed += _freed(beside)
         term = chosen.model.term(label)
         assert term is not None
+        kin += _kin(beside, term, rounds, weighed)
         for place in _free_places(term.element, catalogue):
             if not (place == "command" and series[0].kind not in DRIVES):
                 moved.append(_moved(beside, term, place))
@@ -60,6 +69,7 @@ def alternatives(
         "delay": list(_longer_delay(nominal, series)),
         "location": moved,
         "free_map": list(_one_law(chosen, known, sizes)),
+        "effects": kin,
     }
     kinds: dict[tuple[str, ...], Kind] = {
         proposal.added: kind for kind, group in made.items() for proposal in group
@@ -70,6 +80,39 @@ def alternatives(
     every = [proposal for group in made.values() for proposal in group]
     trials, _ = run_trials(every, series, chosen.starts, states, noise, step)
     return [(trial, kinds[trial.added]) for trial in trials]
+
+
+def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Trial]) -> Iterator[Proposal]:
+    """The model with another element of the same family in the place of an effect, as far as one has scored in any round and
+    is no hypothesis yet; beginning where the family's other members have ended, too."""
+    family = term.element.family
+    scored: dict[str, list[Score]] = {}
+    for one in sorted((s for r in rounds for s in (*r.scores, *r.local)), key=lambda s: -s.statistic):
+        if one.statistic > 0.0 and one.element.family == family != "":
+            scored.setdefault(one.element.name, []).append(one)
+    places = {
+        label: trial
+        for trial in weighed
+        for label in trial.added
+        if sorted(trial.added) == sorted((*base.added, label)) and trial.model.term(label) is not None
+    }
+    there = {other.element.name for other in base.model.terms} | set(places) | {term.element.name}
+    for name, scores in scored.items():
+        if name in there:
+            continue
+        made = propose(base.model, scores[0].element, [one.start for one in scores[:2]], base.added)
+        own = made.added[-1]
+        ends = [
+            {
+                key.replace(f"{label}.", f"{own}."): value.value
+                for key, value in trial.model.parameters.items()
+            }
+            for label, trial in places.items()
+            if trial.element(label).family == family
+        ]
+        known = set(made.model.parameters)
+        nearer = tuple({key: value for key, value in end.items() if key in known} for end in ends)
+        yield replace(made, guesses=(*made.guesses, *nearer))
 
 
 def _base(chosen: Trial, rest: tuple[str, ...]) -> Trial:

@@ -25,6 +25,7 @@ from rhythmid.identify.multiple_shooting import record_of
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.series import Series
+from rhythmid.identify.start_cost import start_freedom
 from rhythmid.identify.student import autocorrelation_time
 from rhythmid.parallel import fork_map
 
@@ -175,9 +176,10 @@ def contend(
     def one(case: tuple[Trial, Kind]) -> tuple[CrossValidated, Array]:
         fit = whole_fit(case[0], series, rows.noise, step)
         found = cross_validate(linearised(fit, rows), rows.blocks)
-        cost = 0.5 * case[0].start_cost / max(rows.fitted, 1)  # of free starts, spread over what the fit saw
-        if cost > 0.0:
-            found = replace(found, penalty=cost)
+        state_steps = fit.linearisation.state_steps
+        free = start_freedom(fit.model, fit.run, rows.noise, fit.starts, fit.residuals, state_steps)
+        if free > 0.0:  # spread over what the fit saw
+            found = replace(found, penalty=free / max(rows.fitted, 1))
         return found, measured_errors(found.error, rows)
 
     done = {i: r for i, r in fork_map(one, list(trials)) if not isinstance(r, Exception)}

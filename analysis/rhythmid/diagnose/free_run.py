@@ -81,7 +81,8 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         run = trajectories(whole_fit(trial, seen, found.noise, step, pool=case.pool))
     if not case.budget.spent and chosen.kind != "freed_value":
         nominal = next(one.trial for one in contenders if one.kind == "nominal")
-        others = alternatives(nominal, trial, seen, known, found.noise, step, run)
+        weighed = [one.trial for one in contenders]
+        others = alternatives(nominal, trial, seen, known, found.noise, step, run, found.rounds, weighed)
         contenders += contend(others, seen, rows, step)
     case.tell("locating what is left")
     after = dependences(run, rows, case.pool)

@@ -5,7 +5,7 @@ by that alone, about one of chi2 a start, whatever its physics; over hundreds of
 is worth. A fair criterion takes the average over the starts' usual range, not the best of it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,18 +33,50 @@ def start_cost(
     the whitened output to them, less what position and velocity at the start can do. `state_steps` (2 + h,) are the differences by
     which sensitivities are taken. Zero without such states.
     """
+    total = 0.0
+    for departure, felt in _felt(model, run, noise, starts, residuals, state_steps):
+        total += float(np.sum(departure**2))
+        total += float(np.linalg.slogdet(np.eye(felt.shape[1]) + felt.T @ felt)[1])
+    return total
+
+
+def start_freedom(
+    model: Model,
+    run: FreeRun,
+    noise: NoiseModel,
+    starts: Sequence[Array],
+    residuals: Sequence[Array],
+    state_steps: Array,
+) -> float:
+    """Effective number of parameters that the starts of the elements' states are: tr H'H (I + H'H)^-1 of all series.
+
+    Arguments as of `start_cost`. By as much does a log density that was reached with the starts fitted exceed, on average, what
+    is left on other data (D. J. Spiegelhalter et al., J. R. Stat. Soc. B 64 (2002) 583).
+    """
+    total = 0.0
+    for _, felt in _felt(model, run, noise, starts, residuals, state_steps):
+        square = felt.T @ felt
+        total += float(np.trace(np.linalg.solve(np.eye(len(square)) + square, square)))
+    return total
+
+
+def _felt(
+    model: Model,
+    run: FreeRun,
+    noise: NoiseModel,
+    starts: Sequence[Array],
+    residuals: Sequence[Array],
+    state_steps: Array,
+) -> Iterator[tuple[Array, Array]]:
+    """Of each series the departures (h,) of its starts, and what a usual departure does to the whitened output (n, h)."""
     if run.states == 2:
-        return 0.0
+        return
     problem = Problem(run, (), noise, None)
     problem.learn_hidden(model, starts)
     _, states, _, _ = problem.linearise(model, starts, residuals, np.empty(0), state_steps)
     hidden = run.states - 2
-    total = 0.0
     for error, _, sensitivity in states:
         white, scatters = sensitivity[:-hidden], np.diag(sensitivity[-hidden:, 2:])
         basis = span(white[:, :2])
         felt = white[:, 2:] / scatters
-        felt = felt - basis @ (basis.T @ felt)
-        total += float(np.sum(error[-hidden:] ** 2))
-        total += float(np.linalg.slogdet(np.eye(hidden) + felt.T @ felt)[1])
-    return total
+        yield error[-hidden:], felt - basis @ (basis.T @ felt)
