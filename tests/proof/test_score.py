@@ -135,6 +135,8 @@ def test_clutter_that_is_named_beside_the_concealed_effect_is_no_fault():
     assert judged(true, answer("missing_physics", "coulomb_friction")).outcome == "exact"
     both = judged(true, answer("missing_physics", "coulomb_friction", "quadratic_drag"))
     assert both.outcome == "exact" and not both.stated_wrong
+    akin = judged(true, answer("missing_physics", "coulomb_friction", "cubic_stiffness"))  # as a magnet pulls
+    assert akin.outcome == "exact" and not akin.stated_wrong
     stranger = judged(true, answer("missing_physics", "coulomb_friction", "backlash"))
     assert stranger.outcome == "wrong" and stranger.stated_wrong == ("backlash",)
     assert judged(true, answer("missing_physics", "quadratic_drag")).outcome == "wrong"

@@ -114,7 +114,7 @@ def put_clutter(
 
     None where they do not come out small.
     """
-    foreign = list(rng.permutation(FOREIGN))
+    foreign = list(rng.permutation(list(FOREIGN)))
     ordinary = list(rng.permutation(list(pool)))
     count = int(rng.integers(1, 3))
     found: list[Concealed] = []

@@ -347,4 +347,10 @@ def three_halves_drag(value, t, x, v, f, m, p, s, ds, held, accepted):
     return value - p[0] * v * math.sqrt(abs(v))
 
 
-FOREIGN = ("two_harmonic_cogging", "magnet", "relaxing_friction", "three_halves_drag")
+# by the family of the catalogue that each would belong to
+FOREIGN = {
+    "two_harmonic_cogging": "ripple",
+    "magnet": "stiffness",
+    "relaxing_friction": "friction",
+    "three_halves_drag": "damping",
+}

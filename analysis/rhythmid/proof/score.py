@@ -1,10 +1,12 @@
 """The answer held against the opened truth."""
 
 import math
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from rhythmid.elements.catalogue import Catalogue
+from rhythmid.proof.equations import FOREIGN
 
 Outcome = Literal["exact", "family", "wrong", "unknown", "undecided", "consistent", "failed"]
 FAMILY = 2  # members that a declared family may have
@@ -33,8 +35,9 @@ class Estimated:
 
 @dataclass(frozen=True)
 class Stated:
-    """A name that an answer states, with its probability, and whether it is right: concealed, or clutter that is really there,
-    or declared indistinguishable from one of these in a family of two."""
+    """A name that an answer states, with its probability, and whether it is right: concealed, or declared indistinguishable from
+    that in a family of two; or clutter that is really there, or of the same family of the catalogue as such clutter, for much
+    of which there is no name."""
 
     name: str
     probability: float
@@ -109,9 +112,10 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
     named = tuple(sorted(effect["element"] for effect in answer.get("missing", ())))
     families = tuple(tuple(group) for group in answer.get("indistinguishable", ()))
     clutter = tuple(sorted(one["effect"]["name"] for one in truth["clutter"]))
-    outcome = _outcome(true, clutter, named, families, answer)
+    kin = _kin_of(clutter, catalogue)
+    outcome = _outcome(true, named, families, answer, kin)
     ranked = _ranked(answer)
-    there = {*true, *clutter}
+    kin = _kin_of(clutter, catalogue)
     slots = {catalogue[name].slot for name in true}
     if len(true) == 1:
         said = {(answer.get("location") or {}).get("slot")}
@@ -128,7 +132,9 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
         families=families,
         stated=tuple(
             Stated(
-                effect["element"], float(effect["probability"]), _right(effect["element"], there, families)
+                effect["element"],
+                float(effect["probability"]),
+                effect["element"] in kin or _right(effect["element"], set(true), families),
             )
             for effect in ranked
             if effect.get("probability") is not None
@@ -169,10 +175,10 @@ def _right(name: str, there: set[str], families: tuple[tuple[str, ...], ...]) ->
 
 def _outcome(
     true: tuple[str, ...],
-    clutter: tuple[str, ...],
     named: tuple[str, ...],
     families: tuple[tuple[str, ...], ...],
     answer: dict[str, Any],
+    kin: Collection[str],
 ) -> Outcome:
     if "verdict" not in answer:
         return "failed"
@@ -181,7 +187,7 @@ def _outcome(
     }  # fmt: skip
     if answer["verdict"] in plain:
         return plain[answer["verdict"]]
-    beside = [name for name in named if name not in clutter]
+    beside = [name for name in named if name in true or name not in kin]
     if beside == list(true) and true:
         return "exact"
     for name in true:
@@ -191,8 +197,13 @@ def _outcome(
         if match is None:
             return "wrong"
         beside.remove(match)
-    strangers = [name for name in beside if not _right(name, set(clutter), families)]
-    return "wrong" if strangers or not true else "family"
+    return "wrong" if beside or not true else "family"
+
+
+def _kin_of(clutter: Sequence[str], catalogue: Catalogue) -> set[str]:
+    """Names of the catalogue that are of the family of any of these effects, of which some are not in the catalogue."""
+    families = {FOREIGN[name] if name in FOREIGN else catalogue[name].family for name in clutter}
+    return {*clutter, *(name for name, one in catalogue.items() if one.family and one.family in families)}
 
 
 def by_effort(answer: dict[str, Any]) -> bool:
