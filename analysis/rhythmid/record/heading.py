@@ -29,6 +29,10 @@ SUFFIXES = (
     "radians", "rads", "radps", "degps", "dps", "rpm", "mps", "mm", "cm", "mrad", "nm", "mnm", "n", "m", "ma", "a", "v", "mv", "msec",
     "ms", "usec", "us", "nsec", "ns", "nanoseconds", "milliseconds", "seconds", "secs", "sec", "s",
 )  # fmt: skip
+LETTERS = {  # a single letter is a unit only behind a word that it suits: pos_a is no current
+    "s": "t time timestamp stamp elapsed", "m": "pos position x y z height displacement disp length travel stroke",
+    "n": "f force load thrust", "a": "i iq current cur", "v": "u voltage volt supply",
+}  # fmt: skip
 _BRACKETS = re.compile(r"^(.*?)\s*[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]\s*$")
 _SLASH = re.compile(r"^(.+?)\s+(?:/|in)\s+(\S+)$")  # "angle / deg", "angle in deg"
 
@@ -60,6 +64,8 @@ def heading_of(column: str) -> Heading:
     lowered = column.lower()
     for suffix in SUFFIXES:
         if lowered.endswith("_" + suffix) and len(column) > len(suffix) + 1:
+            if len(suffix) == 1 and lowered[:-2].rsplit("_", 1)[-1] not in LETTERS[suffix].split():
+                break
             known = _unit(_spelled(suffix))
             assert known is not None
             return Heading(column[: -len(suffix) - 1], *known, column[-len(suffix) :])

@@ -127,7 +127,7 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
         heading = heading_of(name)
         if clock.kind == "column" and (name == clock.column or _is_time(name, value)):
             continue
-        if COUNTER.fullmatch(heading.name) and (np.diff(value) == 1.0).all():
+        if COUNTER.fullmatch(heading.name) and np.ptp(np.diff(value)) == 0.0:
             left.append(f"{name}: counts the rows")
         elif not np.isfinite(value).any() or np.nanmax(value) == np.nanmin(value):
             left.append(f"{name}: never changes")

@@ -87,6 +87,8 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
     head = _head([line for _, line in used[:place]], separator)
     if head is None:
         head = _remark(lines[: used[place][0]], separator, len(cells)) or [str(n) for n in range(len(cells))]
+    if not head[-1] and not cells[-1]:
+        head = head[:-1]
     if len(head) == len(cells) - 1 and not cells[-1]:  # every row ends with a separator
         numeric = numeric[:-1]
     elif len(head) != len(cells):

@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 LONGEST = 20_000  # samples that are looked at: more would tell no more
 LATEST = 0.5  # s by which an answer may come after its command
 LAGS = 12  # samples of the past in an autoregression
+MOST_ROWS = 2000  # of an autoregression: more would tell no more
 PER_PERIOD = 16.0  # samples in the fastest period that carries power, for an autoregression
 POWER = 0.99  # share of the power below that frequency
 ROUNDING = 1e-8  # of a signal's variance: what an autoregression leaves below it is rounding
@@ -96,7 +97,8 @@ def drives(cause: Recorded, effect: Recorded) -> float:
     u, y = u[::step], y[::step]
     u, y = (u - u.mean()) / np.std(u), (y - y.mean()) / np.std(y)
     past = np.lib.stride_tricks.sliding_window_view
-    own, other, target = past(y[:-1], LAGS), past(u[:-1], LAGS), y[LAGS:]
+    every = max(1, len(y) // MOST_ROWS)
+    own, other, target = past(y[:-1], LAGS)[::every], past(u[:-1], LAGS)[::every], y[LAGS:][::every]
     alone = _left(own, target)
     both = _left(np.hstack([own, other]), target)
     return math.log((alone + ROUNDING) / (both + ROUNDING))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -158,10 +159,15 @@ def _output_by_data(able: list[_Known], known: list[_Known], place: str) -> tupl
         return Choice(able[0].one, "the only number that is left"), [
             _said(one, "position") if one is able[0] else one for one in known
         ]
+
+    @cache
+    def lead(first: Recorded, second: Recorded) -> float:
+        return drives(first, second) - drives(second, first)
+
     scored: list[tuple[float, _Known]] = []
     for one in able:
         others = [other for other in able if other is not one]
-        scored.append((sum(drives(o.one, one.one) - drives(one.one, o.one) for o in others), one))
+        scored.append((sum(lead(o.one, one.one) for o in others), one))
     (gain, best), *_ = sorted(scored, key=lambda pair: -pair[0])
     others = tuple(one.one for one in able if one is not best)
     doubts = ("no name tells what it measures: set kind and unit",)

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model
@@ -49,6 +51,7 @@ class Start:
         return [*self.guess.lines(), f"nominal model: inertia, {elements}"]
 
 
+@threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
 def guess(
     source: str | Path, joint: str | None = None, rate: float | None = None, ask: Ask = first_answer
 ) -> Guess:
@@ -67,6 +70,7 @@ def guess(
     return Guess(found, roles, text)
 
 
+@threadpool_limits.wrap(limits=1)
 def start(
     sources: Sequence[str | Path],
     joint: str | None = None,
