@@ -70,6 +70,7 @@ def test_times_that_no_bag_keeps_are_counted_from_the_first_and_a_formula_with_t
     write_record(record, tmp_path / "bag")
     found = read_record(tmp_path / "bag", tmp_path / "bag" / "signals.yaml")
     np.testing.assert_allclose(found.output.time, time - start, atol=1e-9)
+    assert found.forcing_law is not None
     np.testing.assert_allclose(found.forcing_law(found.output.time), law(time), atol=1e-9)
 
 

@@ -43,7 +43,8 @@ def write_record(record: Record, path: str | Path, joint: str = "joint", storage
     for name in dict.fromkeys(topic for topic, _ in placed.values()):
         roles = [role for role in channels if placed[role][0] == name]
         stamps = _stamps(channels[roles[0]], shift)
-        topics[name] = Messages(stamps, **{fields[role]: channels[role].value for role in roles})
+        values = {fields[role]: channels[role].value for role in roles}
+        topics[name] = Messages(stamps, values.get("position"), values.get("velocity"), values.get("effort"))
     text = _signals(record, placed, namespace, joint, shift)
     made = write_bag(path, topics, storage, joint=joint, namespace=namespace)
     write_text(made / "signals.yaml", text)

@@ -169,12 +169,9 @@ def _is_time(name: str, value: Array) -> bool:
 
 def _forward(value: Array) -> bool:
     step = np.diff(value)
-    return (
-        len(step) > 0
-        and bool(np.isfinite(value).all())
-        and value[-1] > value[0]
-        and np.mean(step >= 0.0) >= FORWARD
-    )
+    if not len(step) or not np.isfinite(value).all():
+        return False
+    return bool(value[-1] > value[0]) and float(np.mean(step >= 0.0)) >= FORWARD
 
 
 def _table_clock(path: Path, columns: list[tuple[str, Array]]) -> tuple[Clock, str]:

@@ -13,12 +13,12 @@ from rhythmid.errors import InputError
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block, Topic
 from rhythmid.record.columns import Columns, read_columns
-from rhythmid.record.heading import heading_of
 from rhythmid.record.quality import ChannelQuality, Quality, clipped
 from rhythmid.record.record import SHORTEST, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
 from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
 from rhythmid.record.timing import Timing, put_in_order
+from rhythmid.record.unit_notes import unit_notes
 from rhythmid.simulation.signal import Hold
 
 AMBIGUOUS = 0.01  # share of samples that may have the time of another one with another value
@@ -150,25 +150,6 @@ def read_tables(signals: Signals) -> Record:
     quality = Quality({}, notes=unit_notes(signals))
     record = _record(name, _since_start(made), signals, "sort or split the table", quality)
     return _finish(replace(record, hold=signals.hold or _measured_hold(record)), signals)
-
-
-def unit_notes(signals: Signals) -> tuple[str, ...]:
-    """A note on every column whose heading tells a unit that is not SI and that is read without a scale."""
-    read: list[tuple[str, str | int, float]] = [
-        (role, source.column, source.scale) for role, source in signals.channels.items()
-    ]
-    if signals.time.kind == "column":
-        read.append(("time", signals.time.column, signals.time.scale))
-    found: list[str] = []
-    for role, column, scale in read:
-        heading = heading_of(str(column))
-        if heading.converted and scale == 1.0:
-            unit = "" if role == "time" else f", unit: {heading.unit}"
-            found.append(
-                f"{role}: column {str(column)!r} is in {heading.written} by its heading, but is read as it is; "
-                f"write  scale: {heading.scale:.10g}{unit}"
-            )
-    return tuple(found)
 
 
 def _since_start(made: Mapping[str, Samples]) -> dict[str, Samples]:
