@@ -76,6 +76,22 @@ def wrench(stamp: float, x: float, z: float) -> Any:
     return message("geometry_msgs/msg/WrenchStamped", stamp, wrench=made)
 
 
+def imu(stamp: float, z: float) -> Any:
+    vector, none = STORE.types["geometry_msgs/msg/Vector3"], np.zeros(9)
+    still = STORE.types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+    return message(
+        "sensor_msgs/msg/Imu", stamp, orientation=still, orientation_covariance=none, angular_velocity=vector(x=0.0, y=0.0, z=0.0),
+        angular_velocity_covariance=none, linear_acceleration=vector(x=0.0, y=0.0, z=z), linear_acceleration_covariance=none,
+    )  # fmt: skip
+
+
+def pose(stamp: float, z: float) -> Any:
+    still = STORE.types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+    point = STORE.types["geometry_msgs/msg/Point"](x=0.0, y=0.0, z=z)
+    made = STORE.types["geometry_msgs/msg/Pose"](position=point, orientation=still)
+    return message("geometry_msgs/msg/PoseStamped", stamp, pose=made)
+
+
 def write(path: Path, topics: Mapping[str, list[tuple[float, Any]]]) -> Path:
     """A bag of messages by topic, each with its time of receipt [s]."""
     with new_bag(path) as writer:

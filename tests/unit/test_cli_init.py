@@ -1,6 +1,9 @@
 """`rhythmid init` and `rhythmid convert` as they are typed: from a foreign table to the first verdict, and what they refuse."""
 
 import json
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -63,6 +66,21 @@ def test_what_cannot_be_done_is_refused_in_one_line(table, rhythmid, arguments, 
     refused = rhythmid(*arguments)
     assert refused.returncode == 2 and words in refused.stderr and refused.stderr.count("\n") == 1
     assert sorted(path.name for path in table.parent.iterdir()) == ["run.csv"]
+
+
+def test_on_a_terminal_close_candidates_are_asked_for(tmp_path):
+    angle, _ = moved(TORQUE, 0.05, 0.1, 6.0)
+    np.savez(tmp_path / "run.npz", t=TIME, pos_left=angle, pos_right=0.9 * angle, torque=TORQUE)
+    terminal, end = os.openpty()
+    os.write(terminal, b"7\n2\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "rhythmid.cli", "init", "run.npz"], stdin=end, capture_output=True, text=True, timeout=60, cwd=tmp_path
+    )  # fmt: skip
+    os.close(terminal)
+    os.close(end)
+    assert done.returncode == 0, done.stderr
+    assert "Which joint is looked at?" in done.stdout and "a number from 1 to 2 is expected" in done.stdout
+    assert "output: pos_right" in done.stdout
 
 
 def test_a_table_becomes_a_bag_with_the_guesses_or_with_signals_of_ones_own(table, rhythmid):

@@ -111,6 +111,43 @@ def test_reference_and_effort_give_the_controllers_gains(tmp_path):
     assert model.value("inertia.mass") == pytest.approx(1.0, rel=0.1)
 
 
+def test_an_accelerometer_and_a_thrust_of_which_only_the_topic_tells(tmp_path):
+    pulled = np.gradient(V, foreign.STEP)
+    topics = {
+        "/drone/imu": [(NOW + TIME[k], foreign.imu(NOW + TIME[k], float(pulled[k]))) for k in ROWS],
+        "/drone/thrust_cmd": [
+            (NOW + TIME[k], message("std_msgs/msg/Float32", data=float(FORCE[k]))) for k in ROWS
+        ],
+        "/drone/note": [(NOW, message("std_msgs/msg/String", data="take-off"))],
+    }
+    begun = start([foreign.write(tmp_path / "bag", topics)])
+    assert begun.guess.roles.output_kind == "acceleration" and set(begun.guess.roles.choices) == {
+        "input",
+        "output",
+    }
+    assert begun.nominal.model.value("inertia.mass") == pytest.approx(0.05, rel=0.1)
+
+
+def test_a_pose_and_a_force_plate_whose_axis_the_data_tell(tmp_path):
+    topics = {
+        "/mocap/pose": [(NOW + TIME[k], foreign.pose(NOW + TIME[k], float(X[k]))) for k in ROWS],
+        "/plate": [
+            (NOW + TIME[k], foreign.wrench(NOW + TIME[k], float(OTHER[k]), float(FORCE[k]))) for k in ROWS
+        ],
+    }
+    found = said(foreign.write(tmp_path / "bag", topics))
+    assert found == {"output": "/mocap/pose pose.position.z", "input": "/plate wrench.force.z"}
+
+
+def test_a_free_decay_gets_a_model_per_unit_of_inertia(tmp_path):
+    time = np.arange(1200) * 0.005
+    np.savez(tmp_path / "run.npz", t=time, x=0.1 * np.exp(-time) * np.cos(20 * time))
+    model = start([tmp_path / "run.npz"]).nominal.model
+    assert model.free and "inertia.mass" not in model.free
+    assert model.value("linear_spring.stiffness") == pytest.approx(401.0, rel=0.02)
+    assert model.value("viscous_damper.damping") == pytest.approx(2.0, rel=0.1)
+
+
 TABLES = {
     "classical": ({"t": TIME, "u": FORCE, "y": X}, {"input": "u", "output": "y"}),
     "units": ({"time [ms]": 1e3 * TIME, "angle [deg]": np.degrees(X), "tau [Nm]": FORCE}, {"input": "tau [Nm]", "output": "angle [deg]"}),

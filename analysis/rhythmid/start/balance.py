@@ -90,12 +90,15 @@ class Rows:
             matrices.append(columns[rows][:, places])
         side, matrix = np.concatenate(sides), np.vstack(matrices)
         size = np.linalg.norm(matrix, axis=0)
-        size[size == 0.0] = 1.0
+        told = size > 0.0
+        size[~told] = 1.0
         low = [0.0 if name in POSITIVE else -np.inf for name in names]
         solved = lsq_linear(matrix / size, side, (low, np.inf))
         power = float(np.sum((side - side.mean()) ** 2)) or float(side @ side) or 1.0
         return Law(
-            dict(zip(names, (solved.x / size).tolist(), strict=True)), 2.0 * float(solved.cost) / power, delay
+            dict(zip(names, np.where(told, solved.x / size, 0.0).tolist(), strict=True)),
+            2.0 * float(solved.cost) / power,
+            delay,
         )
 
 
@@ -103,4 +106,7 @@ def _filtered(one: Motion, bandwidth: Bandwidth) -> Array:
     """What drives and all columns (n, 7), without what is above the effort's bandwidth."""
     x, v = one.leg_position, one.leg_velocity
     both = np.column_stack([one.effort, one.acceleration, v, x, np.sin(x), np.cos(x), np.ones(len(x))])
-    return high_pass(low_pass(both, one.period, bandwidth.effort), one.period, bandwidth.low)
+    both = high_pass(low_pass(both, one.period, bandwidth.effort), one.period, bandwidth.low)
+    if bandwidth.low > 0.0:
+        both[:, -1] = 0.0  # what the filter leaves of a constant tells nothing
+    return both

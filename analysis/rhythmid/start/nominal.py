@@ -20,6 +20,7 @@ BETTER = 0.9  # of what a balance leaves: by so much an element has to lower it 
 LAW_KEPT = (
     0.5  # share of an effort that the law of a controller may leave at most, to be taken for what made it
 )
+UNEXPLAINED = 0.8  # share of what drives that a balance may leave at most, for its values to be taken
 LEAST_DAMPING = 0.01  # of inertia times the motion's angular frequency, where the balance shows no damping
 
 
@@ -71,6 +72,9 @@ def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Ca
         return _by_size(records, units, catalogue, str(error))
     if law.coefficients["acceleration"] <= 0.0:
         return _by_size(records, units, catalogue, "the balance of forces shows no inertia")
+    if law.left > UNEXPLAINED:
+        why = f"the balance of forces explains only {1.0 - law.left:.0%} of what drives"
+        return _by_size(records, units, catalogue, why)
     told = f"by the balance of forces, which explains {max(0.0, 1.0 - law.left):.0%} of what drives"
     model = _bare(units, _short(law.coefficients["acceleration"]))
     reasons = {INERTIA: told}
@@ -285,4 +289,4 @@ def _by_size(
 
 def _short(value: float) -> float:
     """A first guess with no more digits than it is worth."""
-    return float(f"{value:.3g}")
+    return float(f"{value:.3g}") + 0.0  # no negative zero

@@ -5,11 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import coherence, welch
 
 from rhythmid.record.inventory import Recorded
 
 Array = NDArray[np.float64]
 LONGEST = 20_000  # samples that are looked at: more would tell no more
+SEGMENTS = 6  # of a record in its spectra, overlapping by half
 LATEST = 0.5  # s by which an answer may come after its command
 LAGS = 12  # samples of the past in an autoregression
 MOST_ROWS = 2000  # of an autoregression: more would tell no more
@@ -80,6 +82,19 @@ def follows(command: Recorded, answer: Recorded) -> Follows:
     best = int(lags[int(np.argmax(np.abs(product[lags])))])
     size = math.sqrt(float(u @ u) * float(y @ y))
     return Follows(float(product[best]) / size, best * period, float(np.std(y) / np.std(u)))
+
+
+def coherent(first: Recorded, second: Recorded) -> float:
+    """Share of the power of `second` that a linear law at any frequency makes of `first`: the mean coherence, weighted by that power."""
+    period, u, y = together(first, second)
+    if not len(u) or np.ptp(u) == 0.0 or np.ptp(y) == 0.0:
+        return 0.0
+    length = max(2 * LAGS, len(u) // SEGMENTS)
+    u, y = np.diff(u), np.diff(y)  # slow drifts go together by chance
+    _, share = coherence(u, y, 1.0 / period, nperseg=length)
+    _, power = welch(y, 1.0 / period, nperseg=length)
+    told = np.isfinite(share)
+    return float(np.sum(share[told] * power[told]) / np.sum(power))
 
 
 def drives(cause: Recorded, effect: Recorded) -> float:

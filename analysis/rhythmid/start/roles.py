@@ -11,7 +11,7 @@ from rhythmid.record.inventory import Inventory, Recorded
 from rhythmid.record.signals import InputKind, OutputKind
 from rhythmid.start.joint import Joint, joint_of
 from rhythmid.start.meaning import Meaning, Quantity, is_ignored, meaning_of, poses, rotary_of
-from rhythmid.start.relation import derivative, drives, follows
+from rhythmid.start.relation import coherent, derivative, drives, follows
 
 Ask = Callable[
     [str, Sequence[str]], int
@@ -226,7 +226,9 @@ def _by_data(one: _Known, output: Recorded, measured: Quantity, velocity: Choice
         told = follows(one.one, output)
         reason = f"a target of the {measured}, which goes with it ({told.correlation:.2f} correlation)"
         return replace(one, meaning=replace(one.meaning, quantity=measured, commanded=True, reason=reason))
-    reason = f"no motion is a copy of it, but it drives one ({drives(one.one, output):+.2f} in log variance)"
+    reason = (
+        f"no motion is a copy of it, and it goes with the output (coherence {coherent(one.one, output):.2f})"
+    )
     return replace(one, meaning=replace(one.meaning, quantity="effort", reason=reason))
 
 
@@ -239,6 +241,9 @@ def _drivers(
     efforts = [one for one in efforts if not one.meaning.forcing]
     commanded = [one for one in efforts if one.meaning.commanded]
     sensed = [one for one in efforts if not one.meaning.commanded]
+    sensed = [
+        one for one in sensed if one.meaning.certain
+    ] or sensed  # what a name says before what may be anything
     if commanded and not forcing:  # a wrench beside a command is what pushes from outside
         forcing = [
             one for one in sensed if one.one.type.startswith("geometry_msgs/") and "Wrench" in one.one.type
@@ -276,14 +281,18 @@ def _strongest(able: list[_Known], reason: str) -> Choice:
 
 
 def _driving(able: list[_Known], output: Recorded, reason: str, ask: Ask) -> Choice:
-    """Of several efforts the one that tells most of the output's future."""
+    """Of several efforts the one that goes best with the output."""
     if len(able) == 1:
         return Choice(able[0].one, f"{reason}: {able[0].meaning.reason}")
-    ranked = _ranked([(max(drives(one.one, output), 0.0) + 1e-9, one) for one in able])
+    ranked = _ranked([(coherent(one.one, output) + 1e-9, one) for one in able])
     picked = ranked[_pick("What drives the machine (input)?", ranked, ask)][1]
     why = next(one.meaning.reason for one in able if one.one is picked)
     others = tuple(one for _, one in ranked if one is not picked)
-    return Choice(picked, f"{reason}: {why}; of those its past tells most of the output", others)
+    return Choice(
+        picked,
+        f"{reason}: {why}; of those it goes best with the output (coherence {coherent(picked, output):.2f})",
+        others,
+    )
 
 
 def _measured_effort(sensed: list[_Known], command: Recorded, output: Recorded, ask: Ask) -> Choice:
