@@ -176,8 +176,8 @@ def test_a_spoilt_text_table_is_refused_with_one_line(tmp_path, fault):
         ("run.csv.gz", b"t,u,y, but not compressed", "run.csv.gz: cannot be read"),
         ("run.csv.gz", gzip.compress(text().encode())[:400], "run.csv.gz: cannot be read as a table"),
         ("run.gz", gzip.compress(text().encode()), "is not a table"),
-        ("run.parquet", b"PAR1", "is not a table; .mat, .npz and .csv, .tsv, .txt, .dat can be read"),
-        ("run.xlsx", b"PK", "is not a table"),
+        ("run.parquet", b"PAR1", "run.parquet: cannot be read"),
+        ("run.xlsx", b"PK", "is not a table; .mat, .npz, .parquet and .csv, .tsv, .txt, .dat can be read"),
     ],
 )
 def test_a_spoilt_or_unknown_file_is_refused_with_one_line(tmp_path, name, content, words):

@@ -18,12 +18,16 @@ from rhythmid.record.record import SHORTEST, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
 from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
 from rhythmid.record.timing import Timing, put_in_order
+from rhythmid.record.unit_notes import unit_notes
 from rhythmid.simulation.signal import Hold
 
 AMBIGUOUS = 0.01  # share of samples that may have the time of another one with another value
 # seconds between the ages at receipt of two channels, from which their stamps hardly share a clock
 CLOCKS_APART = 1.0
 RUN_CLOCK = 10.0  # seconds; a clock that reads less at the first sample started with the run
+CALENDAR = (
+    1e8  # seconds, three years: a clock that reads more counts from 1970, not from the start of a machine
+)
 SAMPLES_PER_CYCLE = 100  # of a forcing that is given by formula
 
 
@@ -55,7 +59,7 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
     signals : which channel is what; by default the topics of rhythmid's own nodes.
 
     Times are relative to the first sample of any channel; a clock that began with the run (simulated time) and the
-    time column of a table keep their own zero. Messages that overtook one another are put back in order, duplicates
+    time column of a table, unless it counts from 1970, keep their own zero. Messages that overtook one another are put back in order, duplicates
     are dropped, and both are counted in the record's quality.
 
     Raises InputError, one line, when there is no such recording, a topic or field is missing or empty, a used sample is
@@ -127,7 +131,7 @@ def read_tables(signals: Signals) -> Record:
         try:
             value = table.column(source.column)
             if signals.time.kind == "column":
-                time = table.column(signals.time.column)
+                time = table.column(signals.time.column) * signals.time.scale
             else:
                 time = np.arange(len(value)) / signals.time.rate
         except InputError as error:
@@ -143,8 +147,17 @@ def read_tables(signals: Signals) -> Record:
     name = table_name(signals.path)
     if name == "signals":
         name = signals.path.resolve().parent.name  # tells more
-    record = _record(name, made, signals, "sort or split the table", Quality({}))
+    quality = Quality({}, notes=unit_notes(signals))
+    record = _record(name, _since_start(made), signals, "sort or split the table", quality)
     return _finish(replace(record, hold=signals.hold or _measured_hold(record)), signals)
+
+
+def _since_start(made: Mapping[str, Samples]) -> dict[str, Samples]:
+    """Samples of tables, their times counted from the first of all where they are a calendar's."""
+    first = min((float(samples.time.min()) for samples in made.values() if len(samples.time)), default=0.0)
+    if first < CALENDAR:
+        return dict(made)
+    return {role: replace(samples, time=samples.time - first) for role, samples in made.items()}
 
 
 def is_run(topic: Topic) -> bool:

@@ -1,6 +1,6 @@
 """signals.yaml: which recorded channel is what.
 
-    time: header                      # header | receive | {column: t} | {sample_rate: 610.3515625}
+    time: header                      # header | receive | {column: t_ms, scale: 0.001} | {sample_rate: 610.3515625}
     input:   {topic: /hopper/excitation,   field: "effort[leg]"}
     output:  {topic: /hopper/joint_states, field: "position[leg]"}
     forcing: {topic: /hopper/forcing,      field: "effort[leg]"}
@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from rhythmid.document import Node, parse, read
 from rhythmid.errors import InputError
 from rhythmid.record.field import Field
+from rhythmid.record.heading import NOT_SI
 from rhythmid.simulation.signal import Hold
 
 InputKind = Literal["force", "base_displacement", "base_acceleration", "reference"]
@@ -40,21 +41,17 @@ INPUT_UNITS: dict[InputKind, str] = {
 }  # fmt: skip
 OUTPUT_UNITS: dict[OutputKind, str] = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 HOLDS: tuple[Hold, ...] = ("zero", "linear", "band_limited")
-NOT_SI = {
-    "mm": (1e-3, "m"), "cm": (1e-2, "m"), "um": (1e-6, "m"), "µm": (1e-6, "m"), "km": (1e3, "m"), "in": (0.0254, "m"),
-    "mm/s": (1e-3, "m/s"), "cm/s": (1e-2, "m/s"), "deg": (math.pi / 180, "rad"), "deg/s": (math.pi / 180, "rad/s"),
-    "rpm": (math.pi / 30, "rad/s"), "mN": (1e-3, "N"), "kN": (1e3, "N"), "lbf": (4.4482216152605, "N"),
-    "mNm": (1e-3, "N*m"), "g": (9.80665, "m/s^2"), "mm/s^2": (1e-3, "m/s^2"),
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Where times come from: `header` stamps, `receive` times, a `column` of the table, or a sample `rate` [Hz]."""
+    """Where times come from: `header` stamps, `receive` times, a `column` of the table, whose numbers are `scale` seconds each,
+    or a sample `rate` [Hz]."""
 
     kind: Literal["header", "receive", "column", "rate"] = "header"
     column: str | int = ""
     rate: float = 0.0
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -287,15 +284,16 @@ def _clock(node: Node | None, document: Node, tables: bool) -> Clock:
             document.fail("'time:' is missing; for a table it is {sample_rate: 1000} in Hz or {column: t}")
         return Clock()
     if isinstance(node.value, dict):
-        keys = node.mapping(["column", "sample_rate"])
+        keys = node.mapping(["column", "scale", "sample_rate"])
         if not tables:
             node.fail(
                 "column and sample_rate are for tables; the messages of a bag have times: header or receive"
             )
-        if len(keys) != 1:
-            node.fail("either sample_rate or column is expected")
+        if ("column" in keys) == ("sample_rate" in keys) or {"scale", "sample_rate"} <= keys.keys():
+            node.fail("either sample_rate, or column and perhaps its scale [s], is expected")
         if "column" in keys:
-            return Clock("column", column=_column(keys["column"]))
+            scale = keys["scale"].number(1e-12, 1e6) if "scale" in keys else 1.0
+            return Clock("column", column=_column(keys["column"]), scale=scale)
         return Clock("rate", rate=keys["sample_rate"].number(1e-6, 1e12))
     kind = node.choice(["header", "receive"])
     if tables:

@@ -1,20 +1,19 @@
-"""Tables: columns of numbers in .mat, .npz, .csv and other text files, which may be compressed (.csv.gz)."""
+"""Tables: columns of numbers in .mat, .npz, .parquet, .csv and other text files, which may be compressed (.csv.gz)."""
 
-import gzip
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
+from rhythmid.record.text_table import COMPRESSED, TEXT, read_text
 
-TEXT = (".csv", ".tsv", ".txt", ".dat")
-COMPRESSED = ".gz"
-SUFFIXES = (".mat", ".npz", *TEXT)
+SUFFIXES = (".mat", ".npz", ".parquet", *TEXT)
 ONE_OF_MANY = re.compile(r"(.+)\[(\d+)\]")  # dof_pos[3]: one column of an array
 
 
@@ -41,9 +40,13 @@ class Table:
     @classmethod
     def load(cls, path: Path) -> "Table":
         """Read a table. Raises InputError when the file is missing, damaged or of an unknown kind."""
-        read = {".mat": _mat, ".npz": _npz, **dict.fromkeys(TEXT, _text)}.get(table_suffix(path))
+        read = {".mat": _mat, ".npz": _npz, ".parquet": _parquet, **dict.fromkeys(TEXT, read_text)}.get(
+            table_suffix(path)
+        )
         if read is None:
-            raise InputError(f"{path}: is not a table; .mat, .npz and {', '.join(TEXT)} can be read")
+            raise InputError(
+                f"{path}: is not a table; .mat, .npz, .parquet and {', '.join(TEXT)} can be read"
+            )
         try:
             return cls(path, read(path))
         except FileNotFoundError:
@@ -104,7 +107,20 @@ class Table:
 def _mat(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
-    return {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+    found = loadmat(path, simplify_cells=True)
+    return dict(_flat({name: value for name, value in found.items() if not name.startswith("__")}))
+
+
+def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Arrays in structs within structs, by the path to them, as MATLAB writes it: `data.q`, `runs[0].q` in a struct array."""
+    for name, value in struct.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{above}{name}.")
+        elif isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
+            for number, one in enumerate(value):
+                yield from _flat(one, f"{above}{name}[{number}].")
+        else:
+            yield above + name, np.atleast_1d(np.asarray(value))
 
 
 def _npz(path: Path) -> dict[str, Any]:
@@ -112,53 +128,27 @@ def _npz(path: Path) -> dict[str, Any]:
         return {name: file[name] for name in file.files}
 
 
-def _text(path: Path) -> dict[str, Any]:
-    """A text table with commas, semicolons, tabs or spaces between columns; '#' starts a comment. The first line, or
-    the last comment before it, may name the columns, which are otherwise called by number."""
-    skipped, line, comment = 0, "", ""
-    with _opened(path) as file:
-        for line in file:
-            if line.split("#")[0].strip():
-                break
-            comment = line.strip(" #\r\n") or comment
-            skipped += 1
-    if not line.split("#")[0].strip():
-        raise InputError(f"{path}: is empty")
-    delimiter = next((mark for mark in (",", ";", "\t") if mark in line), None)
-    cells = _cells(line.split("#")[0], delimiter)
-    named = not all(_is_number(cell) for cell in cells)
-    names = cells if named else [str(number) for number in range(len(cells))]
-    if not named and len(remark := _cells(comment, delimiter)) == len(names):
-        names = remark
-    if len(set(names)) < len(names):
-        raise InputError(f"{path}: two columns have the same name in line {skipped + 1}")
-    with _opened(path) as file:
-        table = np.loadtxt(file, delimiter=delimiter, skiprows=skipped + named, ndmin=2, converters=_number)
-    if table.size and table.shape[1] != len(names):
-        raise InputError(
-            f"{path}: line {skipped + 1} has {len(names)} columns, the rows have {table.shape[1]}"
-        )
-    return dict(zip(names, table.T.reshape(len(names), -1)))
-
-
-def _opened(path: Path) -> TextIO:
-    if path.suffix.lower() == COMPRESSED:
-        return gzip.open(path, "rt", encoding="utf-8-sig", errors="replace")
-    return path.open(encoding="utf-8-sig", errors="replace")
-
-
-def _cells(line: str, delimiter: str | None) -> list[str]:
-    return [cell.strip().strip("\"'") for cell in line.strip().split(delimiter)]
-
-
-def _number(cell: str) -> float:
-    """A cell's value; an empty one is NaN, so that the complaint can name where."""
-    return float(cell) if cell.strip() else np.nan
-
-
-def _is_number(cell: str) -> bool:
+def _parquet(path: Path) -> dict[str, Any]:
     try:
-        float(cell)
-    except ValueError:
-        return cell == ""
-    return True
+        from pyarrow.parquet import read_table
+    except ImportError:
+        raise InputError(
+            f"{path}: reading Parquet needs pyarrow: pip install pyarrow, or save the table as .csv"
+        ) from None
+    if not path.exists():
+        raise FileNotFoundError
+    table = read_table(path)
+    found: dict[str, Any] = {}
+    for name, column in zip(table.column_names, table.columns):
+        values = column.to_numpy()
+        if values.dtype.kind in "mM":  # times: seconds
+            values = (
+                values.astype("datetime64[ns]" if values.dtype.kind == "M" else "timedelta64[ns]").astype(
+                    np.int64
+                )
+                * 1e-9
+            )
+        if values.dtype.kind == "O" and len(values) and isinstance(values[0], np.ndarray):
+            values = np.stack(list(values))  # one list of numbers a row
+        found[name] = values
+    return found

@@ -1,0 +1,46 @@
+"""`rhythmid convert`: a table as a bag."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rhythmid.commands.options import SignalsFile
+from rhythmid.errors import InputError
+from rhythmid.output import require_new
+
+
+def convert(
+    table: Annotated[
+        Path, typer.Argument(help="Table (.csv, .mat, .npz, .parquet, …), or signals.yaml of tables.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Bag to write: a new folder.")],
+    signals: SignalsFile = None,
+    joint: Annotated[str, typer.Option("--joint", help="Name of the joint in the messages.")] = "joint",
+    rate: Annotated[
+        float | None,
+        typer.Option("--rate", metavar="HZ", help="Rate of the rows, where the table holds no time."),
+    ] = None,
+) -> None:
+    """Write a table as a rosbag2 (MCAP) of joint states, with a signals.yaml inside that reads it back.
+
+    Without --signals the columns are guessed as by `rhythmid init`, and the guesses are printed.
+    """
+    from rhythmid.record.bag import is_bag
+    from rhythmid.record.convert import write_record
+    from rhythmid.record.read import read_record
+    from rhythmid.record.signals import Signals
+    from rhythmid.start.start import guess
+
+    require_new(out)
+    if is_bag(table):
+        raise InputError(f"{table}: is a bag already; convert takes a table")
+    if signals is None and table.suffix not in (".yaml", ".yml"):
+        guessed = guess(table, rate=rate)
+        for line in guessed.lines():
+            typer.echo(line)
+        record = read_record(table, Signals.from_text(guessed.signals))
+    else:
+        record = read_record(table, signals)
+    write_record(record, out, joint)
+    typer.echo(f"{out}: {', '.join(record.channels)}; read it with --signals {out / 'signals.yaml'}")

@@ -1,0 +1,63 @@
+"""`rhythmid init`: looks at a recording and writes the two files that describe it."""
+
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rhythmid.commands.options import Elements
+from rhythmid.errors import InputError
+from rhythmid.output import require_new, require_writable, write_text
+
+
+def init(
+    sources: Annotated[
+        list[Path], typer.Argument(help="Bags or tables of one layout; roles are guessed from the first.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Folder for signals.yaml and model.yaml.")] = Path(),
+    joint: Annotated[
+        str | None, typer.Option("--joint", help="Joint to look at; by default the one that moves most.")
+    ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option("--rate", metavar="HZ", help="Rate of a table's rows, where it holds no time."),
+    ] = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", "--no-input", help="Take the best guess everywhere, without asking.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite files that exist.")] = False,
+    elements: Elements = None,
+) -> None:
+    """Guess which channel is what, and a nominal model to begin with; write both, every guess with its reason."""
+    from rhythmid.elements.catalogue import load_catalogue
+    from rhythmid.start.roles import first_answer
+    from rhythmid.start.start import start
+
+    if rate is not None and not (math.isfinite(rate) and rate > 0.0):
+        raise InputError("--rate is a number of rows a second, greater than 0")
+    signals, model = out / "signals.yaml", out / "model.yaml"
+    for path in (signals, model):
+        require_writable(path) if force else require_new(path)
+    asking = not yes and sys.stdin.isatty()
+    begun = start(sources, joint, rate, _prompt if asking else first_answer, load_catalogue(elements or ()))
+    write_text(signals, begun.guess.signals)
+    write_text(model, begun.model)
+    for line in begun.lines():
+        typer.echo(line)
+    given = " ".join(map(str, sources))
+    typer.echo(f"{signals}, {model}: every guess is a comment there; go on with")
+    typer.echo(f"  rhythmid check {sources[0]} --signals {signals}")
+    typer.echo(f"  rhythmid diagnose {given} --signals {signals} --model {model}")
+
+
+def _prompt(question: str, answers: Sequence[str]) -> int:
+    """Ask on the terminal; the first answer is the default."""
+    typer.echo(question)
+    for number, answer in enumerate(answers, start=1):
+        typer.echo(f"  {number}  {answer}")
+    while not 1 <= (number := typer.prompt("number", default=1, type=int)) <= len(answers):
+        typer.echo(f"a number from 1 to {len(answers)} is expected")
+    return number - 1

@@ -1,0 +1,115 @@
+"""A record as a bag: its channels as joint states, with the signals.yaml by which they are read back."""
+
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.errors import InputError
+from rhythmid.output import write_text
+from rhythmid.record.bag_writer import Storage, write_bag
+from rhythmid.record.messages import Messages
+from rhythmid.record.record import Channel, Record
+
+STATES = "joint_states"
+TOPICS = {
+    "input": "joint_commands",
+    "forcing": "forcing",
+    "reference": "reference",
+}  # of roles that are no state
+RUN_CLOCK = 9.0  # s; times that begin before are kept, as a bag's reader takes such a clock for one that began with the run
+
+
+def write_record(record: Record, path: str | Path, joint: str = "joint", storage: Storage = "mcap") -> Path:
+    """Write a record as a new bag of sensor_msgs/JointState, with a signals.yaml inside that reads it back.
+
+    Values are as in the record, scaled already; times are kept to a nanosecond, and begin at 0 where the record's are negative or
+    begin late. Raises InputError where the bag exists or cannot be written, or an acceleration was recorded, which no joint state
+    holds.
+    """
+    namespace = "/" + (re.sub(r"\W+", "_", record.name).strip("_") or "record")
+    if namespace[1].isdigit():
+        namespace = f"/_{namespace[1:]}"
+    channels = {
+        role: one for role, one in record.channels.items() if role != "forcing" or record.forcing_law is None
+    }
+    fields = {role: _field(role, record) for role in channels}
+    shift = _shift(record)
+    placed = {role: (_topic(role, one, record), fields[role]) for role, one in channels.items()}
+    topics: dict[str, Messages] = {}
+    for name in dict.fromkeys(topic for topic, _ in placed.values()):
+        roles = [role for role in channels if placed[role][0] == name]
+        stamps = _stamps(channels[roles[0]], shift)
+        values = {fields[role]: channels[role].value for role in roles}
+        topics[name] = Messages(stamps, values.get("position"), values.get("velocity"), values.get("effort"))
+    text = _signals(record, placed, namespace, joint, shift)
+    made = write_bag(path, topics, storage, joint=joint, namespace=namespace)
+    write_text(made / "signals.yaml", text)
+    return made
+
+
+def _field(role: str, record: Record) -> str:
+    kind = {"input": record.input_kind, "output": record.output_kind}.get(role, role)
+    field = {
+        "force": "effort", "forcing": "effort", "effort": "effort", "velocity": "velocity", "position": "position",
+        "base_displacement": "position",
+    }.get(kind)  # fmt: skip
+    if kind == "reference":
+        one = record.reference if role == "reference" else record.input
+        assert one is not None
+        return "velocity" if one.unit.endswith("/s") else "position"
+    if field is None:
+        raise InputError(
+            f"{record.name}: {role} is an acceleration, which a JointState does not hold; keep the table"
+        )
+    return field
+
+
+def _topic(role: str, channel: Channel, record: Record) -> str:
+    """States that share their times share a topic."""
+    if role in TOPICS:
+        return TOPICS[role]
+    if role == "output" or np.array_equal(channel.time, record.output.time):
+        if role == "output" or _field(role, record) != _field("output", record):
+            return STATES
+    return f"{STATES}_{role}"
+
+
+def _shift(record: Record) -> float:
+    """What is taken from the record's times [s] for a bag's stamps."""
+    first = min(float(channel.time[0]) for channel in record.channels.values())
+    return 0.0 if 0.0 <= first < RUN_CLOCK else first
+
+
+def _stamps(channel: Channel, shift: float) -> NDArray[np.int64]:
+    return np.rint((channel.time - shift) * 1e9).astype(np.int64)
+
+
+def _signals(
+    record: Record, placed: Mapping[str, tuple[str, str]], namespace: str, joint: str, shift: float
+) -> str:
+    lines = ["time: header"]
+    if "input" not in placed:
+        lines.append("input: none")
+    for role, (topic, field) in placed.items():
+        channel = record.channels[role]
+        more = ""
+        if role == "input":
+            more = f", kind: {record.input_kind}, hold: {record.hold}"
+        elif role == "output":
+            more = f", kind: {record.output_kind}"
+        lines.append(
+            f'{role}: {{topic: {namespace}/{topic}, field: "{field}[{joint}]", unit: "{channel.unit}"{more}}}'
+        )
+    law = record.forcing_law
+    if law is not None:
+        phase = law.phase + 2.0 * math.pi * law.frequency * shift
+        lines.append(
+            f"forcing: {{amplitude: {law.amplitude!r}, frequency: {law.frequency!r}, phase: {phase!r}}}"
+        )
+    if record.parameters:
+        lines += ["parameters:", *(f"  {name}: {value!r}" for name, value in record.parameters.items())]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,103 @@
+"""What the heading of a table's column says besides its name: the unit, as in `q [rad]`, `tau (Nm)`, `pos_deg`."""
+
+import math
+import re
+from dataclasses import dataclass
+
+NOT_SI = {
+    "mm": (1e-3, "m"), "cm": (1e-2, "m"), "um": (1e-6, "m"), "µm": (1e-6, "m"), "km": (1e3, "m"), "in": (0.0254, "m"),
+    "mm/s": (1e-3, "m/s"), "cm/s": (1e-2, "m/s"), "deg": (math.pi / 180, "rad"), "deg/s": (math.pi / 180, "rad/s"),
+    "rpm": (math.pi / 30, "rad/s"), "mN": (1e-3, "N"), "kN": (1e3, "N"), "lbf": (4.4482216152605, "N"),
+    "mNm": (1e-3, "N*m"), "g": (9.80665, "m/s^2"), "mm/s^2": (1e-3, "m/s^2"),
+}  # fmt: skip
+FURTHER = {
+    "mrad": (1e-3, "rad"), "rev": (2 * math.pi, "rad"), "deg/s^2": (math.pi / 180, "rad/s^2"), "Ncm": (1e-2, "N*m"),
+    "mA": (1e-3, "A"), "mV": (1e-3, "V"), "mrad/s": (1e-3, "rad/s"), "rps": (2 * math.pi, "rad/s"), "Nmm": (1e-3, "N*m"),
+    "ms": (1e-3, "s"), "us": (1e-6, "s"), "ns": (1e-9, "s"), "min": (60.0, "s"),
+}  # fmt: skip
+SI = ("s", "m", "rad", "N", "N*m", "m/s", "rad/s", "m/s^2", "rad/s^2", "A", "V", "kg")
+SPELLINGS = {
+    "°": "deg", "degree": "deg", "degrees": "deg", "degs": "deg", "dps": "deg/s", "sec": "s", "secs": "s", "seconds": "s",
+    "second": "s", "msec": "ms", "millis": "ms", "usec": "us", "micros": "us", "µs": "us", "nsec": "ns", "nanos": "ns",
+    "nanoseconds": "ns", "milliseconds": "ms", "microseconds": "us", "radians": "rad", "radian": "rad", "meter": "m",
+    "meters": "m", "metre": "m", "metres": "m", "newton": "N", "amp": "A", "amps": "A", "volt": "V", "volts": "V",
+    "rads": "rad/s", "mps": "m/s", "radps": "rad/s", "degps": "deg/s", "r/min": "rpm", "1/min": "rpm",
+}  # fmt: skip
+# after an underscore, in any case; not those that are words or other quantities, too: _in, _g, _min, _rev
+SUFFIXES = (
+    "deg_per_s", "rad_per_s", "m_per_s", "mm_per_s", "deg_s", "rad_s", "mm_s", "m_s2", "m_s", "rad_s2", "deg", "degrees", "rad",
+    "radians", "rads", "radps", "degps", "dps", "rpm", "mps", "mm", "cm", "mrad", "nm", "mnm", "n", "m", "ma", "a", "v", "mv", "msec",
+    "ms", "usec", "us", "nsec", "ns", "nanoseconds", "milliseconds", "seconds", "secs", "sec", "s",
+)  # fmt: skip
+LETTERS = {  # a single letter is a unit only behind a word that it suits: pos_a is no current
+    "s": "t time timestamp stamp elapsed", "m": "pos position x y z height displacement disp length travel stroke",
+    "n": "f force load thrust", "a": "i iq current cur", "v": "u voltage volt supply",
+}  # fmt: skip
+_BRACKETS = re.compile(r"^(.*?)\s*[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]\s*$")
+_SLASH = re.compile(r"^(.+?)\s+(?:/|in)\s+(\S+)$")  # "angle / deg", "angle in deg"
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A column's heading: the `name` without the unit, and the SI `unit` of which the column's numbers are `scale` each.
+
+    `unit` is empty where none is told; `written` is the unit as the heading spells it.
+    """
+
+    name: str
+    unit: str = ""
+    scale: float = 1.0
+    written: str = ""
+
+    @property
+    def converted(self) -> bool:
+        """Whether the heading tells a unit that is not SI."""
+        return self.scale != 1.0
+
+
+def heading_of(column: str) -> Heading:
+    """The heading `column` taken apart: a unit in brackets, behind a slash, or as a suffix after an underscore."""
+    column = column.strip()
+    for pattern in (_BRACKETS, _SLASH):
+        if (match := pattern.match(column)) and (known := _unit(match[2])) is not None:
+            return Heading(match[1].strip() or column, *known, match[2])
+    lowered = column.lower()
+    for suffix in SUFFIXES:
+        if lowered.endswith("_" + suffix) and len(column) > len(suffix) + 1:
+            if len(suffix) == 1 and lowered[:-2].rsplit("_", 1)[-1] not in LETTERS[suffix].split():
+                break
+            known = _unit(_spelled(suffix))
+            assert known is not None
+            return Heading(column[: -len(suffix) - 1], *known, column[-len(suffix) :])
+    return Heading(column)
+
+
+def is_unit(text: str) -> bool:
+    """Whether a cell below a column's name can be its unit: one that is known, a dash or nothing."""
+    bare = text.strip().strip("[](){}").strip()
+    return bare in ("", "-", "1", "%") or _unit(bare) is not None
+
+
+def _unit(text: str) -> tuple[str, float] | None:
+    """SI unit and factor of a unit as it is written; None where it is not known."""
+    text = text.strip().replace(" per ", "/").replace("²", "^2").replace("^2", "²").replace("**2", "²")
+    text = re.sub(r"(?<=s)2$", "²", text)
+    parts = [re.sub(r"[\s·*⋅.]", "", part) for part in text.split("/")]
+    parts = [SPELLINGS.get(part, SPELLINGS.get(part.lower(), part)) for part in parts]
+    plain = "/".join(parts).replace("²", "^2")
+    plain = SPELLINGS.get(plain, SPELLINGS.get(plain.lower(), plain))
+    plain = {"nm": "Nm", "NM": "Nm", "n": "N"}.get(plain, plain)  # no robot is measured in nanometres
+    plain = "N*m" if plain == "Nm" else plain
+    if plain in SI:
+        return plain, 1.0
+    found = NOT_SI.get(plain) or FURTHER.get(plain)
+    return None if found is None else (found[1], found[0])
+
+
+def _spelled(suffix: str) -> str:
+    """A suffix as the unit that it stands for."""
+    special = {"nm": "Nm", "mnm": "mNm", "n": "N", "ma": "mA", "a": "A", "v": "V", "mv": "mV"}
+    if suffix in special:
+        return special[suffix]
+    per = re.fullmatch(r"(deg|rad|mm|m)_(?:per_)?s(2?)", suffix)
+    return f"{per[1]}/s{'^2' if per[2] else ''}" if per else suffix

@@ -1,0 +1,321 @@
+"""What is in a source: every number that was recorded over and over, a field of a topic or a column of a table, with its times."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.errors import InputError
+from rhythmid.record.bag import Bag, is_bag
+from rhythmid.record.block import Topic
+from rhythmid.record.columns import Columns, read_columns
+from rhythmid.record.field import NAMES, Field
+from rhythmid.record.heading import heading_of
+from rhythmid.record.message_types import typestore
+from rhythmid.record.signals import Clock
+from rhythmid.record.table import SUFFIXES, Table, table_suffix
+
+Array = NDArray[np.float64]
+WIDEST = 64  # entries of a list beyond which it is an image or a scan, not joints
+DEEPEST = 5  # messages within messages that are looked into
+SKIPPED_PACKAGES = (
+    "diagnostic_msgs",
+    "rcl_interfaces",
+    "tf2_msgs",
+    "rosgraph_msgs",
+    "visualization_msgs",
+    "nav_msgs",
+)
+SKIPPED_FIELDS = re.compile(r"header|stamp|.*covariance|orientation|layout|points|time_from_start")
+TIME = re.compile(
+    r"(?:elapsed_?|time_?|wall_?|ros_?)*(?:t|time|timestamp|stamp|seconds|secs?|clock)", re.IGNORECASE
+)
+COUNTER = re.compile(
+    r"|index|idx|i|n|k|id|no|nr|frame|sample|step|row|count|counter|seq|unnamed: 0", re.IGNORECASE
+)
+EVEN = 0.2  # relative spread of the steps of an unnamed column, below which it is taken for the time
+FORWARD = 0.99  # share of steps of a time that go forward
+# the longest sample period [s] that is thought of: a time without a unit whose steps are longer is in ms, µs or ns
+LONGEST_STEP = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """One number as it was recorded.
+
+    Attributes
+    ----------
+    topic, type, field : of a message; empty for a column.
+    column : name of the column; empty for a message's field.
+    joint : the joint whose number it is, where a name stands beside it.
+    said : what names it within its message or table, such as `position` or the heading without its unit.
+    unit, scale : SI unit, empty where not told, and how much of it one recorded unit is.
+    time, value : float64[n], s and as recorded times `scale`; a message's time is that of its receipt.
+    stamped : whether its messages bear stamps.
+    """
+
+    said: str
+    time: Array
+    value: Array
+    topic: str = ""
+    type: str = ""
+    field: str = ""
+    column: str = ""
+    joint: str = ""
+    unit: str = ""
+    scale: float = 1.0
+    written_unit: str = ""
+    stamped: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.topic} {self.field}" if self.topic else self.column
+
+    @property
+    def rate(self) -> float:
+        """Samples a second, 0 for a single one."""
+        span = float(self.time[-1] - self.time[0]) if len(self.time) > 1 else 0.0
+        return (len(self.time) - 1) / span if span > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Inventory:
+    """All numbers of a source that change, how its times are told and why, and what was left out."""
+
+    path: Path
+    recorded: tuple[Recorded, ...]
+    clock: Clock
+    clock_reason: str
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def is_bag(self) -> bool:
+        """Whether the source is a bag, not a table."""
+        return self.clock.kind in ("header", "receive")
+
+
+def inventory(source: str | Path, rate: float | None = None) -> Inventory:
+    """What is in a bag or table; `rate` [Hz] is that of a table without a time. Raises InputError, one line."""
+    source = Path(source)
+    if not source.exists():
+        raise InputError(f"{source}: no such file or directory")
+    if table_suffix(source) in SUFFIXES:
+        return _of_table(Table.load(source), rate)
+    if not is_bag(source):
+        raise InputError(
+            f"{source}: is neither a bag (directory, .mcap, .db3) nor a table ({', '.join(SUFFIXES)})"
+        )
+    return _of_bag(Bag(source))
+
+
+def _of_table(table: Table, rate: float | None) -> Inventory:
+    columns = list(_vectors(table))
+    if not columns:
+        raise InputError(f"{table.path}: holds no column of numbers")
+    count = max((len(value) for _, value in columns), key=[len(value) for _, value in columns].count)
+    columns = [(name, value) for name, value in columns if len(value) == count]
+    if rate is not None:
+        clock, reason, time = Clock("rate", rate=rate), "as given with --rate", np.arange(count) / rate
+    else:
+        clock, reason = _table_clock(table.path, columns)
+        time = dict(columns)[str(clock.column)] * clock.scale
+    found, left = [], []
+    for name, value in columns:
+        heading = heading_of(name)
+        if clock.kind == "column" and (name == clock.column or _is_time(name, value)):
+            continue
+        if COUNTER.fullmatch(heading.name) and np.ptp(np.diff(value)) == 0.0:
+            left.append(f"{name}: counts the rows")
+        elif not np.isfinite(value).any() or np.nanmax(value) == np.nanmin(value):
+            left.append(f"{name}: never changes")
+        else:
+            scaled = value * heading.scale
+            found.append(
+                Recorded(
+                    heading.name, time, scaled, column=name, unit=heading.unit, scale=heading.scale,
+                    written_unit=heading.written,
+                )
+            )  # fmt: skip
+    return Inventory(table.path, tuple(found), clock, reason, tuple(left))
+
+
+def _vectors(table: Table) -> Iterator[tuple[str, Array]]:
+    """Columns of numbers by name, those of arrays one by one."""
+    for name, values in table.columns.items():
+        array = np.asarray(values)
+        if array.dtype.kind not in "fiub":
+            continue
+        if array.ndim == 2 and min(array.shape) > 1:
+            if array.shape[1] <= WIDEST:
+                yield from (
+                    (f"{name}[{number}]", table.column(f"{name}[{number}]"))
+                    for number in range(array.shape[1])
+                )
+        elif array.size == max(array.shape, default=0) and array.size > 1:
+            yield str(name), table.column(name)
+
+
+def _is_time(name: str, value: Array) -> bool:
+    """Whether a column is called a time and goes forward as one."""
+    heading = heading_of(name)
+    called = (
+        TIME.fullmatch(heading.name.rsplit(".", 1)[-1].replace(" ", "_")) is not None or heading.unit == "s"
+    )
+    return called and _forward(value)
+
+
+def _forward(value: Array) -> bool:
+    step = np.diff(value)
+    if not len(step) or not np.isfinite(value).all():
+        return False
+    return bool(value[-1] > value[0]) and float(np.mean(step >= 0.0)) >= FORWARD
+
+
+def _table_clock(path: Path, columns: list[tuple[str, Array]]) -> tuple[Clock, str]:
+    """The column that holds the time. Raises InputError where there is none."""
+    for name, value in columns:
+        if _is_time(name, value):
+            heading = heading_of(name)
+            scale, why = heading.scale, f"its heading says {heading.written}" if heading.unit else ""
+            if not why:
+                scale, why = _guessed_scale(value)
+            return Clock("column", column=name, scale=scale), f"called a time, and goes forward; {why}"
+    for name, value in columns:
+        step = np.diff(value)
+        if COUNTER.fullmatch(name) is None and _forward(value) and np.std(step) < EVEN * np.mean(step):
+            if name.isdigit() or not (step == 1.0).all():
+                scale, why = _guessed_scale(value)
+                return Clock(
+                    "column", column=name, scale=scale
+                ), f"the only column that goes forward evenly; {why}"
+    names = ", ".join(name for name, _ in columns)
+    raise InputError(
+        f"{path}: no column goes forward like a time ({names}); give the rows' rate with --rate HZ"
+    )
+
+
+def _guessed_scale(value: Array) -> tuple[float, str]:
+    """Seconds in one unit of a time whose unit is not told, by the size of its steps."""
+    step = float(np.median(np.diff(value)))
+    for scale, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
+        if step * scale < LONGEST_STEP:
+            return scale, f"steps of {step:.4g} are taken to be {unit}"
+    return 1e-9, f"steps of {step:.4g} are taken to be ns"
+
+
+def _of_bag(bag: Bag) -> Inventory:
+    first: dict[str, tuple[Topic, bytes]] = {}
+    for block in bag.blocks():
+        if block.topic.name not in first and len(block):
+            first[block.topic.name] = block.topic, bytes(next(iter(block)))
+    wanted: dict[str, list[Recorded]] = {}
+    left: list[str] = []
+    for name, (topic, data) in sorted(first.items()):
+        if topic.type.split("/")[0] in SKIPPED_PACKAGES:
+            left.append(f"{name}: {topic.type}")
+            continue
+        try:
+            message = typestore(topic).deserialize_cdr(data, topic.type)
+        except Exception as error:  # a type that is not defined, or a damaged message
+            left.append(f"{name}: {' '.join(str(error).split())}")
+            continue
+        empty = np.empty(0)
+        fields = [
+            Recorded(said, empty, empty, topic.name, topic.type, path, joint=joint)
+            for path, said, joint in _numbers(message)
+        ]
+        if fields:
+            wanted[name] = fields
+        else:
+            left.append(f"{name}: {topic.type} holds no number that could be a signal")
+    left += [f"{name}: is empty" for name in sorted(bag.topics) if name not in first]
+    columns = read_columns(
+        Bag(bag.path).blocks(lambda topic: topic.name in wanted),
+        {name: [Field.parse(one.field) for one in fields] for name, fields in wanted.items()},
+    )
+    begin = min((int(one.log_ns.min()) for one in columns.values() if len(one.log_ns)), default=0)
+    found = [one for name, fields in wanted.items() for one in _filled(fields, columns[name], begin)]
+    moving = [one for one in found if len(one.value) > 1 and np.ptp(one.value) > 0.0]
+    left += [f"{one}: never changes" for one in found if one not in moving]
+    if not moving:
+        raise InputError(
+            f"{bag.path}: no topic holds a number that changes; topics: {', '.join(sorted(bag.topics)) or 'none'}"
+        )
+    return Inventory(bag.path, tuple(moving), Clock("receive"), "", tuple(left))
+
+
+def _filled(fields: list[Recorded], columns: Columns, begin: int) -> Iterator[Recorded]:
+    """Fields of one topic with their samples."""
+    stamped = columns.stamp_ns is not None and bool((columns.stamp_ns > 0).any())
+    for one in fields:
+        field = Field.parse(one.field)
+        value = columns.values[field]
+        kept = np.isfinite(value)
+        time = (columns.log_ns[kept] - begin) * 1e-9
+        order = np.argsort(time, kind="stable")
+        yield replace(one, time=time[order], value=value[kept][order], stamped=stamped)
+
+
+def _numbers(
+    message: Any, path: str = "", said: str = "", joint: str = "", above: tuple[Any, ...] = ()
+) -> Iterator[tuple[str, str, str]]:
+    """Path, name and joint of every number in a message."""
+    if len(above) > DEEPEST:
+        return
+    above = (*above, message)
+    for name in getattr(message, "__dataclass_fields__", {}):
+        if name.startswith("__") or SKIPPED_FIELDS.fullmatch(name):
+            continue
+        value = getattr(message, name)
+        here, words = f"{path}.{name}" if path else name, f"{said} {name}".strip()
+        if hasattr(value, "__dataclass_fields__"):
+            yield from _numbers(value, here, words, joint, above)
+        elif isinstance(value, (int, float)) and not isinstance(value, bool):
+            yield here, words, joint
+        elif isinstance(value, (list, tuple, np.ndarray)) and 0 < len(value) <= WIDEST:
+            yield from _entries(value, here, words, joint, above)
+
+
+def _entries(
+    values: Any, path: str, said: str, joint: str, above: tuple[Any, ...]
+) -> Iterator[tuple[str, str, str]]:
+    """The same of every entry of a list; entries are called by name where a list of names stands beside them."""
+    if isinstance(values[0], (str, bool, bytes)):
+        return
+    names = _names(above[-1], len(values), NAMES)
+    interfaces = _names(
+        above[-1], len(values), ("interface_names",)
+    )  # control_msgs/InterfaceValue: position, effort, …
+    for number, value in enumerate(values):
+        here = f"{path}[{names[number] if names else number}]"
+        of_joint = names[number] if names else joint
+        if hasattr(value, "__dataclass_fields__"):
+            yield from _numbers(value, here, said, of_joint, above)
+        elif interfaces:
+            yield here, interfaces[number], of_joint
+        else:
+            yield here, said, of_joint or (f"#{number}" if len(values) > 1 else "")
+
+
+def _names(message: Any, count: int, keys: tuple[str, ...]) -> list[str] | None:
+    """Names of `count` entries that stand in the message, each of its own and such as a path can hold."""
+    for key in keys:
+        names = getattr(message, key, None)
+        if isinstance(names, list) and len(names) == count == len(set(names)):
+            if all(
+                isinstance(name, str) and re.fullmatch(r"[^\[\]\s]+", name) and not name.isdigit()
+                for name in names
+            ):
+                return names
+    return None
+
+
+def header_clock(chosen: Mapping[str, Recorded]) -> tuple[Clock, str]:
+    """Stamps where every chosen topic bears them, else the times of receipt."""
+    without = sorted({one.topic for one in chosen.values() if not one.stamped})
+    if without:
+        return Clock("receive"), f"{', '.join(without)} bears no stamps, so times of receipt are compared"
+    return Clock("header"), "all of these topics bear stamps"

@@ -1,0 +1,220 @@
+"""Text tables as programs write them: comment lines, a title, names and units above the numbers; commas, semicolons, tabs or
+spaces between the columns; decimal points or commas; cells in quotes.
+
+Nothing has to be said of a file: the separator is the one by which most lines are rows of numbers of one length.
+"""
+
+import csv
+import gzip
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from rhythmid.errors import InputError
+from rhythmid.record.heading import is_unit
+
+TEXT = (".csv", ".tsv", ".txt", ".dat")
+COMPRESSED = ".gz"
+COMMENTS = ("#", "%")
+SEPARATORS = ("\t", ";", ",", None)  # None: any number of spaces; in this order where two do equally well
+LOOKED_AT = 200  # lines from which the dialect is told: more than any head has
+SAMPLE = 1 << 16  # bytes from which the encoding is told
+BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a text table is written.
+
+    Attributes
+    ----------
+    separator : between columns; None stands for any number of spaces.
+    decimal : "." or ",".
+    first : number of the line, counted from 0, that holds the first row of numbers; the number of lines where none does.
+    names : of the columns, with their units where the file tells them.
+    numeric : positions of the columns that hold numbers.
+    """
+
+    separator: str | None
+    decimal: str
+    first: int
+    names: tuple[str, ...]
+    numeric: tuple[int, ...]
+
+
+def read_text(path: Path) -> dict[str, Any]:
+    """Columns of a text table by name: float64[n] each, text[n] where a column holds words.
+
+    Raises InputError where the file is empty, its names are not unique or do not belong to the rows; ValueError where a row
+    is damaged.
+    """
+    encoding = _encoding(path)
+    with _opened(path, encoding) as file:
+        dialect = dialect_of(list(islice(file, LOOKED_AT)), str(path))
+    count = len(dialect.names)
+    words = [place for place in range(count) if place not in dialect.numeric]
+    with _opened(path, encoding) as file:
+        numbers = _rows(islice(file, dialect.first, None), dialect, dialect.numeric)
+    found: dict[str, Any] = {
+        dialect.names[place]: column for place, column in zip(dialect.numeric, numbers.T)
+    }
+    if words:
+        with _opened(path, encoding) as file:
+            lines = (line for line in islice(file, dialect.first, None) if _content(line))
+            cells = [_cells(line, dialect.separator) for line in lines]
+        found |= {dialect.names[place]: np.array([row[place] for row in cells]) for place in words}
+    return {name: found[name] for name in dialect.names}
+
+
+def dialect_of(lines: list[str], name: str) -> Dialect:
+    """The dialect of a table that begins with these lines. Raises InputError; `name` stands for the file."""
+    used = [(number, line) for number, line in enumerate(lines) if _content(line)]
+    if not used:
+        raise InputError(f"{name}: is empty")
+    separator, decimal, rows = max(_readings([line for _, line in used]), key=lambda one: _worth(one[2]))
+    if not any(rows):  # no numbers: names alone
+        separator = max(SEPARATORS, key=lambda one: len(_cells(used[-1][1], one)))
+        head = _cells(used[-1][1], separator)
+        return Dialect(separator, decimal, len(lines), tuple(head), tuple(range(len(head))))
+    place = next(index for index, row in enumerate(rows) if row)
+    cells = _cells(used[place][1], separator)
+    numeric = tuple(index for index, cell in enumerate(cells) if _number(cell, decimal) is not None)
+    head = _head([line for _, line in used[:place]], separator)
+    if head is None:
+        head = _remark(lines[: used[place][0]], separator, len(cells)) or [str(n) for n in range(len(cells))]
+    if not head[-1] and not cells[-1]:
+        head = head[:-1]
+    if len(head) == len(cells) - 1 and not cells[-1]:  # every row ends with a separator
+        numeric = numeric[:-1]
+    elif len(head) != len(cells):
+        line = used[place - 1][0] + 1
+        raise InputError(f"{name}: line {line} has {len(head)} columns, the rows have {len(cells)}")
+    if len(set(head)) < len(head):
+        twice = next(one for one, count in Counter(head).items() if count > 1)
+        line = used[place - 1][0] + 1 if place else 1
+        raise InputError(
+            f"{name}: two columns have the same name in line {line} ({twice!r}); rename one of them"
+        )
+    return Dialect(separator, decimal, used[place][0], tuple(head), numeric)
+
+
+def _readings(lines: list[str]) -> Iterator[tuple[str | None, str, list[int]]]:
+    """Separator, decimal mark, and of each line how many numbers it holds where it is a row, else 0."""
+    for separator in SEPARATORS:
+        split = [_cells(line, separator) for line in lines]
+        for decimal in (".",) if separator == "," and not any('"' in line for line in lines) else (".", ","):
+            count = [sum(bool(cell) and _number(cell, decimal) is not None for cell in row) for row in split]
+            usual = Counter(len(row) for row, numbers in zip(split, count) if numbers).most_common(1)
+            width = usual[0][0] if usual else 0
+            yield separator, decimal, [n if len(row) == width else 0 for row, n in zip(split, count)]
+
+
+def _worth(rows: list[int]) -> tuple[int, int]:
+    """How well a reading does: numbers that are told apart in rows, and the number of rows."""
+    return sum(rows), sum(1 for row in rows if row)
+
+
+def _head(above: list[str], separator: str | None) -> list[str] | None:
+    """Names of the columns from the lines above the first row, with a line of units below them where there is one."""
+    if not above:
+        return None
+    names = _cells(above[-1], separator)
+    if len(above) > 1 and all(is_unit(cell) for cell in names):
+        titles = _cells(above[-2], separator)
+        if len(titles) == len(names):
+            return [
+                f"{title} [{unit.strip('[]()')}]" if unit else title for title, unit in zip(titles, names)
+            ]
+    return names
+
+
+def _remark(lines: list[str], separator: str | None, count: int) -> list[str] | None:
+    """Names in the last comment line that has as many entries as there are columns."""
+    for line in reversed(lines):
+        text = line.strip().lstrip("#% ")
+        cells = _cells(text, separator)
+        if text and len(cells) == count:
+            return cells
+    return None
+
+
+def _rows(lines: Iterable[str], dialect: Dialect, columns: tuple[int, ...]) -> np.ndarray:
+    """Numbers [rows, columns]; the slow way with Python's own conversion only where cells are empty or have decimal commas."""
+
+    def value(cell: str) -> float:
+        found = _number(cell, dialect.decimal)
+        return float(cell) if found is None else found
+
+    def read(lines: Iterable[str], converters: Any) -> np.ndarray:
+        return np.loadtxt(
+            lines, delimiter=dialect.separator, comments=COMMENTS[0], quotechar='"', usecols=columns, ndmin=2,
+            converters=converters,
+        )  # fmt: skip
+
+    held = [line for line in lines if _content(line)]
+    if not held or not columns:
+        return np.empty((0, len(columns)))
+    usual = len(_cells(held[0], dialect.separator))
+    for line in held:  # loadtxt itself looks at no column but those that are used
+        if line[0] not in COMMENTS and '"' not in line and dialect.separator is not None:
+            if line.count(dialect.separator) + 1 != usual:
+                raise ValueError(
+                    f"a row has {line.count(dialect.separator) + 1} cells, the first has {usual}"
+                )
+    if dialect.decimal == "." and '"' not in held[0]:
+        try:
+            return read(held, None)
+        except ValueError:
+            pass  # an empty cell, say
+    return read(held, value)
+
+
+def _content(line: str) -> bool:
+    """Whether a line is anything but blank or a comment."""
+    return bool(line.strip()) and line.lstrip()[0] not in COMMENTS
+
+
+def _cells(line: str, separator: str | None) -> list[str]:
+    """Cells of a line, without quotes and the spaces around them."""
+    if separator is None:
+        return next(csv.reader([" ".join(line.split())], delimiter=" ", skipinitialspace=True), [])
+    row = next(csv.reader([line.strip(" \r\n")], delimiter=separator, skipinitialspace=True), [])
+    return [cell.strip().strip("'").strip() for cell in row]
+
+
+def _number(cell: str, decimal: str) -> float | None:
+    """A cell's value, None where it is no number; an empty one is NaN, so that the complaint can name where."""
+    cell = cell.strip().strip("\"'")
+    if decimal == ",":
+        if "." in cell:
+            return None
+        cell = cell.replace(",", ".")
+    try:
+        return float(cell) if cell else np.nan
+    except ValueError:
+        return None
+
+
+def _encoding(path: Path) -> str:
+    """UTF-8 or UTF-16 by its mark, else UTF-8 where the beginning is, else Windows' own."""
+    with gzip.open(path) if path.suffix.lower() == COMPRESSED else path.open("rb") as file:
+        start = file.read(SAMPLE)
+    for mark, encoding in BYTE_ORDER_MARKS.items():
+        if start.startswith(mark):
+            return encoding
+    try:
+        start[: start.rfind(b"\n") + 1].decode()
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
+
+
+def _opened(path: Path, encoding: str) -> TextIO:
+    if path.suffix.lower() == COMPRESSED:
+        return gzip.open(path, "rt", encoding=encoding, errors="replace")
+    return path.open(encoding=encoding, errors="replace")

@@ -1,0 +1,112 @@
+"""The balance of forces of a machine of which nothing is known yet, by least squares: what goes with the acceleration, the speed, the
+position and its sine. A first guess for a nominal model, no estimate: that is what `identify` is for."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from rhythmid.errors import InputError
+from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
+from rhythmid.identify.inverse_dynamics.motion import Motion, high_pass, low_pass, motion_of, stretches
+from rhythmid.model import Model
+from rhythmid.record.record import Record
+
+Array = NDArray[np.float64]
+LATEST = 0.2  # s by which what drives may act later than it was recorded, in a first guess
+LATER = 0.9  # of what is left without a delay: by so much a delay has to lower it to be guessed
+COLUMNS = ("acceleration", "velocity", "position", "sine", "cosine", "constant")
+POSITIVE = frozenset({"acceleration", "velocity", "position"})
+MOST_ROWS = 4000  # of the balance: more would not make a first guess better
+LEAST_ROWS = 40  # rows of a stretch without which nothing is guessed from it
+
+
+@dataclass(frozen=True)
+class Law:
+    """Coefficients by column, the share of the driving signal's power that they leave (0: nothing), and by how much later it acts [s]."""
+
+    coefficients: dict[str, float]
+    left: float
+    delay: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What drives, and the columns of the balance, of all stretches, low-pass filtered.
+
+    `drives` (n,) and `columns` (n, 6) of each stretch, in the order of COLUMNS; `period` [s] of each; `margin` samples at either end
+    that the filter spoils. `span` is the travel of the position, relative to the base where that moves; where the base drives
+    (`by_base`), what drives is −a.
+    """
+
+    drives: tuple[Array, ...]
+    columns: tuple[Array, ...]
+    period: tuple[float, ...]
+    margin: tuple[int, ...]
+    span: float
+    bandwidth: Bandwidth
+    by_base: bool
+
+    @classmethod
+    def of(cls, records: Sequence[Record], bare: Model) -> "Rows":
+        """Rows of records whose input or effort drives. Raises InputError where they are too short or nothing drives them."""
+        raw = stretches(records, bare)
+        chosen = bandwidth_of(raw, bare)
+        motions = [motion_of(one, bare, chosen.motion, chosen.low) for one in raw]
+        motions = [one for one in motions if len(one.time) >= LEAST_ROWS]
+        if not motions:
+            raise InputError("the records are too short for a balance of forces")
+        made = [_filtered(one, chosen) for one in motions]
+        return cls(
+            tuple(both[:, 0] for both in made), tuple(both[:, 1:] for both in made), tuple(one.period for one in motions),
+            tuple(min(int(1.0 / (chosen.effort * one.period)), len(one.time) // 8) for one in motions),
+            max(float(np.ptp(one.leg_position)) for one in motions), chosen, motions[0].driven_by_base,
+        )  # fmt: skip
+
+    def delay(self, names: Sequence[str]) -> float:
+        """By how much later [s] what drives acts, where that makes the balance of these columns clearly better; else 0."""
+        if self.by_base:
+            return 0.0
+        period = max(self.period)
+        most = min(LATEST, 0.25 * min(len(one) * p for one, p in zip(self.drives, self.period, strict=True)))
+        delays = [number * period for number in range(1, int(most / period) + 1)]
+        at_once = self.fit(names)
+        best = min((self.fit(names, one) for one in delays), key=lambda law: law.left, default=at_once)
+        return best.delay if best.left < LATER * at_once.left else 0.0
+
+    def fit(self, names: Sequence[str], delay: float = 0.0) -> Law:
+        """Force balance of these columns; coefficients of acceleration, velocity and position are not negative."""
+        places = [COLUMNS.index(name) for name in names]
+        every = max(1, sum(map(len, self.drives)) // MOST_ROWS)
+        sides, matrices = [], []
+        for drive, columns, period, margin in zip(
+            self.drives, self.columns, self.period, self.margin, strict=True
+        ):
+            step = round(delay / period)
+            rows = np.arange(margin + step, len(drive) - margin, every)
+            sides.append(drive[rows - step])
+            matrices.append(columns[rows][:, places])
+        side, matrix = np.concatenate(sides), np.vstack(matrices)
+        size = np.linalg.norm(matrix, axis=0)
+        told = size > 0.0
+        size[~told] = 1.0
+        low = [0.0 if name in POSITIVE else -np.inf for name in names]
+        solved = lsq_linear(matrix / size, side, (low, np.inf))
+        power = float(np.sum((side - side.mean()) ** 2)) or float(side @ side) or 1.0
+        return Law(
+            dict(zip(names, np.where(told, solved.x / size, 0.0).tolist(), strict=True)),
+            2.0 * float(solved.cost) / power,
+            delay,
+        )
+
+
+def _filtered(one: Motion, bandwidth: Bandwidth) -> Array:
+    """What drives and all columns (n, 7), without what is above the effort's bandwidth."""
+    x, v = one.leg_position, one.leg_velocity
+    both = np.column_stack([one.effort, one.acceleration, v, x, np.sin(x), np.cos(x), np.ones(len(x))])
+    both = high_pass(low_pass(both, one.period, bandwidth.effort), one.period, bandwidth.low)
+    if bandwidth.low > 0.0:
+        both[:, -1] = 0.0  # what the filter leaves of a constant tells nothing
+    return both

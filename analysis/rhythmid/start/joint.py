@@ -1,0 +1,69 @@
+"""Which of several joints is looked at: the one that was asked for, else the one that moves most."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rhythmid.errors import InputError
+from rhythmid.record.inventory import Recorded
+from rhythmid.start.meaning import Meaning, words_of
+
+CLOSE = 0.7  # of the motion of the joint that moves most, from which another one is worth a question
+
+
+@dataclass(frozen=True)
+class Joint:
+    """The joint that is looked at, empty where there is but one, and how much every joint moved (standard deviation)."""
+
+    name: str = ""
+    motion: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def others(self) -> list[str]:
+        """The other joints, those that moved most first."""
+        return sorted(
+            (name for name in self.motion if name != self.name), key=lambda name: -self.motion[name]
+        )
+
+    def includes(self, one: Recorded, meaning: Meaning) -> bool:
+        """Whether a number is this joint's, or not one of another joint's."""
+        if not self.name or meaning.joint == self.name:
+            return True
+        if meaning.joint in self.motion:
+            return False
+        said = set(words_of(one.topic))
+        if set(words_of(self.name)) <= said:
+            return True
+        return not any(set(words_of(other)) <= said for other in self.others)
+
+
+def joint_of(
+    known: Sequence[tuple[Recorded, Meaning]],
+    wanted: str | None,
+    ask: Callable[[str, Sequence[str]], int],
+    place: str,
+) -> Joint:
+    """The joint to look at. Raises InputError where none is called `wanted`."""
+    motion: dict[str, float] = {}
+    order = ("position", "velocity", "acceleration")
+    for quantity in order:
+        able = [
+            (one, meaning) for one, meaning in known
+            if meaning.quantity == quantity and meaning.commanded is not True and meaning.joint and meaning.joint[0] != "#"
+        ]  # fmt: skip
+        if able and not motion:
+            for one, meaning in able:
+                motion[meaning.joint] = max(motion.get(meaning.joint, 0.0), float(np.nanstd(one.value)))
+    if wanted is not None:
+        if wanted not in motion:
+            raise InputError(
+                f"{place}: no joint is called {wanted!r}; it has {', '.join(motion) or 'no named joints'}"
+            )
+        return Joint(wanted, motion)
+    ranked = sorted(motion, key=lambda name: -motion[name])
+    if len(ranked) < 2:
+        return Joint(ranked[0] if ranked else "", motion)
+    close = [name for name in ranked if motion[name] >= CLOSE * motion[ranked[0]]]
+    number = ask("Which joint is looked at?", close) if len(close) > 1 else 0
+    return Joint(close[number], motion)

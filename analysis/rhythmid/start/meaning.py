@@ -1,0 +1,156 @@
+"""What a recorded number means by its name, unit and message type: which quantity, and whether it was asked for or measured."""
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from rhythmid.record.inventory import Recorded
+
+Quantity = Literal["position", "velocity", "acceleration", "effort"]
+BY_UNIT: dict[str, Quantity] = {
+    "rad": "position", "m": "position", "rad/s": "velocity", "m/s": "velocity", "rad/s^2": "acceleration",
+    "m/s^2": "acceleration", "N": "effort", "N*m": "effort", "A": "effort", "V": "effort",
+}  # fmt: skip
+WORDS: dict[Quantity, frozenset[str]] = {
+    "position": frozenset(
+        "position positions pos angle angles theta phi alpha pose height displacement disp encoder enc deflection extension length "
+        "travel rotation".split()
+    ),
+    "velocity": frozenset("velocity velocities vel speed rate omega twist dq qd qdot thetadot dtheta xdot dx angvel".split()),
+    "acceleration": frozenset("acceleration accelerations accel acc ddq qdd xddot ddx".split()),
+    "effort": frozenset(
+        "effort efforts torque torques tau force forces wrench current currents cur voltage volt volts pwm duty load trq "
+        "moment iq".split()
+    ),
+}  # fmt: skip
+LETTERS: dict[str, Quantity] = {  # what one letter stands for by custom, where nothing else is said
+    "q": "position", "x": "position", "y": "position", "z": "position", "v": "velocity", "w": "velocity", "a": "acceleration",
+    "u": "effort", "f": "effort", "i": "effort", "t": "effort",
+}  # fmt: skip
+COMMANDED = frozenset(
+    "des desired cmd cmds command commands commanded ref reference target targets goal setpoint sp set demand demanded excitation "
+    "request requested".split()
+)
+COMMANDED_LETTERS = frozenset("u r".split())
+MEASURED = frozenset("meas measured act actual state states feedback fb est estimated present real".split())
+FORCING = frozenset("forcing pump pumping disturbance perturbation external".split())
+BASE = frozenset("base table ground shaker platform floor".split())
+GENERIC = frozenset(
+    "dof joint joints motor data robot array value values actuator axis trajectory controller controllers".split()
+)
+ROTARY = frozenset(
+    "angle angles theta phi alpha torque torques tau q rotation rotary omega revolute hinge encoder moment trq dof joint joints "
+    "qpos qvel knee hip ankle thigh calf shoulder elbow wrist arm pan tilt roll pitch yaw pendulum".split()
+)
+LINEAR = frozenset(
+    "force forces height displacement disp x z slide slider prismatic linear leg lift rail cart piston travel extension length"
+    " deflection elevator".split()
+)  # fmt: skip
+POSED = frozenset(
+    "des desired ref reference target targets goal setpoint sp".split()
+)  # of a motion, where nothing else is said
+ELECTRICAL = {"V": "voltage volt volts", "A": "current currents cur iq amp amps i", "1": "pwm duty"}
+IGNORED = frozenset("temp temperature battery power error err status mode".split())
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a number is by its name: None where nothing is said. `reason` is a phrase, `certain` whether a word or unit says it."""
+
+    quantity: Quantity | None
+    commanded: bool | None
+    forcing: bool
+    base: bool
+    joint: str
+    reason: str
+    certain: bool
+
+
+def words_of(text: str) -> list[str]:
+    """Words of a name in lower case: parted at capitals, digits, dots, slashes and underscores."""
+    apart = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", text)
+    return re.findall(r"[a-z]+|\d+", apart.lower())
+
+
+def meaning_of(one: Recorded) -> Meaning:
+    """What a recorded number means by what names it."""
+    near, far = words_of(one.said), words_of(one.topic)
+    quantity, reason, certain = _quantity(one, near, far)
+    every = {*near, *far}
+    commanded: bool | None = None
+    if every & COMMANDED or (not one.topic and set(near) & COMMANDED_LETTERS and not certain):
+        commanded = True
+        reason += f"; {_one(near + far, COMMANDED | COMMANDED_LETTERS)!r} says that it was asked for"
+    elif every & MEASURED or one.type in (
+        "sensor_msgs/msg/JointState",
+        "sensor_msgs/msg/Imu",
+        "nav_msgs/msg/Odometry",
+    ):
+        commanded = False
+    forcing = bool(every & FORCING)
+    joint = one.joint or _joint_of_column(one)
+    return Meaning(
+        quantity, commanded, forcing, bool(every & BASE), joint, reason.removeprefix("; "), certain
+    )
+
+
+def is_ignored(one: Recorded) -> bool:
+    """Whether its name says that it is neither a motion nor what drives one."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & IGNORED)
+
+
+def rotary_of(one: Recorded) -> tuple[bool | None, str]:
+    """Whether the quantity turns (True) or slides (False), and the word or unit that says it."""
+    if one.unit in ("rad", "rad/s", "rad/s^2", "N*m"):
+        return True, f"its unit is {one.written_unit}"
+    if one.unit in ("m", "m/s", "m/s^2", "N"):
+        return False, f"its unit is {one.written_unit}"
+    if force_unit_of(one) in ("V", "A", "1"):
+        return True, "it feeds a motor"
+    for word in [*words_of(one.said), *words_of(one.joint), *words_of(one.topic)]:
+        if word in LINEAR:
+            return False, f"its name says {word!r}"
+        if word in ROTARY:
+            return True, f"its name says {word!r}"
+    return None, ""
+
+
+def force_unit_of(one: Recorded) -> str:
+    """Unit of what drives, by its heading or a word that says what a motor is fed with; empty where neither does."""
+    if one.unit:
+        return one.unit
+    words = {*words_of(one.said), *words_of(one.topic)}
+    return next((unit for unit, names in ELECTRICAL.items() if words & set(names.split())), "")
+
+
+def poses(one: Recorded) -> bool:
+    """Whether its name says that it is what a motion is to become: a target, a set point."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & POSED)
+
+
+def _quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity | None, str, bool]:
+    if one.unit in BY_UNIT:
+        return BY_UNIT[one.unit], f"its heading says {one.written_unit}", True
+    for words, where in ((near, "name"), (far, "topic")):
+        for word in reversed(words):
+            for quantity, known in WORDS.items():
+                if word in known:
+                    return quantity, f"its {where} says {word!r}", True
+    for word in reversed(near):
+        if word in LETTERS:
+            return LETTERS[word], f"{word!r} usually stands for that", False
+    return None, "", False
+
+
+def _one(words: list[str], known: frozenset[str]) -> str:
+    return next(word for word in words if word in known)
+
+
+def _joint_of_column(one: Recorded) -> str:
+    """What tells a column from others of the same quantity: `3` of dof_pos[3], `knee` of knee_pos; empty for messages."""
+    if one.topic:
+        return ""
+    known = COMMANDED | MEASURED | GENERIC | FORCING | BASE | frozenset().union(*WORDS.values())
+    left = [word for word in words_of(one.column.replace(one.written_unit, "") if one.written_unit else one.column)
+            if word not in known and word not in LETTERS]  # fmt: skip
+    return "_".join(left)

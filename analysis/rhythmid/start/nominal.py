@@ -1,0 +1,292 @@
+"""A nominal model to begin with: what the records suggest at first sight, with first guesses of all values."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.elements.force.pendulum_gravity import LEAST
+from rhythmid.errors import InputError
+from rhythmid.identify.series import prepare, scales
+from rhythmid.model import INERTIA, MASS, Model, Value
+from rhythmid.record.record import Channel, Record
+from rhythmid.start.balance import Law, Rows
+from rhythmid.start.roles import Roles
+from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
+
+BETTER = 0.9  # of what a balance leaves: by so much an element has to lower it to be among the first guesses
+LAW_KEPT = (
+    0.5  # share of an effort that the law of a controller may leave at most, to be taken for what made it
+)
+UNEXPLAINED = 0.8  # share of what drives that a balance may leave at most, for its values to be taken
+LEAST_DAMPING = 0.01  # of inertia times the motion's angular frequency, where the balance shows no damping
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """A model to begin with, the reason for its inertia and each of its terms (by label), and what was not guessed."""
+
+    model: Model
+    reasons: dict[str, str]
+    remarks: tuple[str, ...]
+
+
+def nominal_of(records: Sequence[Record], roles: Roles, units: Units, catalogue: Catalogue) -> Nominal:
+    """The nominal model of records whose roles were guessed; `units` are those of its force, position and inertia."""
+    if roles.input_kind == "reference":
+        return _servo(records, roles, units, catalogue)
+    first = records[0]
+    driven = first.input is not None or first.effort is not None
+    if not driven or roles.input_kind != "force":
+        return _alone(
+            records, units, catalogue, "its base moves" if driven else "nothing that drives it was recorded"
+        )
+    return _forced(records, roles, units, catalogue)
+
+
+def units_of(roles: Roles, force: str) -> Units:
+    """Units of the machine: of its position by how it moves, of its force as recorded, where that is told."""
+    usual = ROTATIONAL if roles.rotary else TRANSLATIONAL
+    if force in ("", usual.force):
+        return usual
+    return Units(force, usual.position, f"{force}*s^2/{usual.position}")
+
+
+def per_inertia(units: Units) -> Units:
+    """Units of a machine of which no force is known: forces are accelerations."""
+    return Units(f"{units.position}/s^2", units.position, "1")
+
+
+def _bare(units: Units, mass: float = 1.0, fixed: bool = False) -> Model:
+    return Model(Value(mass, units.mass, fixed, MASS.bounds), (), units)
+
+
+def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Catalogue) -> Nominal:
+    """Force and motion were recorded: all by the balance of forces."""
+    try:
+        rows = Rows.of(records, _bare(units))
+        law, kind = _restoring(rows, roles.rotary, inertial=True)
+    except InputError as error:
+        return _by_size(records, units, catalogue, str(error))
+    if law.coefficients["acceleration"] <= 0.0:
+        return _by_size(records, units, catalogue, "the balance of forces shows no inertia")
+    if law.left > UNEXPLAINED:
+        why = f"the balance of forces explains only {1.0 - law.left:.0%} of what drives"
+        return _by_size(records, units, catalogue, why)
+    told = f"by the balance of forces, which explains {max(0.0, 1.0 - law.left):.0%} of what drives"
+    model = _bare(units, _short(law.coefficients["acceleration"]))
+    reasons = {INERTIA: told}
+    remarks: list[str] = []
+    if "reference" in roles.choices:
+        model, reasons, remark = _controller(records, model, reasons, catalogue)
+        remarks += [remark] if remark else []
+    elif law.delay > 0.0:
+        model = model.with_element(catalogue["input_delay"], {"delay": _short(law.delay)})
+        reasons["input_delay"] = "the balance is better when what drives acts so much later"
+    model, more = _forces(model, law, kind, rows, catalogue)
+    return Nominal(model, reasons | more, tuple(remarks))
+
+
+def _restoring(rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:
+    """The balance with what brings the machine back, if anything does: a spring, gravity of a pendulum, or neither."""
+    moving = ["acceleration", "velocity"] if inertial else ["velocity"]
+    full = [*moving, "position", "constant"]
+    delay = rows.delay(full)
+    plain = rows.fit(moving, delay)
+    options: dict[str, Law] = {
+        "constant": rows.fit([*moving, "constant"], delay),
+        "spring": rows.fit(full, delay),
+    }
+    if rotary and rows.span >= 2.0 * LEAST:
+        options["pendulum"] = rows.fit([*moving, "sine", "cosine"], delay)
+    if options["spring"].coefficients["position"] <= 0.0:
+        del options["spring"]
+    law, kind = plain, "free"
+    if options["constant"].left < BETTER * law.left:
+        law, kind = options["constant"], "constant"
+    back = [name for name in ("spring", "pendulum") if name in options]
+    if back:
+        best = min(back, key=lambda name: options[name].left)
+        if options[best].left < BETTER * law.left:
+            law, kind = options[best], best
+    return law, kind
+
+
+def _forces(
+    model: Model, law: Law, kind: str, rows: Rows, catalogue: Catalogue
+) -> tuple[Model, dict[str, str]]:
+    """The model with what the balance shows besides the inertia."""
+    found, reasons = law.coefficients, {}
+    if kind == "spring":
+        stiffness = found["position"]
+        rest = -found["constant"] / stiffness
+        values = {"stiffness": _short(stiffness), "rest_length": _short(rest)}
+        model = model.with_element(catalogue["linear_spring"], values)
+        reasons["linear_spring"] = "a force that goes with the position brings it back"
+        if model.units.position == "rad" and rows.span >= 2.0 * LEAST:
+            reasons["linear_spring"] += (
+                "; it explains more than a pendulum's gravity, which is pendulum_gravity: {moment: …}"
+            )
+        elif model.units.position == "rad":
+            reasons["linear_spring"] += (
+                "; at so small an angle a pendulum's gravity does the same: pendulum_gravity: {moment: …}"
+            )
+    elif kind == "pendulum":
+        moment, hanging = (
+            math.hypot(found["sine"], found["cosine"]),
+            math.atan2(-found["cosine"], found["sine"]),
+        )
+        model = model.with_element(
+            catalogue["pendulum_gravity"], {"moment": _short(moment), "reference": _short(hanging)}
+        )
+        reasons["pendulum_gravity"] = (
+            "a torque that goes with the sine of the angle explains more than a spring; reference: hanging"
+        )
+    elif kind == "constant":
+        model = model.with_element(catalogue["constant_force"], {"force": _short(-found["constant"])})
+        reasons["constant_force"] = (
+            "a constant part is needed for the balance: gravity, or an offset of what drives"
+        )
+    damping, why = found["velocity"], "every machine loses energy; the value is by the balance"
+    if damping <= 0.0:
+        inertia = found.get("acceleration", model.mass.value)
+        damping = LEAST_DAMPING * inertia * 2.0 * math.pi * rows.bandwidth.dominant
+        why = "every machine loses energy; the balance shows no damping, so a small one is guessed"
+    model = model.with_element(catalogue["viscous_damper"], {"damping": _short(damping)})
+    return model, reasons | {"viscous_damper": why}
+
+
+def _controller(
+    records: Sequence[Record], model: Model, reasons: dict[str, str], catalogue: Catalogue
+) -> tuple[Model, dict[str, str], str]:
+    """The model with the position controller that made the recorded effort from reference and motion, if one did."""
+    law = _control_law(records)
+    if law is None or law.left > LAW_KEPT:
+        left = "" if law is None else f" (a proportional and a derivative gain leave {law.left:.0%} of it)"
+        return (
+            model,
+            reasons,
+            f"No controller: the recorded effort is not what the reference would make{left}.",
+        )
+    gains = {
+        "proportional": _short(law.coefficients["gain"]),
+        "derivative": _short(law.coefficients["velocity"]),
+    }
+    made = model.with_element(catalogue["position_control"], gains)
+    reason = f"reference and effort were recorded, and these gains explain {1.0 - law.left:.0%} of the effort"
+    return made, reasons | {"position_control": reason}, ""
+
+
+def _control_law(records: Sequence[Record]) -> Law | None:
+    """Gains of  effort = k_p (reference − position) − k_d velocity + constant."""
+    sides, matrices = [], []
+    for record in records:
+        if record.reference is None or record.effort is None or record.output_kind != "position":
+            return None
+        grid = replace(record, input=None).uniform()
+        assert grid.effort is not None and grid.reference is not None
+        velocity = np.gradient(grid.output, grid.period)
+        kept = grid.valid
+        sides.append(grid.effort[kept])
+        matrices.append(
+            np.column_stack([grid.reference - grid.output, -velocity, np.ones(len(grid.output))])[kept]
+        )
+    side, matrix = np.concatenate(sides), np.vstack(matrices)
+    solution = np.linalg.lstsq(matrix, side, rcond=None)[0]
+    left = float(np.mean((side - matrix @ solution) ** 2) / max(float(np.var(side)), 1e-300))
+    if solution[0] <= 0.0:
+        return None
+    return Law({"gain": float(solution[0]), "velocity": max(float(solution[1]), 0.0)}, left)
+
+
+def _servo(records: Sequence[Record], roles: Roles, units: Units, catalogue: Catalogue) -> Nominal:
+    """Only reference and motion are known: a controller, all per unit of inertia."""
+    model = _bare(units, 1.0, fixed=True)
+    reasons = {INERTIA: "no force is known, so all is per unit of inertia"}
+    law = _servo_law(records, roles.reference_of)
+    if law.delay > 0.0:
+        model = model.with_element(catalogue["input_delay"], {"delay": _short(law.delay)})
+        reasons["input_delay"] = "the balance is better when the reference acts so much later"
+    told = f"the reference drives; gains by least squares of the acceleration, of which they explain {max(0.0, 1.0 - law.left):.0%}"
+    gain = _short(law.coefficients["gain"])
+    if roles.reference_of == "velocity":
+        model = model.with_element(catalogue["velocity_control"], {"gain": gain})
+        return Nominal(model, reasons | {"velocity_control": told}, ())
+    derivative = _short(law.coefficients["velocity"])
+    model = model.with_element(
+        catalogue["position_control"], {"proportional": gain, "derivative": derivative}
+    )
+    remark = "No viscous damper: without a recorded effort it does what the derivative gain does."
+    return Nominal(model, reasons | {"position_control": told}, (remark,))
+
+
+def _servo_law(records: Sequence[Record], of: str) -> Law:
+    """Gains of  acceleration = k_p (reference − position) − k_d velocity, by size alone where that comes out negative.
+
+    The balance is solved for the reference: r = x + (a + k_d v) / k_p.
+    """
+    as_force = [
+        replace(one, input_kind="force", reference=None, effort=None, forcing=None) for one in records
+    ]
+    frequency = scales(prepare(as_force), _bare(TRANSLATIONAL)).frequency
+    usual = (
+        2.0 * math.pi * max(frequency, 1.0)
+    ) * 3.0  # thrice the motion's own: a servo follows what it is asked for
+    fallback = Law({"gain": usual**2 if of == "position" else usual, "velocity": 1.4 * usual}, 1.0)
+    try:
+        rows = Rows.of(as_force, _bare(TRANSLATIONAL))
+        names = ["acceleration", "velocity", *(["position"] if of == "position" else []), "constant"]
+        law = rows.fit(names, rows.delay(names))
+    except InputError:
+        return fallback
+    inertial = law.coefficients["acceleration"]
+    if inertial <= 0.0:
+        return fallback
+    return Law(
+        {"gain": 1.0 / inertial, "velocity": law.coefficients["velocity"] / inertial}, law.left, law.delay
+    )
+
+
+def _alone(records: Sequence[Record], units: Units, catalogue: Catalogue, why: str) -> Nominal:
+    """A free decay, or a machine on a base that moves: all per unit of inertia."""
+    model = _bare(units, 1.0, fixed=True)
+    reasons = {INERTIA: f"{why}, so all is per unit of inertia"}
+    try:
+        rows = Rows.of([_as_driven(one) for one in records], model)
+        law, kind = _restoring(rows, units.position == "rad", inertial=False)
+    except InputError as error:
+        return _by_size(records, units, catalogue, str(error), fixed=True)
+    model, more = _forces(model, law, kind, rows, catalogue)
+    return Nominal(model, reasons | more, ())
+
+
+def _as_driven(record: Record) -> Record:
+    """A free decay as one that its own inertial force drives, −a, which is what a base would be."""
+    if record.input is not None:
+        return record
+    resting = Channel(record.output.time, np.zeros(len(record.output)), record.output.unit)
+    return replace(record, input=resting, input_kind="base_displacement", hold="linear", reference=None)
+
+
+def _by_size(
+    records: Sequence[Record], units: Units, catalogue: Catalogue, why: str, fixed: bool = False
+) -> Nominal:
+    """Where there is no balance: the inertia that would make such an acceleration of such a force."""
+    found = scales(prepare(records), _bare(units, 1.0, fixed))
+    inertial = found.position * (2.0 * math.pi * found.frequency) ** 2
+    mass = 1.0 if fixed else _short(found.effort / max(inertial, 1e-12))
+    model = _bare(units, mass, fixed)
+    damping = 0.1 * mass * 2.0 * math.pi * found.frequency
+    model = model.with_element(catalogue["viscous_damper"], {"damping": _short(damping)})
+    reasons = {
+        INERTIA: f"by the sizes of force and motion at {found.frequency:.3g} Hz only: {why}",
+        "viscous_damper": "every machine loses energy; a damping ratio of a twentieth is a guess",
+    }
+    return Nominal(model, reasons, ())
+
+
+def _short(value: float) -> float:
+    """A first guess with no more digits than it is worth."""
+    return float(f"{value:.3g}") + 0.0  # no negative zero

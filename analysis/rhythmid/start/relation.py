@@ -1,0 +1,132 @@
+"""How two recorded numbers go together: whether one is the integral of the other, follows it, or is driven by it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import coherence, welch
+
+from rhythmid.record.inventory import Recorded
+
+Array = NDArray[np.float64]
+LONGEST = 20_000  # samples that are looked at: more would tell no more
+SEGMENTS = 6  # of a record in its spectra, overlapping by half
+LATEST = 0.5  # s by which an answer may come after its command
+LAGS = 12  # samples of the past in an autoregression
+MOST_ROWS = 2000  # of an autoregression: more would tell no more
+PER_PERIOD = 16.0  # samples in the fastest period that carries power, for an autoregression
+POWER = 0.99  # share of the power below that frequency
+ROUNDING = 1e-8  # of a signal's variance: what an autoregression leaves below it is rounding
+SAME_SIZE = (0.5, 2.0)  # ratio within which an answer is of its command's size
+
+
+@dataclass(frozen=True)
+class Follows:
+    """How well `answer` is a later copy of `command`: correlation, lag [s] and the ratio of sizes."""
+
+    correlation: float
+    lag: float
+    ratio: float
+
+    @property
+    def is_copy(self) -> bool:
+        """Whether it is the same quantity, in the same unit."""
+        return SAME_SIZE[0] < self.ratio < SAME_SIZE[1]
+
+
+def together(first: Recorded, second: Recorded) -> tuple[float, Array, Array]:
+    """Both on a common grid by straight lines: period [s], and values (n,) each; n is 0 where they do not overlap."""
+    begin, end = max(first.time[0], second.time[0]), min(first.time[-1], second.time[-1])
+    rate = min(first.rate, second.rate)
+    count = int((end - begin) * rate) if rate > 0.0 else 0
+    if count < 4 * LAGS:
+        return 1.0, np.empty(0), np.empty(0)
+    grid = begin + np.arange(min(count, LONGEST)) / rate
+    return 1.0 / rate, *(np.interp(grid, *_finite(one)) for one in (first, second))
+
+
+def _finite(one: Recorded) -> tuple[Array, Array]:
+    kept = np.isfinite(one.value)
+    return one.time[kept], one.value[kept]
+
+
+def derivative(position: Recorded, velocity: Recorded) -> tuple[float, float]:
+    """Correlation of the slope of `position` with `velocity`, and the ratio of slope to velocity; 0, 0 where nothing is to be told.
+
+    The integral of the velocity is compared, so that noise is not differentiated; both without their straight lines.
+    """
+    period, x, v = together(position, velocity)
+    if not len(x):
+        return 0.0, 0.0
+    integral = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1])) * period])
+    time = np.linspace(-1.0, 1.0, len(x))
+    base = np.column_stack([np.ones(len(x)), time])
+    x, integral = (one - base @ np.linalg.lstsq(base, one, rcond=None)[0] for one in (x, integral))
+    power = float(integral @ integral)
+    if power == 0.0 or not x.any():
+        return 0.0, 0.0
+    return float(x @ integral / math.sqrt(power * float(x @ x))), float(x @ integral / power)
+
+
+def follows(command: Recorded, answer: Recorded) -> Follows:
+    """The correlation of an answer with its command at the lag where it is greatest, which may be negative."""
+    period, u, y = together(command, answer)
+    if not len(u) or np.ptp(u) == 0.0 or np.ptp(y) == 0.0:
+        return Follows(0.0, 0.0, 0.0)
+    u, y = u - u.mean(), y - y.mean()
+    length = 1 << (2 * len(u) - 1).bit_length()
+    product = np.fft.irfft(np.fft.rfft(y, length) * np.conj(np.fft.rfft(u, length)), length)
+    most = min(int(LATEST / period), len(u) // 4)
+    lags = np.concatenate([np.arange(most + 1), np.arange(-most, 0)])
+    best = int(lags[int(np.argmax(np.abs(product[lags])))])
+    size = math.sqrt(float(u @ u) * float(y @ y))
+    return Follows(float(product[best]) / size, best * period, float(np.std(y) / np.std(u)))
+
+
+def coherent(first: Recorded, second: Recorded) -> float:
+    """Share of the power of `second` that a linear law at any frequency makes of `first`: the mean coherence, weighted by that power."""
+    period, u, y = together(first, second)
+    if not len(u) or np.ptp(u) == 0.0 or np.ptp(y) == 0.0:
+        return 0.0
+    length = max(2 * LAGS, len(u) // SEGMENTS)
+    u, y = np.diff(u), np.diff(y)  # slow drifts go together by chance
+    _, share = coherence(u, y, 1.0 / period, nperseg=length)
+    _, power = welch(y, 1.0 / period, nperseg=length)
+    told = np.isfinite(share)
+    return float(np.sum(share[told] * power[told]) / np.sum(power))
+
+
+def drives(cause: Recorded, effect: Recorded) -> float:
+    """How much better the past of both predicts `effect` than its own past alone, as a log ratio of variances.
+
+    C. W. J. Granger, Econometrica 37 (1969) 424: the cause is what helps to predict. Great where the first drives the second, near 0
+    where it does not.
+    """
+    period, u, y = together(cause, effect)
+    if not len(u) or np.ptp(u) == 0.0 or np.ptp(y) == 0.0:
+        return 0.0
+    step = max(1, int(1.0 / (PER_PERIOD * max(_fastest(u, period), _fastest(y, period)) * period)))
+    while len(u) // step < 4 * LAGS and step > 1:
+        step //= 2
+    u, y = u[::step], y[::step]
+    u, y = (u - u.mean()) / np.std(u), (y - y.mean()) / np.std(y)
+    past = np.lib.stride_tricks.sliding_window_view
+    every = max(1, len(y) // MOST_ROWS)
+    own, other, target = past(y[:-1], LAGS)[::every], past(u[:-1], LAGS)[::every], y[LAGS:][::every]
+    alone = _left(own, target)
+    both = _left(np.hstack([own, other]), target)
+    return math.log((alone + ROUNDING) / (both + ROUNDING))
+
+
+def _left(columns: Array, target: Array) -> float:
+    solution = np.linalg.lstsq(columns, target, rcond=1e-10)[0]
+    return float(np.mean((target - columns @ solution) ** 2))
+
+
+def _fastest(value: Array, period: float) -> float:
+    """Frequency [Hz] below which most of a signal's power lies."""
+    power = np.abs(np.fft.rfft((value - value.mean()) * np.hanning(len(value)))) ** 2
+    total = np.cumsum(power)
+    place = int(np.searchsorted(total, POWER * total[-1])) if total[-1] > 0.0 else 1
+    return max(place, 1) / (len(value) * period)

@@ -1,0 +1,107 @@
+"""From recordings of which nothing is said to the two files that describe them: signals.yaml and a nominal model.yaml."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from threadpoolctl import threadpool_limits
+
+from rhythmid.elements.catalogue import Catalogue, load_catalogue
+from rhythmid.errors import InputError
+from rhythmid.model import Model
+from rhythmid.record.inventory import Inventory, inventory
+from rhythmid.record.read import load_records, read_record
+from rhythmid.record.signals import Clock, Signals
+from rhythmid.start.meaning import force_unit_of
+from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
+from rhythmid.start.roles import Ask, Roles, first_answer, guess_roles
+from rhythmid.start.written import clock_of, model_yaml, signals_yaml
+from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
+
+
+@dataclass(frozen=True, eq=False)
+class Guess:
+    """What a source holds, the roles that were guessed, and the text of signals.yaml."""
+
+    inventory: Inventory
+    roles: Roles
+    signals: str
+
+    def lines(self) -> list[str]:
+        """The guesses in plain text, one line each."""
+        choices = self.roles.choices.items()
+        found = [f"{role}: {choice.recorded}: {choice.reason}" for role, choice in choices]
+        found += [f"CHECK {role}: {doubt}" for role, choice in choices for doubt in choice.doubts]
+        if self.roles.joint.others:
+            found.append(f"joint: {self.roles.joint.name} (others: {', '.join(self.roles.joint.others)})")
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """The guess, the nominal model, and the text of model.yaml."""
+
+    guess: Guess
+    nominal: Nominal
+    model: str
+
+    def lines(self) -> list[str]:
+        """The guesses in plain text, one line each."""
+        elements = ", ".join(term.label for term in self.nominal.model.terms)
+        return [*self.guess.lines(), f"nominal model: inertia, {elements}"]
+
+
+@threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
+def guess(
+    source: str | Path, joint: str | None = None, rate: float | None = None, ask: Ask = first_answer
+) -> Guess:
+    """Look at one recording and guess which channel is what; parameters and errors as of `start`."""
+    found = inventory(source, rate)
+    roles = guess_roles(found, joint, ask)
+    units = _units(roles)
+    clock, reason = clock_of(found, roles)
+    text = signals_yaml(found, roles, units, clock, reason)
+    try:
+        read_record(source, Signals.from_text(text))
+    except InputError as error:
+        if clock.kind != "header":
+            raise
+        text = signals_yaml(found, roles, units, Clock("receive"), f"the stamps do not serve: {error}")
+    return Guess(found, roles, text)
+
+
+@threadpool_limits.wrap(limits=1)
+def start(
+    sources: Sequence[str | Path],
+    joint: str | None = None,
+    rate: float | None = None,
+    ask: Ask = first_answer,
+    catalogue: Catalogue | None = None,
+) -> Start:
+    """Look at recordings of one layout and guess what they are, and what the machine is.
+
+    Parameters
+    ----------
+    sources : bags or tables; roles are guessed from the first, the nominal model from all.
+    joint : the joint to look at; by default the one that moves most.
+    rate : of a table without a time [Hz].
+    ask : answers where several candidates are close; takes the best by default.
+
+    Raises InputError, one line, where a source cannot be read, or nothing in it can be a motion.
+    """
+    guessed = guess(sources[0], joint, rate, ask)
+    records = load_records(sources, Signals.from_text(guessed.signals))
+    catalogue = load_catalogue() if catalogue is None else catalogue
+    units = _units(guessed.roles)
+    nominal = nominal_of(records, guessed.roles, units, catalogue)
+    text = model_yaml(nominal, guessed.roles, units, units not in (TRANSLATIONAL, ROTATIONAL))
+    Model.from_text(text, "model.yaml", catalogue)
+    return Start(guessed, nominal, text)
+
+
+def _units(roles: Roles) -> Units:
+    """Units of the machine's force, position and inertia."""
+    forces = [roles.choices[role] for role in ("input", "effort", "forcing") if role in roles.choices]
+    if roles.input_kind != "force" or not forces:
+        return per_inertia(units_of(roles, ""))
+    return units_of(roles, force_unit_of(forces[0].recorded))

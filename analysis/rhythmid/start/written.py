@@ -1,0 +1,187 @@
+"""signals.yaml and model.yaml as text, every guess with its reason and its alternatives in comments."""
+
+import json
+import textwrap
+from collections.abc import Sequence
+
+from rhythmid.elements.element import SLOTS
+from rhythmid.model import INERTIA, Term, Value
+from rhythmid.record.inventory import Inventory, Recorded, header_clock
+from rhythmid.record.signals import ROLES, Clock
+from rhythmid.start.meaning import force_unit_of, meaning_of
+from rhythmid.start.nominal import Nominal
+from rhythmid.start.roles import Choice, Roles
+from rhythmid.units import Units
+
+WIDTH = 110
+LISTED = 8  # alternatives that a comment names
+MEANS = {
+    "input": "what drives the machine", "output": "the measured motion", "velocity": "its velocity, as recorded beside it",
+    "effort": "the measured effort of the actuator", "reference": "what the controller is asked for",
+    "forcing": "what pushes besides the input",
+}  # fmt: skip
+
+
+def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clock_reason: str) -> str:
+    """The text of signals.yaml."""
+    lines = [
+        *_comment(f"Which channel of {found.path.name} is what. Guessed by `rhythmid init`: look through it and correct what is wrong."),
+        "",
+        *_comment(f"time: {clock_reason}."),
+        f"time: {_time(clock)}",
+    ]  # fmt: skip
+    for role in ROLES:
+        if role in roles.choices:
+            choice = roles.choices[role]
+            lines += [
+                "",
+                *_said(role, choice),
+                f"{role}: {_channel(role, choice.recorded, roles, units, found.is_bag)}",
+            ]
+        elif role == "input" and "effort" not in roles.choices:
+            why = "nothing that was recorded drives the machine" + (
+                "" if "forcing" not in roles.choices else " but the forcing"
+            )
+            lines += ["", *_comment(f"input: {why}."), "input: none"]
+    taken = [choice.recorded for choice in roles.choices.values()]
+    rest = [
+        str(one)
+        for one in found.recorded
+        if not any(one is other for other in taken) and roles.joint.includes(one, meaning_of(one))
+    ]
+    if roles.joint.others:
+        moved = ", ".join(
+            f"{name} ({roles.joint.motion[name]:.3g})" for name in roles.joint.others[: 2 * LISTED]
+        )
+        name, own = roles.joint.name, roles.joint.motion[roles.joint.name]
+        lines += [
+            "",
+            *_comment(
+                f"joint: {name}; standard deviation of its motion {own:.3g}. Others (--joint NAME): {moved}."
+            ),
+        ]
+    if rest:
+        lines += ["", *_comment(f"Recorded too, and not used: {_listed(rest, 3 * LISTED)}.")]
+    if found.left_out:
+        lines += ["", *_comment(f"Left out: {_listed(found.left_out, LISTED)}.")]
+    lines += ["", *_comment("Only a part of the record:"), "# use: [0, 60]                            # s"]
+    return "\n".join(lines) + "\n"
+
+
+def clock_of(found: Inventory, roles: Roles) -> tuple[Clock, str]:
+    """How times are told: of a bag by stamps, where all chosen topics bear them."""
+    if not found.is_bag:
+        return found.clock, found.clock_reason
+    return header_clock({role: choice.recorded for role, choice in roles.choices.items()})
+
+
+def model_yaml(nominal: Nominal, roles: Roles, units: Units, explicit: bool) -> str:
+    """The text of model.yaml; `explicit` where the file has to declare its units."""
+    model = nominal.model
+    lines = [
+        *_comment(
+            "A nominal model to begin with, guessed by `rhythmid init` from what was recorded: put in what is known of the machine. "
+            "All values that are not fixed are estimated."
+        ),
+        "",
+        *_comment(f"It {'turns' if roles.rotary else 'slides'}: {roles.rotary_reason}."),
+    ]
+    if explicit:
+        lines.append(
+            f"units: {{force: {units.force}, position: {units.position}, mass: {json.dumps(units.mass)}}}"
+        )
+    lines += ["", *_comment(f"{nominal.reasons[INERTIA]}."), f"inertia: {{mass: {_value(model.mass)}}}"]
+    for slot in SLOTS:
+        terms = [term for term in model.terms if term.element.slot == slot]
+        if terms:
+            lines += ["", f"{slot}:"]
+            for term in terms:
+                lines += [
+                    *(f"  {line}" for line in _comment(f"{nominal.reasons[term.label]}.")),
+                    f"  - {_term(term)}",
+                ]
+    for remark in nominal.remarks:
+        lines += ["", *_comment(remark)]
+    return "\n".join(lines) + "\n"
+
+
+def _term(term: Term) -> str:
+    return f"{term.element.name}: {{{', '.join(f'{name}: {_value(value)}' for name, value in term.values.items())}}}"
+
+
+def _value(value: Value) -> str:
+    return (
+        f"{{value: {value.value:g}, unit: {json.dumps(value.unit)}{', fixed: true' if value.fixed else ''}}}"
+    )
+
+
+def _time(clock: Clock) -> str:
+    if clock.kind == "rate":
+        return f"{{sample_rate: {clock.rate!r}}}"
+    if clock.kind == "column":
+        return f"{{column: {_quoted(str(clock.column))}{_scale(clock.scale)}}}"
+    return clock.kind
+
+
+def _channel(role: str, one: Recorded, roles: Roles, units: Units, bag: bool) -> str:
+    parts = (
+        [f"topic: {one.topic}, field: {_quoted(one.field)}"] if bag else [f"column: {_quoted(one.column)}"]
+    )
+    parts.append(f"unit: {json.dumps(_unit(role, one, roles, units))}{_scale(one.scale)}")
+    if role == "output" and roles.output_kind != "position":
+        parts.append(f"kind: {roles.output_kind}")
+    if role == "input":
+        if roles.input_kind != "force":
+            parts.append(f"kind: {roles.input_kind}")
+        held = roles.input_kind == "reference" or meaning_of(one).commanded is True
+        if not bag and held:
+            parts.append("hold: zero")
+        elif bag and not held:
+            parts.append("hold: linear")
+    return f"{{{', '.join(parts)}}}"
+
+
+def _unit(role: str, one: Recorded, roles: Roles, units: Units) -> str:
+    position = units.position
+    by_kind = {"position": position, "velocity": f"{position}/s", "acceleration": f"{position}/s^2"}
+    if role == "output":
+        return by_kind[roles.output_kind]
+    if role == "velocity":
+        return by_kind["velocity"]
+    if role == "reference" or (role == "input" and roles.input_kind == "reference"):
+        return by_kind[roles.reference_of]
+    if role == "input" and roles.input_kind != "force":
+        return by_kind[roles.input_kind.removeprefix("base_").replace("displacement", "position")]
+    return force_unit_of(one) or ("N*m" if roles.rotary else "N")
+
+
+def _scale(scale: float) -> str:
+    return "" if scale == 1.0 else f", scale: {scale:.10g}"
+
+
+def _said(role: str, choice: Choice) -> list[str]:
+    """The reason of a choice, what is doubtful, and what else could play the role."""
+    one = choice.recorded
+    lines = _comment(f"{role}, {MEANS[role]}: {choice.reason}.")
+    if one.scale != 1.0:
+        lines += _comment(f"  scale: its heading says {one.written_unit}.")
+    for doubt in choice.doubts:
+        lines += _comment(f"  CHECK: {doubt}.")
+    if choice.others:
+        lines += _comment(f"  or else: {_listed([str(other) for other in choice.others], LISTED)}.")
+    return lines
+
+
+def _listed(names: Sequence[str], most: int) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return "; ".join(names[:most]) + more
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _comment(text: str) -> list[str]:
+    indent = " " * (len(text) - len(text.lstrip()))
+    return [f"# {line}" for line in textwrap.wrap(text.strip(), WIDTH, initial_indent=indent, subsequent_indent=indent + "  ",
+                                                 break_long_words=False, break_on_hyphens=False)]  # fmt: skip

@@ -1,0 +1,99 @@
+"""`rhythmid init` and `rhythmid convert` as they are typed: from a foreign table to the first verdict, and what they refuse."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from foreign import STEP, moved, tones
+
+from rhythmid.record.read import read_record
+
+TIME = np.arange(5000) * STEP
+TORQUE = tones(3, TIME, 1.2, 0.4, 3.0)
+DRY = 0.25
+
+
+@pytest.fixture
+def table(tmp_path):
+    """A bench's log, its times in ms, angles in degrees, decimal commas; a spring-loaded joint with dry friction."""
+    angle, _ = moved(TORQUE, 0.05, 0.1, 6.0, DRY)
+    angle = np.degrees(angle) + 0.02 * np.random.default_rng(0).standard_normal(len(angle))
+    rows = [
+        f"{1e3 * TIME[k]:.0f};{angle[k]:.5f};{TORQUE[k]:.6f}".replace(".", ",")
+        for k in range(0, len(TIME), 10)
+    ]
+    path = tmp_path / "run.csv"
+    path.write_text('# bench 3\n"t [ms]";"angle [deg]";"tau [Nm]"\n' + "\n".join(rows) + "\n")
+    return path
+
+
+def test_three_commands_lead_from_a_foreign_table_to_a_verdict(table, rhythmid):
+    begun = rhythmid("init", "run.csv")
+    assert (begun.returncode, begun.stderr) == (0, "")
+    commands = [line.split()[1:] for line in begun.stdout.splitlines() if line.startswith("  rhythmid ")]
+    assert [one[0] for one in commands] == ["check", "diagnose"]
+    checked = rhythmid(*commands[0])
+    assert checked.returncode == 0 and "note" not in checked.stdout
+    done = rhythmid(*commands[1], "--json", "answer.json", timeout=250.0)
+    assert done.returncode == 0, done.stderr
+    answer = json.loads((table.parent / "answer.json").read_text())
+    assert answer["verdict"] == "missing_physics" and answer["missing"][0]["element"] == "coulomb_friction"
+    found = answer["missing"][0]["parameters"]["force"]
+    assert found["value"] == pytest.approx(DRY, abs=max(0.01, 3.0 * found["std"]))
+
+
+def test_files_that_exist_are_not_overwritten_unless_told_to(table, rhythmid):
+    (table.parent / "model.yaml").write_text("mine")
+    refused = rhythmid("init", "run.csv")
+    assert refused.returncode == 2 and "model.yaml: exists already" in refused.stderr
+    assert refused.stderr.count("\n") == 1 and not (table.parent / "signals.yaml").exists()
+    assert rhythmid("init", "run.csv", "--force").returncode == 0
+    assert "inertia" in (table.parent / "model.yaml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("init", "run.csv", "--rate", "-5"), "--rate is a number of rows a second"),
+        (("convert", "run.csv", "--out", "run.csv"), "run.csv: exists already"),
+        (("convert", "none.csv", "--out", "bag"), "none.csv: no such file"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_in_one_line(table, rhythmid, arguments, words):
+    refused = rhythmid(*arguments)
+    assert refused.returncode == 2 and words in refused.stderr and refused.stderr.count("\n") == 1
+    assert sorted(path.name for path in table.parent.iterdir()) == ["run.csv"]
+
+
+def test_on_a_terminal_close_candidates_are_asked_for(tmp_path):
+    angle, _ = moved(TORQUE, 0.05, 0.1, 6.0)
+    np.savez(tmp_path / "run.npz", t=TIME, pos_left=angle, pos_right=0.9 * angle, torque=TORQUE)
+    terminal, end = os.openpty()
+    os.write(terminal, b"7\n2\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "rhythmid.cli", "init", "run.npz"], stdin=end, capture_output=True, text=True, timeout=60, cwd=tmp_path
+    )  # fmt: skip
+    os.close(terminal)
+    os.close(end)
+    assert done.returncode == 0, done.stderr
+    assert "Which joint is looked at?" in done.stdout and "a number from 1 to 2 is expected" in done.stdout
+    assert "output: pos_right" in done.stdout
+
+
+def test_a_table_becomes_a_bag_with_the_guesses_or_with_signals_of_ones_own(table, rhythmid):
+    done = rhythmid("convert", "run.csv", "--out", "bag")
+    assert done.returncode == 0 and "output: angle [deg]" in done.stdout
+    (table.parent / "own.yaml").write_text(
+        "time: {column: 't [ms]', scale: 0.001}\ninput: {column: 'tau [Nm]', unit: N*m}\n"
+        "output: {column: 'angle [deg]', unit: rad, scale: 0.01745329252}\n"
+    )
+    assert rhythmid("convert", "run.csv", "--out", "other", "--signals", "own.yaml").returncode == 0
+    expected = read_record(table, table.parent / "own.yaml")
+    for name in ("bag", "other"):
+        found = read_record(table.parent / name, table.parent / name / "signals.yaml")
+        np.testing.assert_array_equal(found.output.value, expected.output.value)
+        np.testing.assert_array_equal(found.input.value, expected.input.value)
+        np.testing.assert_allclose(found.output.time, expected.output.time, atol=1e-9)

@@ -1,0 +1,189 @@
+"""Text tables in every dialect hold the same numbers; headings tell their units; structs and Parquet are tables, too."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from rhythmid.errors import InputError
+from rhythmid.record.bag_report import quality_report
+from rhythmid.record.heading import heading_of
+from rhythmid.record.read import read_record
+from rhythmid.record.signals import Signals
+from rhythmid.record.table import Table
+from rhythmid.record.text_table import dialect_of, read_text
+
+NUMBERS = st.floats(-1e6, 1e6, allow_subnormal=False)
+PREAMBLES = (
+    "",
+    "# bench 3\n",
+    "% made by hand\n%\n",
+    "Test run of Friday\n\n",
+    "\n\n",
+    "# a, b; c\nRobot 7\n",
+)
+
+
+@st.composite
+def dialects(draw):
+    """Separator, decimal mark, preamble, quotes, units in a line of their own, a trailing separator, line ends."""
+    separator = draw(st.sampled_from([",", ";", "\t", " "]))
+    decimal = "." if separator == "," else draw(st.sampled_from([".", ","]))
+    trailing = separator in ",;" and draw(st.booleans())
+    return separator, decimal, draw(st.sampled_from(PREAMBLES)), draw(st.booleans()), draw(st.booleans()), trailing, draw(
+        st.sampled_from(["\n", "\r\n"])
+    )  # fmt: skip
+
+
+def written(rows, names, units, dialect) -> str:
+    separator, decimal, preamble, quoted, unit_line, trailing, end = dialect
+
+    def line(cells):
+        cells = [f'"{cell}"' if quoted else cell for cell in cells]
+        return separator.join(cells) + separator * trailing + "\n"
+
+    body = [line([repr(float(value)).replace(".", decimal) for value in row]) for row in rows]
+    return (preamble + line(names) + (line(units) if unit_line else "") + "".join(body)).replace("\n", end)
+
+
+@given(st.lists(st.tuples(NUMBERS, NUMBERS, NUMBERS), min_size=3, max_size=12), dialects())
+def test_a_table_reads_the_same_in_every_dialect(tmp_path_factory, rows, dialect):
+    path = tmp_path_factory.mktemp("dialect") / "run.csv"
+    path.write_text(written(rows, ["t", "angle", "tau"], ["s", "deg", "Nm"], dialect), newline="")
+    found = read_text(path)
+    names = ["t [s]", "angle [deg]", "tau [Nm]"] if dialect[4] else ["t", "angle", "tau"]
+    assert list(found) == names
+    np.testing.assert_array_equal(np.column_stack(list(found.values())), np.array(rows))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+def test_a_degree_sign_is_read_in_every_encoding(tmp_path, encoding):
+    (tmp_path / "run.csv").write_text("t [µs];q [°]\n0;1,5\n1;2,5\n2;3\n", encoding=encoding)
+    assert list(Table.load(tmp_path / "run.csv").columns) == ["t [µs]", "q [°]"]
+
+
+def test_a_column_of_words_does_not_hide_the_others(tmp_path):
+    (tmp_path / "run.csv").write_text("t,state,q\n0,walk,1\n1,stop,2\n2,walk,3\n")
+    table = Table.load(tmp_path / "run.csv")
+    np.testing.assert_array_equal(table.column("q"), [1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match="'state' does not hold real numbers"):
+        table.column("state")
+
+
+def test_an_empty_cell_is_no_number_in_any_column(tmp_path):
+    (tmp_path / "run.csv").write_text("t;q\n0;1,5\n1;\n2;2,5\n")
+    np.testing.assert_array_equal(Table.load(tmp_path / "run.csv").column("q"), [1.5, np.nan, 2.5])
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "unit", "scale"),
+    [
+        ("q [rad]", "q", "rad", 1.0),
+        ("tau (Nm)", "tau", "N*m", 1.0),
+        ("torque [N·m]", "torque", "N*m", 1.0),
+        ("pos_deg", "pos", "rad", math.pi / 180),
+        ("theta (°)", "theta", "rad", math.pi / 180),
+        ("vel_deg_s", "vel", "rad/s", math.pi / 180),
+        ("omega [deg/s]", "omega", "rad/s", math.pi / 180),
+        ("speed in rpm", "speed", "rad/s", math.pi / 30),
+        ("x / mm", "x", "m", 1e-3),
+        ("t_ms", "t", "s", 1e-3),
+        ("stamp [ns]", "stamp", "s", 1e-9),
+        ("a [m/s²]", "a", "m/s^2", 1.0),
+        ("pos_a", "pos_a", "", 1.0),
+        ("current_a", "current", "A", 1.0),
+        ("foot_in", "foot_in", "", 1.0),
+        ("x [counts]", "x [counts]", "", 1.0),
+        ("data.q", "data.q", "", 1.0),
+    ],
+)
+def test_a_heading_tells_name_unit_and_scale(heading, name, unit, scale):
+    found = heading_of(heading)
+    assert (found.name, found.unit) == (name, unit)
+    assert found.scale == pytest.approx(scale, rel=1e-12)
+
+
+TIME = np.arange(400) * 0.005
+Q, TAU = 0.3 * np.sin(5 * TIME), np.cos(3 * TIME)
+
+
+def test_check_says_when_a_unit_of_the_heading_is_not_heeded(tmp_path):
+    rows = "\n".join(f"{1e3 * t:.1f},{math.degrees(q):.6f},{u:.6f}" for t, q, u in zip(TIME, Q, TAU))
+    (tmp_path / "run.csv").write_text(f"t_ms,q [deg],tau [Nm]\n{rows}\n")
+    blind = "time: {column: t_ms}\ninput: {column: 'tau [Nm]', unit: N*m}\noutput: {column: 'q [deg]', unit: rad}\n"
+    lines = "\n".join(quality_report(tmp_path / "run.csv", Signals.from_text(blind)).lines())
+    assert (
+        "output: column 'q [deg]' is in deg by its heading, but is read as it is; write  scale: 0.01745329252, unit: rad"
+        in lines
+    )
+    assert "time: column 't_ms' is in ms by its heading" in lines and "write  scale: 0.001" in lines
+    assert "tau" not in lines.split("note:", 1)[1]
+    heeded = blind.replace("t_ms}", "t_ms, scale: 0.001}").replace(
+        "unit: rad", "unit: rad, scale: 0.0174532925"
+    )
+    assert "note" not in "\n".join(quality_report(tmp_path / "run.csv", Signals.from_text(heeded)).lines())
+    record = read_record(tmp_path / "run.csv", Signals.from_text(heeded))
+    np.testing.assert_allclose(record.output.time, TIME, atol=1e-9)
+    np.testing.assert_allclose(record.output.value, Q, atol=1e-6)
+
+
+def test_a_clock_that_counts_from_1970_begins_at_the_first_row(tmp_path):
+    np.savez(tmp_path / "run.npz", stamp=1.7e9 + TIME, q=Q)
+    record = read_record(
+        tmp_path / "run.npz", Signals.from_text("time: {column: stamp}\ninput: none\noutput: {column: q}\n")
+    )
+    np.testing.assert_allclose(record.output.time, TIME, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "time",
+    [
+        "{column: t, sample_rate: 5}",
+        "{scale: 0.001}",
+        "{sample_rate: 5, scale: 0.1}",
+        "{column: t, scale: 0}",
+    ],
+)
+def test_a_time_that_is_said_twice_or_half_is_refused(time):
+    with pytest.raises(InputError, match=r"signals.yaml:1: time"):
+        Signals.from_text(f"time: {time}\noutput: {{column: q}}\n")
+
+
+def test_structs_of_matlab_are_read_by_their_paths(tmp_path):
+    nested = {
+        "data": {"t": TIME, "joint": {"q": Q[:, None]}},
+        "runs": np.array([{"u": TAU}, {"u": 2 * TAU}], dtype=object),
+    }
+    savemat(tmp_path / "run.mat", nested)
+    table = Table.load(tmp_path / "run.mat")
+    np.testing.assert_allclose(table.column("data.joint.q"), Q)
+    np.testing.assert_allclose(table.column("runs[1].u"), 2 * TAU)
+
+
+def test_parquet_is_read_with_its_times_and_lists(tmp_path):
+    pa = pytest.importorskip("pyarrow")
+    from pyarrow.parquet import write_table
+
+    stamps = pa.array((1e9 * (1.7e9 + TIME)).astype(np.int64), pa.timestamp("ns"))
+    lists = pa.array([[float(q), 0.0] for q in Q])
+    write_table(pa.table({"stamp": stamps, "q": lists, "tau": TAU}), tmp_path / "run.parquet")
+    text = "time: {column: stamp}\ninput: {column: tau}\noutput: {column: 'q[0]'}\n"
+    record = read_record(tmp_path / "run.parquet", Signals.from_text(text))
+    np.testing.assert_allclose(record.output.value, Q)
+    np.testing.assert_allclose(record.output.time, TIME, atol=1e-6)
+
+
+def test_parquet_without_its_library_is_refused_with_what_to_install(tmp_path, monkeypatch):
+    (tmp_path / "run.parquet").write_bytes(b"PAR1")
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    with pytest.raises(InputError, match=r"run\.parquet: reading Parquet needs pyarrow: pip install"):
+        Table.load(tmp_path / "run.parquet")
+
+
+def test_names_that_do_not_belong_to_the_rows_are_refused_with_their_line():
+    with pytest.raises(InputError, match="run.csv: line 2 has 2 columns, the rows have 3"):
+        dialect_of(["# title\n", "t,q\n", "0,1,2\n", "1,2,3\n"], "run.csv")
