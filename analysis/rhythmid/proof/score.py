@@ -115,7 +115,6 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
     kin = _kin_of(clutter, catalogue)
     outcome = _outcome(true, named, families, answer, kin)
     ranked = _ranked(answer)
-    kin = _kin_of(clutter, catalogue)
     slots = {catalogue[name].slot for name in true}
     if len(true) == 1:
         said = {(answer.get("location") or {}).get("slot")}
