@@ -29,6 +29,9 @@ Array = NDArray[np.float64]
 SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
 STEEP = 0.8  # of chi2, below which as many iterations as in a sketch have to bring a descent that goes on
 PROMISING = 0.3  # share of the spread of chi2 within which a model is carried to convergence
+EXPLAINED = (
+    0.5  # share of the ceiling that the best of a round leaves, above which every minimum is gone through
+)
 HOPS = 12  # at most, from one minimum to the next
 WAYS = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minima, that one hop goes
 FAINTER = (0.1, 0.01)  # shares of a guess that led nowhere, tried in its place
@@ -193,9 +196,6 @@ def _fit_proposal(
         back = best.model.with_values({name: proposal.guesses[0][name] for name in flat})
         again = descend(back, run, names, noise, best.starts, BRIEF, None, TOLERANCE)
         best = min(best, again, key=lambda end: end.chi2)
-    hops = _hops(proposal, series) if best.chi2 < proposal.ceiling else {}
-    for name, distance in hops.items():
-        best = _hopped(best, run, names, noise, name, distance)
     return _outcome(best, run, noise)
 
 
@@ -210,13 +210,23 @@ def _carried_on(end: Descent, run: FreeRun, names: tuple[str, ...], noise: Noise
     return end
 
 
-def _hops(proposal: Proposal, series: Sequence[Series]) -> dict[str, float]:
+def _hops(trial: Trial, series: Sequence[Series]) -> dict[str, float]:
     """Parameters of the newest effect that have many minima, and how far these lie apart."""
-    newest = proposal.model.term(proposal.added[-1]) if proposal.added else None
+    newest = trial.model.term(trial.added[-1]) if trial.added else None
     if newest is None or newest.element.hops is None:
         return {}
-    apart = newest.element.hops(scales(series, proposal.model))
+    apart = newest.element.hops(scales(series, trial.model))
     return {f"{newest.label}.{name}": distance for name, distance in apart.items()}
+
+
+def _in_deepest(trial: Trial, series: Sequence[Series], max_step: float) -> _Outcome:
+    """Where a trial ends in the deepest of the minima that its newest effect has, as far as hops from one to the next lead there."""
+    run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
+    names = tuple(trial.model.free)
+    best = descend(trial.model, run, names, trial.noise, trial.starts, 1, None, TOLERANCE, trial.differences)
+    for name, distance in _hops(trial, series).items():
+        best = _hopped(best, run, names, trial.noise, name, distance)
+    return _outcome(best, run, trial.noise)
 
 
 def _hopped(
@@ -317,14 +327,30 @@ def run_trials(
             trials.append(_trial(proposals[index].added, proposals[index].model, result, noise))
     if not trials:
         return [], excluded
-    best = min(trial.chi2 for trial in trials)
-    worst = max(trial.chi2 for trial in trials)
-    open_ones = [
-        t for t in trials if not t.converged and t.chi2 - best <= PROMISING * max(worst - best, t.samples)
+    # many minima are gone through only where that can matter: few descents are as dear
+    ceilings = {proposal.added: proposal.ceiling for proposal in proposals}
+    lowest = min(trial.chi2 for trial in trials)
+    hopping = [
+        i
+        for i, t in enumerate(trials)
+        if _hops(t, series)
+        and t.chi2 < ceilings[t.added]
+        and (lowest > EXPLAINED * ceilings[t.added] or _promising(t, trials))
     ]
+    for place, result in fork_map(lambda i: _in_deepest(trials[i], series, max_step), hopping):
+        if not isinstance(result, Exception):
+            before = trials[hopping[place]]
+            trials[hopping[place]] = _trial(before.added, before.model, result, noise)
+    open_ones = [t for t in trials if not t.converged and _promising(t, trials)]
     finished = under_noise(open_ones, series, noise, max_step, THOROUGH)
     done = {t.added for t in finished}
     return sorted([*finished, *(t for t in trials if t.added not in done)], key=lambda t: t.bic()), excluded
+
+
+def _promising(trial: Trial, trials: Sequence[Trial]) -> bool:
+    """Whether a trial is near the best of all."""
+    best, worst = min(one.chi2 for one in trials), max(one.chi2 for one in trials)
+    return trial.chi2 - best <= PROMISING * max(worst - best, trial.samples)
 
 
 def whole_fit(
