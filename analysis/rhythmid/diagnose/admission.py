@@ -12,6 +12,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.drive import drive_of, driven
 from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
+from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.outlier import without_stray
 from rhythmid.record.quality import clipped_samples
 from rhythmid.record.record import Record
@@ -23,14 +24,15 @@ DECAYS = 0.7  # of the motion's size that a free decay keeps at most from its fi
 
 @dataclass(frozen=True)
 class Admitted:
-    """Records as they are judged, and what there is to say of them."""
+    """Records and held-out records as they are judged, cut where commands are missing; and what there is to say of them."""
 
     records: tuple[Record, ...]
+    holdout: tuple[Record, ...]
     notes: tuple[str, ...]
 
 
 def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model) -> Admitted:
-    """The records and, behind them, the held-out ones, made tidy and driven by what drives the model.
+    """The records and the held-out ones made tidy, driven by what drives the model, and cut where that is missing.
 
     Raises InputError for records that cannot be judged.
     """
@@ -40,14 +42,20 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
     cleaned = [without_clipped(record) for record, _ in tidy]
     given = tuple(driven(record, model) for record, _ in cleaned)
     check_comparable(prepare(given))
+    cut = [cut_at_gaps(record) for record in given]
     notes = dict.fromkeys(
         (
             remark,
             *(note for _, said in (*tidy, *cleaned) for note in said),
             *(drive_of(a, b) for (a, _), b in zip(cleaned, given)),
+            *(note for one in cut for note in one.notes),
         )
     )
-    return Admitted(given, tuple(note for note in notes if note is not None))
+    learnt, unseen = (
+        tuple(stretch for one in part for stretch in one.stretches)
+        for part in (cut[: len(records)], cut[len(records) :])
+    )
+    return Admitted(learnt, unseen, tuple(note for note in notes if note is not None))
 
 
 def without_clipped(record: Record) -> tuple[Record, tuple[str, ...]]:

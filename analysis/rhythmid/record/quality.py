@@ -26,7 +26,7 @@ class ChannelQuality:
     ----------
     source : where it comes from.
     timing : of its samples, as recorded.
-    nan : number of samples that are not finite. A record has none; a report may.
+    nan : samples that are no number (NaN, or an empty field of a table) and count as missing.
     clipped : samples in runs at the largest or smallest value, as a limit leaves them.
     missing : messages that do not carry the channel's entry, such as those of another joint.
     conflicts : duplicates whose values differ.
@@ -54,7 +54,7 @@ class ChannelQuality:
             f"{timing.gaps} gaps, {timing.lost} samples lost, longest {timing.longest_gap:.4g} s": timing.gaps,
             f"{timing.duplicates} duplicates, {self.conflicts} of them with other values": timing.duplicates,
             f"{timing.late} messages out of order": timing.late,
-            f"{self.nan} samples are not finite": self.nan,
+            f"{self.nan} samples are NaN or empty and count as missing": self.nan,
             f"{self.clipped} samples look clipped": self.clipped,
             f"{self.missing} messages without this entry": self.missing,
         }

@@ -20,6 +20,7 @@ from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
 from rhythmid.record.timing import Timing, put_in_order
 from rhythmid.simulation.signal import Hold
 
+MOSTLY = 0.5  # share of samples that are no number, beyond which a channel is useless
 AMBIGUOUS = 0.01  # share of samples that may have the time of another one with another value
 # seconds between the ages at receipt of two channels, from which their stamps hardly share a clock
 CLOCKS_APART = 1.0
@@ -58,8 +59,10 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
     time column of a table keep their own zero. Messages that overtook one another are put back in order, duplicates
     are dropped, and both are counted in the record's quality.
 
+    A sample that is no number (NaN, an empty field of a table) is a missing one, and counted.
+
     Raises InputError, one line, when there is no such recording, a topic or field is missing or empty, a used sample is
-    not finite, time goes backwards, or too little is recorded.
+    infinite, time goes backwards, or too little is recorded.
     """
     if isinstance(signals, (str, Path)):
         signals = Signals.load(signals)
@@ -224,6 +227,9 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         kept = put_in_order(samples.time, label, mend)
         time, value = samples.time[kept], samples.value[kept]
         conflicts = _conflicts(samples, time, value)
+        absent = np.isnan(value)
+        if absent.mean() > MOSTLY:
+            raise InputError(f"{label}: {int(absent.sum())} of {len(value)} samples are NaN or empty")
         if conflicts > AMBIGUOUS * len(samples.time):
             raise InputError(
                 f"{label}: {conflicts} of {len(samples.time)} samples have the time of another one with another value: "
@@ -232,14 +238,14 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         judged[role] = ChannelQuality(
             str(samples.source),
             timing,
-            nan=int(np.count_nonzero(~np.isfinite(samples.value))),
-            clipped=clipped(value),
+            nan=int(absent.sum()),
+            clipped=clipped(value[~absent]),
             missing=samples.missing,
             conflicts=conflicts,
             lateness_mean=None if samples.lateness is None else float(samples.lateness.mean()),
             lateness_max=None if samples.lateness is None else float(samples.lateness.max()),
         )
-        channels[role] = Channel(time, value, samples.source.unit, str(samples.source))
+        channels[role] = Channel(time[~absent], value[~absent], samples.source.unit, str(samples.source))
     notes = (*quality.notes, *_clock_notes(judged))
     return Record(
         name, input_kind=signals.input_kind, output_kind=signals.output_kind, forcing_law=signals.forcing_law,
@@ -262,7 +268,7 @@ def _finish(record: Record, signals: Signals) -> Record:
         if not finite.all():
             raise InputError(
                 f"{signals.channels[role].place}{channel.source}: {np.count_nonzero(~finite)} of {len(channel)} samples "
-                f"are NaN or infinite, the first at {channel.time[np.argmin(finite)]:.6f} s"
+                f"are infinite, the first at {channel.time[np.argmin(finite)]:.6f} s"
             )
     if len(record.output) < SHORTEST:
         raise InputError(
@@ -325,8 +331,10 @@ def _pumping_frequency(record: Record) -> float:
 
 
 def _measured_hold(record: Record) -> Hold:
-    """How a tabulated, measured input continues: band-limited if evenly spaced, else by straight lines."""
+    """How a tabulated, measured input continues: band-limited if evenly spaced but for gaps, else by straight lines."""
     if record.input is None:
         return "zero"
     step = np.diff(record.input.time)
-    return "band_limited" if len(step) > 2 and np.ptp(step) < 2e-9 else "linear"
+    periods = np.rint(step / record.input.period)  # more than one where samples are missing
+    even = len(step) > 2 and np.abs(step - periods * record.input.period).max() < 2e-9 and periods.min() > 0.0
+    return "band_limited" if even else "linear"
