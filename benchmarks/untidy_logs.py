@@ -2,7 +2,7 @@
 
     python benchmarks/untidy_logs.py [--seed N] [--cases N] [--kind NAME …] [--machine NAME …] [--effect NAME …] [--budget S]
 
-A pendulum (200 Hz) and a mass on a spring (500 Hz) are simulated, each with Coulomb friction that the nominal model lacks and with nothing
+A pendulum (200 Hz), a mass on a spring and a lightly damped joint with hardly any noise (500 Hz) are simulated, each with Coulomb friction that the nominal model lacks and with nothing
 concealed, and written as a table of time, command and position. Each kind of fault spoils a copy of the table at random places; the
 table is then read and diagnosed as a user would, by signals.yaml and model.yaml. Printed for each case: the verdict and the names,
 the friction's level where it is stated with its standard deviation, the error on held-out data and the seconds; at the end, for each
@@ -63,6 +63,17 @@ force:
         {"pendulum_gravity.moment": 1.0, "viscous_damper.damping": 0.05},
         {"type": "multisine", "rms": 0.6, "period": 20.0, "periods": 2, "band": [0.1, 2.0]},
         0.09, 200.0, 32.0, 2e-4, ("N*m", "rad"), "",
+    ),
+    "joint": Machine(
+        """
+inertia: {mass: {value: 0.02, unit: kg*m^2, fixed: true}}
+force:
+  - linear_spring: {stiffness: {value: 4.5, unit: N*m/rad}, rest_length: {value: 0.0, unit: rad}}
+  - viscous_damper: {damping: {value: 0.015, unit: N*m*s/rad}}
+""",
+        {"linear_spring.stiffness": 4.0, "viscous_damper.damping": 0.012},
+        {"type": "multisine", "rms": 0.3, "period": 12.0, "periods": 2, "band": [0.2, 8.0]},
+        0.04, 500.0, 20.0, 1e-6, ("N*m", "rad"), ", hold: zero",
     ),
     "mass": Machine(
         """

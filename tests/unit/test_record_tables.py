@@ -138,8 +138,8 @@ def test_the_quality_of_a_table_is_reported(tmp_path):
 
 WRONG = {
     "text in a cell": (text().replace("\n0.0", "\nzero", 1), "run.csv: cannot be read as a table"),
-    "empty cell": (text(rows=[(0, 0, 0), *zip(TIME[1:], U[1:], Y[1:])]).replace("\n0,0,0\n", "\n0,0,\n"), "1 of 200 samples are NaN"),
-    "NaN": (text(rows=[(0, 0, np.nan), *zip(TIME[1:], U[1:], Y[1:])]), "run.csv column y: 1 of 200 samples are NaN"),
+    "mostly NaN": (text(rows=zip(TIME, U, np.where(TIME < TIME[120], np.nan, Y))), "run.csv column y: 120 of 200 samples are NaN"),
+    "infinite": (text(rows=[(0, 0, np.inf), *zip(TIME[1:], U[1:], Y[1:])]), "run.csv column y: 1 of 200 samples are infinite"),
     "time is NaN": (text(rows=[(np.nan, 0, 0), *zip(TIME[1:], U[1:], Y[1:])]), "time is not finite in row 0"),
     "time goes backwards": (text(rows=zip(TIME[::-1], U, Y)), "time goes backwards"),
     "time stands still": (text(rows=zip(0 * TIME, U, Y)), "all 200 samples have the same time"),

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block, Topic
+from rhythmid.record.clocks import clock_notes
 from rhythmid.record.columns import Columns, read_columns
-from rhythmid.record.quality import ChannelQuality, Quality, clipped
+from rhythmid.record.quality import ChannelQuality, Quality, clipped, resolution
 from rhythmid.record.record import SHORTEST, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
 from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
@@ -22,8 +23,6 @@ from rhythmid.simulation.signal import Hold
 
 MOSTLY = 0.5  # share of samples that are no number, beyond which a channel is useless
 AMBIGUOUS = 0.01  # share of samples that may have the time of another one with another value
-# seconds between the ages at receipt of two channels, from which their stamps hardly share a clock
-CLOCKS_APART = 1.0
 RUN_CLOCK = 10.0  # seconds; a clock that reads less at the first sample started with the run
 SAMPLES_PER_CYCLE = 100  # of a forcing that is given by formula
 
@@ -129,10 +128,11 @@ def read_tables(signals: Signals) -> Record:
         table = tables[source.file]
         try:
             value = table.column(source.column)
-            if signals.time.kind == "column":
-                time = table.column(signals.time.column)
+            clock = source.clock(signals.time)
+            if clock.kind == "column":
+                time = table.column(clock.column)
             else:
-                time = np.arange(len(value)) / signals.time.rate
+                time = np.arange(len(value)) / clock.rate
         except InputError as error:
             raise InputError(f"{source.place}{error}") from None
         if len(time) != len(value):
@@ -203,14 +203,16 @@ def _from_columns(
             f"{source.place}no message of {source.topic} in {bag.path} has {source.field.text}: "
             f"{found.reason[source.field]}"
         )
-    if signals.time.kind == "header" and found.stamp_ns is None:
+    stamped = source.clock(signals.time).kind == "header"
+    if stamped and found.stamp_ns is None:
         raise InputError(
-            f"{source.place}{source.topic}: {found.topic.type} has no time stamp; use  time: receive"
+            f"{source.place}{source.topic}: {found.topic.type} has no time stamp; use  time: receive  for this channel, "
+            "within its braces, or for all"
         )
-    stamp_ns = found.stamp_ns if signals.time.kind == "header" else found.log_ns
+    stamp_ns = found.stamp_ns if stamped else found.log_ns
     assert stamp_ns is not None
     kept = ~missing
-    lateness = np.asarray((found.log_ns - stamp_ns)[kept] * 1e-9) if signals.time.kind == "header" else None
+    lateness = np.asarray((found.log_ns - stamp_ns)[kept] * 1e-9) if stamped else None
     value = found.values[source.field][kept] * source.scale + source.offset
     return stamp_ns[kept], Samples(source, np.empty(0), value, lateness, int(missing.sum()))
 
@@ -244,9 +246,13 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
             conflicts=conflicts,
             lateness_mean=None if samples.lateness is None else float(samples.lateness.mean()),
             lateness_max=None if samples.lateness is None else float(samples.lateness.max()),
+            lateness_min=None if samples.lateness is None else float(samples.lateness.min()),
+            lateness_std=None if samples.lateness is None else float(samples.lateness.std()),
+            resolution=resolution(value[~absent]),
         )
         channels[role] = Channel(time[~absent], value[~absent], samples.source.unit, str(samples.source))
-    notes = (*quality.notes, *_clock_notes(judged))
+    clocks = {role: samples.source.clock(signals.time).kind for role, samples in made.items()}
+    notes = (*quality.notes, *clock_notes(judged, clocks))
     return Record(
         name, input_kind=signals.input_kind, output_kind=signals.output_kind, forcing_law=signals.forcing_law,
         quality=replace(quality, channels=judged, notes=notes), parameters=signals.declared(name), **channels,
@@ -306,17 +312,6 @@ def _require_overlap(record: Record) -> None:
                 f"{record.name}: {role} ({channel.time[0]:.6g} to {channel.time[-1]:.6g} s) and output ({first:.6g} to "
                 f"{last:.6g} s) were not recorded at the same time; if their stamps come from two clocks, use  time: receive"
             )
-
-
-def _clock_notes(channels: Mapping[str, ChannelQuality]) -> tuple[str, ...]:
-    """A note if channels are stamped by clocks that cannot be the same."""
-    age = {
-        role: channel.lateness_mean for role, channel in channels.items() if channel.lateness_mean is not None
-    }
-    if not age or max(age.values()) - min(age.values()) < CLOCKS_APART:
-        return ()
-    told = ", ".join(f"{role} {seconds:.6g} s" for role, seconds in age.items())
-    return (f"stamps of different clocks: received after their stamps by {told}; use  time: receive",)
 
 
 def _pumping_frequency(record: Record) -> float:
