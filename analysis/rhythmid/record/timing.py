@@ -11,7 +11,9 @@ GAP = 1.5  # periods between two samples, beyond which at least one is missing
 LATE = 10.0  # periods by which a message may arrive late and still be put back in order
 SAME = 1e-9  # seconds; times that differ by less are one
 OFTEN = 0.1  # share of steps longer than 1.5 periods, beyond which a channel is not periodic
-NEIGHBOURS = 2  # samples on either side, beyond as many as may be missing, over which a long step may be made up by short ones
+NEIGHBOURS = (
+    5  # samples on either side, beyond twice as many as may be missing, whose stamps tell whether any is
+)
 
 Times = NDArray[np.float64]
 
@@ -89,10 +91,11 @@ def gaps_between(time: Times) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     if len(wide) == 0 or len(wide) > OFTEN * len(step):
         return nothing, nothing
     lost = np.maximum(np.rint(step[wide] / period - 1.0).astype(np.int64), 1)
-    behind = np.concatenate([[0.0], np.cumsum(step - period)])
-    first = np.maximum(wide - lost - NEIGHBOURS, 0)
-    last = np.minimum(wide + lost + NEIGHBOURS + 1, len(step))
-    real = behind[last] - behind[first] > 0.5 * period * lost
+    late = time - period * np.arange(len(time))
+    real = np.zeros(len(wide), dtype=bool)
+    for index, (before, count) in enumerate(zip(wide, 2 * lost + NEIGHBOURS, strict=True)):
+        earlier, later = late[max(before + 1 - count, 0) : before + 1], late[before + 1 : before + 1 + count]
+        real[index] = np.median(later) - np.median(earlier) > 0.5 * period * lost[index]
     return wide[real], lost[real]
 
 
