@@ -57,9 +57,10 @@ def cut_at_gaps(record: Record) -> Cut:
     if not stretches:
         return Cut((record,), tuple(notes))  # too often to be cut: what remains is the hold
     kept = sum(one.duration for one in stretches)
+    gaps = _joined(spans)
     notes.append(
-        f"{record.name}: is cut at {len(_joined(spans))} gaps of the command, {sum(b - a for a, b in spans):.3g} s in all; its "
-        f"{len(stretches)} stretches, {kept:.4g} s, have initial states of their own"
+        f"{record.name}: cut where commands are missing ({len(gaps)} times, {sum(b - a for a, b in gaps):.3g} s in all) into "
+        f"stretches with initial states of their own ({len(stretches)}, {kept:.4g} s)"
     )
     return Cut(stretches, tuple(notes))
 
