@@ -14,7 +14,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +87,10 @@ force:
         0.3, 500.0, 20.0, 2e-5, ("N", "m"), ", hold: zero",
     ),
 }  # fmt: skip
+
+MACHINES["joint_fast_commands"] = replace(  # what jitter of arrival excites is far above its noise
+    MACHINES["joint"], excitation=MACHINES["joint"].excitation | {"band": [0.2, 60.0]}
+)
 
 
 def simulated(machine: Machine, friction: float, seed: int, kind: str) -> Table:

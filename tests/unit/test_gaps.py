@@ -22,7 +22,7 @@ seeds = st.integers(0, 10_000)
 def slow(seed):
     """A command of up to 2 Hz."""
     rng = np.random.default_rng(seed)
-    return sum(np.sin(2 * np.pi * f * TIME + rng.uniform(0, 6)) for f in (0.3, 0.9, 1.4, 2.0))
+    return np.sum([np.sin(2 * np.pi * f * TIME + rng.uniform(0, 6)) for f in (0.3, 0.9, 1.4, 2.0)], axis=0)
 
 
 def record(command, kept=None, measured=None, hold="zero"):
