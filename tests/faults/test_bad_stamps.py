@@ -43,7 +43,7 @@ def test_gaps_are_counted_and_marked_as_not_valid(tmp_path):
     timing = record.quality.channels["output"].timing
     assert (timing.gaps, timing.lost, timing.longest_gap) == (2, 21, pytest.approx(0.021))
     uniform = record.uniform()
-    np.testing.assert_array_equal(uniform.valid, kept)
+    assert not uniform.valid[100:120].any() and uniform.valid[kept].all()
     np.testing.assert_array_equal(uniform.output[kept], VALUES[kept])
 
 
@@ -84,3 +84,43 @@ def test_stamps_of_another_clock_are_told_where_receipt_shows_it(tmp_path):
 def test_stamps_that_are_all_zero_are_refused_with_what_to_do(tmp_path):
     with pytest.raises(InputError, match="all 400 samples have the same time, 0 s; use  time: receive"):
         read_record(stamped(tmp_path, 0 * STAMPS, received=STAMPS))
+
+
+OUTPUT = "output: {topic: /hopper/joint_states, field: 'position[0]'}\n"
+
+
+def test_a_channel_may_have_times_of_its_own_and_what_is_assumed_is_told(tmp_path):
+    path = write_bag(
+        tmp_path / "bag",
+        {
+            "/hopper/excitation": Messages(0 * STAMPS, effort=VALUES, receive_ns=STAMPS + 300_000),
+            "/hopper/joint_states": Messages(STAMPS, position=VALUES, receive_ns=STAMPS + 500_000),
+        },
+    )
+    own = tmp_path / "signals.yaml"
+    own.write_text("input: {topic: /hopper/excitation, field: 'effort[0]', time: receive}\n" + OUTPUT)
+    record = read_record(path, own)
+    assert record.input is not None
+    np.testing.assert_allclose(record.input.time, 3e-4 + 1e-9 * STAMPS, atol=1e-12)
+    np.testing.assert_allclose(record.output.time, 1e-9 * STAMPS, atol=1e-12)
+    (note,) = record.quality.notes
+    assert (
+        note.startswith("assumed: input (time of receipt) and output (stamps) share one clock")
+        and "0.5 ms" in note
+    )
+
+
+@pytest.mark.parametrize(
+    ("time", "words"),
+    [
+        ("recieve", "signals.yaml:1: input.time: 'recieve' is none of header, receive"),
+        ("{column: t}", "column and sample_rate are for tables"),
+        ("{rate: 100}", "rate"),
+    ],
+)
+def test_a_wrong_time_of_a_channel_is_told_with_its_place(tmp_path, time, words):
+    own = tmp_path / "signals.yaml"
+    own.write_text(f"input: {{topic: /hopper/excitation, field: 'effort[0]', time: {time}}}\n" + OUTPUT)
+    with pytest.raises(InputError) as told:
+        read_record(stamped(tmp_path, STAMPS), own)
+    assert words in str(told.value) and "\n" not in str(told.value)

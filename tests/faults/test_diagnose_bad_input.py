@@ -134,11 +134,6 @@ def test_right_units_are_not_suspected_although_the_model_is_far_off(plain):
     assert run(plain, wrong).verdict == "consistent"
 
 
-def test_motion_that_nothing_recorded_drives_is_refused(plain):
-    alone = [replace(one, input=None, forcing=None) for one in plain]
-    refused(alone, "no input channel", "does not decay", "signals.yaml")
-
-
 def test_a_missing_input_beside_a_forcing_is_noted(plain):
     found = run([replace(one, input=None) for one in plain])
     assert found.verdict != "consistent"
@@ -240,7 +235,6 @@ def test_a_candidate_that_blows_the_simulation_up_is_reported_as_excluded(plain,
             lambda topics: topics | {"joint_states": still(topics["joint_states"])},
             "never changes; nothing can be learnt",
         ),
-        (lambda topics: {"joint_states": topics["joint_states"]}, "does not decay"),
     ],
 )
 def test_records_that_cannot_be_judged_get_one_line_exit_code_2_and_no_file(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.record.outlier import repeated_samples, stray_samples, without_stray
-from rhythmid.record.quality import resolution
+from rhythmid.record.quality import clipped_samples, resolution
 
 seeds = st.integers(0, 10_000)
 TIME = 1e-3 * np.arange(5000)
@@ -88,3 +88,39 @@ def test_what_is_left_out_is_said_and_peaks_of_an_acceleration_are_kept():
     assert len(kept.output) == len(one.output) - 2
     assert len(notes) == 1 and "2 of" in notes[0] and "t = 0.5151 s" in notes[0]
     assert without_stray(replace(broken, output_kind="acceleration"))[1] == ()
+
+
+@pytest.mark.parametrize("rate", [50.0, 200.0, 1000.0])
+def test_a_machine_that_sticks_and_slips_keeps_all_its_samples(rate):
+    """A mass that a slow spring drags over dry friction: it stands still, to the last digit, and slips within a few samples."""
+    step, pull, place, speed, places = 1e-4, 0.0, 0.0, 0.0, []
+    for _ in range(200_000):
+        pull += 0.02 * step
+        force = 400.0 * (pull - place)
+        if speed == 0.0 and abs(force) < 2.0:
+            pass
+        else:
+            after = speed + step * (force - 1.0)
+            speed, place = (0.0, place) if after <= 0.0 else (after, place + step * after)
+        places.append(place)
+    value = np.array(places)[:: round(1.0 / (rate * step))]
+    assert np.mean(np.diff(value) == 0.0) > 0.1
+    assert not repeated_samples(value).any() and not clipped_samples(value).any()
+
+
+@given(seed=seeds)
+def test_a_grid_that_a_few_samples_miss_is_known(seed):
+    rng = np.random.default_rng(seed)
+    value = motion(rng, 1e-3)
+    rounded = 1e-4 * np.round(value / 1e-4)
+    free = rng.random(len(value)) < 0.025
+    assert resolution(np.where(free, value, rounded)) == pytest.approx(1e-4, rel=1e-3)
+
+
+def test_a_plateau_at_a_stop_is_not_clipping():
+    """A bouncing sine pressed against a stop: it arrives at speed and leaves from rest."""
+    t = TIME[:2000]
+    phase = t % 0.5
+    value = np.minimum(4.0 * phase, 0.5) - np.where(phase > 0.3, 12.0 * (phase - 0.3) ** 2, 0.0)
+    assert np.count_nonzero(value == 0.5) > 400
+    assert not clipped_samples(value).any()

@@ -103,13 +103,16 @@ def test_channels_of_unequal_rates_meet_on_the_grid_of_the_output(seed):
 
 
 @given(seed=seeds, share=st.floats(0.0, 0.09))
-def test_a_value_that_bridges_a_gap_is_marked(seed, share):
+def test_a_value_that_bridges_several_lost_samples_is_marked(seed, share):
     rng = np.random.default_rng(seed)
     kept = rng.random(N) >= share
     kept[[0, -1]] = True
     value = band_limited(GRID, seed)
     uniform = record(output=(GRID[kept], value[kept])).uniform(RATE)
-    np.testing.assert_array_equal(uniform.valid, kept)
+    alone = ~kept & np.roll(kept, 1) & np.roll(kept, -1)
+    assert uniform.valid[kept | alone].all()
+    many = np.convolve(~kept, np.ones(5), mode="same") == 5  # in the middle of at least five
+    assert not uniform.valid[many].any()
     np.testing.assert_array_equal(uniform.output[kept], value[kept])
 
 

@@ -128,6 +128,34 @@ def test_one_table_is_cut_into_a_seen_and_an_unseen_part(tmp_path):
     np.testing.assert_array_equal(np.concatenate([seen.output.value, unseen.output.value]), Y)
 
 
+def test_each_column_of_a_table_may_have_a_time_column_of_its_own(tmp_path):
+    np.savez(tmp_path / "run.npz", t=TIME, u=U, t2=TIME[::2] + 1e-4, y=Y[::2])
+    record = read_record(
+        signals(
+            tmp_path,
+            "run.npz",
+            "input: {file: FILE, column: u, time: {column: t}}\noutput: {file: FILE, column: y, time: {column: t2}}\n",
+        )
+    )
+    assert record.input is not None
+    np.testing.assert_array_equal(record.input.time, TIME)
+    np.testing.assert_array_equal(record.output.time, TIME[::2] + 1e-4)
+
+
+def test_empty_fields_are_missing_samples_and_are_counted(tmp_path):
+    (tmp_path / "run.csv").write_text(text(rows=zip(TIME, U, np.where(np.arange(N) % 50 == 7, np.nan, Y))))
+    record = read_record(signals(tmp_path, "run.csv"))
+    assert record.quality.channels["output"].nan == N // 50
+    np.testing.assert_array_equal(record.output.value, Y[np.arange(N) % 50 != 7])
+    assert any("NaN or empty" in line for line in quality_report(signals(tmp_path, "run.csv")).lines())
+
+
+def test_a_regular_table_with_lost_rows_is_still_band_limited(tmp_path):
+    kept = np.delete(np.arange(N), [50, 51, 90])
+    np.savez(tmp_path / "run.npz", t=TIME[kept], u=U[kept], y=Y[kept])
+    assert read_record(signals(tmp_path, "run.npz")).hold == "band_limited"
+
+
 def test_the_quality_of_a_table_is_reported(tmp_path):
     kept = np.delete(np.arange(N), [50, 51])
     np.savez(tmp_path / "run.npz", t=TIME[kept], u=U[kept], y=Y[kept])
@@ -138,8 +166,8 @@ def test_the_quality_of_a_table_is_reported(tmp_path):
 
 WRONG = {
     "text in a cell": (text().replace("\n0.0", "\nzero", 1), "run.csv: cannot be read as a table"),
-    "empty cell": (text(rows=[(0, 0, 0), *zip(TIME[1:], U[1:], Y[1:])]).replace("\n0,0,0\n", "\n0,0,\n"), "1 of 200 samples are NaN"),
-    "NaN": (text(rows=[(0, 0, np.nan), *zip(TIME[1:], U[1:], Y[1:])]), "run.csv column y: 1 of 200 samples are NaN"),
+    "mostly NaN": (text(rows=zip(TIME, U, np.where(TIME < TIME[120], np.nan, Y))), "run.csv column y: 120 of 200 samples are NaN"),
+    "infinite": (text(rows=[(0, 0, np.inf), *zip(TIME[1:], U[1:], Y[1:])]), "run.csv column y: 1 of 200 samples are infinite"),
     "time is NaN": (text(rows=[(np.nan, 0, 0), *zip(TIME[1:], U[1:], Y[1:])]), "time is not finite in row 0"),
     "time goes backwards": (text(rows=zip(TIME[::-1], U, Y)), "time goes backwards"),
     "time stands still": (text(rows=zip(0 * TIME, U, Y)), "all 200 samples have the same time"),

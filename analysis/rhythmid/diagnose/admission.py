@@ -12,25 +12,27 @@ from rhythmid.errors import InputError
 from rhythmid.identify.drive import drive_of, driven
 from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
+from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.outlier import without_stray
 from rhythmid.record.quality import clipped_samples
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
 MOSTLY = 0.5  # share of clipped samples beyond which a record is useless
-DECAYS = 0.7  # of the motion's size that a free decay keeps at most from its first quarter to its last
+DECAYS = 0.7  # of the motion's size from the first quarter to the last, above which it may be driven
 
 
 @dataclass(frozen=True)
 class Admitted:
-    """Records as they are judged, and what there is to say of them."""
+    """Records and held-out records as they are judged, cut where commands are missing; and what there is to say of them."""
 
     records: tuple[Record, ...]
+    holdout: tuple[Record, ...]
     notes: tuple[str, ...]
 
 
 def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model) -> Admitted:
-    """The records and, behind them, the held-out ones, made tidy and driven by what drives the model.
+    """The records and the held-out ones made tidy, driven by what drives the model, and cut where that is missing.
 
     Raises InputError for records that cannot be judged.
     """
@@ -40,14 +42,20 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
     cleaned = [without_clipped(record) for record, _ in tidy]
     given = tuple(driven(record, model) for record, _ in cleaned)
     check_comparable(prepare(given))
+    cut = [cut_at_gaps(record) for record in given]
     notes = dict.fromkeys(
         (
             remark,
             *(note for _, said in (*tidy, *cleaned) for note in said),
             *(drive_of(a, b) for (a, _), b in zip(cleaned, given)),
+            *(note for one in cut for note in one.notes),
         )
     )
-    return Admitted(given, tuple(note for note in notes if note is not None))
+    learnt, unseen = (
+        tuple(stretch for one in part for stretch in one.stretches)
+        for part in (cut[: len(records)], cut[len(records) :])
+    )
+    return Admitted(learnt, unseen, tuple(note for note in notes if note is not None))
 
 
 def without_clipped(record: Record) -> tuple[Record, tuple[str, ...]]:
@@ -73,7 +81,7 @@ def without_clipped(record: Record) -> tuple[Record, tuple[str, ...]]:
 
 
 def check_driven(records: Sequence[Record], model: Model) -> str | None:
-    """Raise InputError for motion that goes on with nothing recorded that drives it; a remark where only the forcing is known."""
+    """A remark where what drives the machine is not recorded, as far as that shows: a free decay needs nothing that does."""
     if model.term("periodic_forcing") is not None:
         return None
     for record in records:
@@ -81,9 +89,9 @@ def check_driven(records: Sequence[Record], model: Model) -> str | None:
             continue
         quarters = np.array_split(record.output.value - record.output.value.mean(), 4)
         if float(np.std(quarters[-1])) > DECAYS * float(np.std(quarters[0])):
-            raise InputError(
-                f"{record.name}: has no input channel, and the motion does not decay, so something drives it that is not recorded; "
-                f"name its channel under 'input:' (or 'forcing:') in signals.yaml"
+            return (
+                f"{record.name}: has no input channel, and the motion hardly decays: whatever drives it counts as missing physics "
+                "here; name its channel under 'input:' (or 'forcing:') in signals.yaml"
             )
     forced = [record for record in records if record.forcing is not None]
     if forced and all(record.input is None for record in records):

@@ -21,10 +21,9 @@ from rhythmid.diagnose.evidence import (
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, names_of, richer_of
 from rhythmid.diagnose.search.refit import Trial, fine_enough, whole_fit
 from rhythmid.errors import InputError
-from rhythmid.identify.multiple_shooting import record_of
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, start_only
-from rhythmid.identify.series import Series
+from rhythmid.identify.series import Series, record_of
 from rhythmid.identify.start_cost import start_freedom
 from rhythmid.identify.student import autocorrelation_time
 from rhythmid.parallel import fork_map
@@ -75,6 +74,7 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
     hidden = tuple(_long_enough(one, noise, True) for one in series)
     others = tuple(_long_enough(one, noise) for one in unseen)
     names = list(dict.fromkeys(record_of(one) for one in series))
+    other_names = list(dict.fromkeys(record_of(one) for one in unseen))
     lengths: list[tuple[int, int]] = []
     power, total, held_power, held_total = 0.0, 0, 0.0, 0
     for parts, group, first in (
@@ -82,10 +82,10 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
         (hidden, series, len(names)),
         (others, unseen, 2 * len(names)),
     ):
-        for index, (slices, one) in enumerate(zip(parts, group)):
+        listed = other_names if group is unseen else names
+        for slices, one in zip(parts, group):
             count = sum(s.stop - s.start for s in slices)
-            number = first + (index if group is unseen else names.index(record_of(one)))
-            lengths.append((number, count))
+            lengths.append((first + listed.index(record_of(one)), count))
             mask = np.zeros(one.blocks, bool)
             for part in slices:
                 mask[part] = True
@@ -93,7 +93,7 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
             if group is unseen or parts is hidden:
                 held_power, held_total = held_power + one.power(mask), held_total + count
     record = np.concatenate([np.full(count, number, dtype=np.int64) for number, count in lengths])
-    held = np.arange(len(names), 2 * len(names) + len(unseen))
+    held = np.arange(len(names), 2 * len(names) + len(other_names))
     return Rows(
         seen,
         hidden,

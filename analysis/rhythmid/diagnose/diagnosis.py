@@ -12,7 +12,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from rhythmid.diagnose.admission import Admitted, admitted
+from rhythmid.diagnose.admission import admitted
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
@@ -87,14 +87,13 @@ def diagnose(
     model = with_declared(model, (*records, *holdout))
     check_free(model)
     given = admitted(records, holdout, model)
-    count = len(records)
     # the matrices are tall and thin, and workers run side by side: threads inside linear algebra only get in the way
     with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
         known = catalogue or load_catalogue()
-        case = Case(model, given.records[:count], given.records[count:], known, pool, tell, Budget(budget))
+        case = Case(model, given.records, given.holdout, known, pool, tell, Budget(budget))
         effort = applicable(case.records, model)
         made: list[Answer] = []
-        answers = _answers(case, effort, count, given)
+        answers = _answers(case, effort, given.notes)
         while not made or not made[-1].stands:
             try:
                 answer = next(answers, None)
@@ -112,7 +111,7 @@ def diagnose(
         return chosen
 
 
-def _answers(case: Case, effort: Applicability, count: int, given: Admitted) -> Iterator[Answer]:
+def _answers(case: Case, effort: Applicability, notes: Sequence[str]) -> Iterator[Answer]:
     """Answers of all ways to score that apply, the most telling way first; they are worked out as they are asked for.
 
     A free run that follows the machine comes first. Else the recorded effort does where it is at least as large as the
@@ -120,11 +119,11 @@ def _answers(case: Case, effort: Applicability, count: int, given: Admitted) -> 
     """
     driven = effort.applies and effort.effort_share >= 1.0
     if effort.applies and not effort.free_run_means_something:
-        answer = _by_effort(case, effort, given.notes)
+        answer = _by_effort(case, effort, notes)
         yield answer
         if answer.diagnosis.augmented.train_nrmse < LEFT:
             return
-    series = prepare(given.records)
+    series, count = prepare((*case.records, *case.holdout)), len(case.records)
     check_units(case.nominal, series[:count], case.pool)
 
     def by_motion(windows: bool) -> Iterator[Answer]:
@@ -133,7 +132,7 @@ def _answers(case: Case, effort: Applicability, count: int, given: Admitted) -> 
         )
         for scoring in ways:
             result = free_run(case, scoring)
-            diagnosis = compose(case, result, given.notes)
+            diagnosis = compose(case, result, notes)
             yield Answer(diagnosis, causal(without_free_maps(result.search.fit.model)), result)
 
     if not effort.applies or not effort.free_run_means_something:
@@ -146,10 +145,10 @@ def _answers(case: Case, effort: Applicability, count: int, given: Admitted) -> 
     if told:
         return
     if driven:
-        yield _by_effort(case, effort, given.notes)
+        yield _by_effort(case, effort, notes)
     yield from by_motion(windows=True)
     if not driven:
-        yield _by_effort(case, effort, given.notes)
+        yield _by_effort(case, effort, notes)
 
 
 def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST) -> Answer:

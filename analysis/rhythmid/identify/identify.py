@@ -23,6 +23,7 @@ from rhythmid.ltp.harmonic_estimate import HarmonicEstimates
 from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, smoothed
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
+from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.outlier import without_stray
 from rhythmid.record.record import Record
 from rhythmid.simulation.signal import continuous, spline
@@ -184,8 +185,9 @@ def identify(
     if not given:
         raise InputError("nothing to identify from: give at least one record")
     tidy = [without_stray(record) for record in given]
+    cut = [note for record, _ in tidy for note in cut_at_gaps(record).notes]
     found = _identified(tuple(record for record, _ in tidy), model, harmonics, method, forcing, offset, htf)
-    return replace(found, notes=(*(note for _, said in tidy for note in said), *found.notes))
+    return replace(found, notes=(*(note for _, said in tidy for note in said), *cut, *found.notes))
 
 
 def _identified(

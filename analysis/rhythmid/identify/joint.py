@@ -22,6 +22,7 @@ from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
 from rhythmid.identify.series import Series, dominant_frequency, prepare
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
+from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
@@ -254,6 +255,7 @@ def joint_likelihood(
         raise InputError("nothing to identify from: give at least one record")
     model, pumping = prepared_model(with_declared(model, given), given)
     starts = _start(model, given, pumping, longest, cycle)
+    given = _stretches(given)
     best: JointFit | None = None
     for start in starts:
         late = sum(max(start.value(name), 0.0) for name in DELAYS if name in start.parameters)
@@ -287,6 +289,7 @@ def fit_from(
     """The fit that the model's own values lead to, without a search: for values that are known to be near."""
     given = (records,) if isinstance(records, Record) else tuple(records)
     ready, pumping = prepared_model(with_declared(model, given), given)
+    given = _stretches(given)
     late = sum(max(ready.value(name), 0.0) for name in DELAYS if name in ready.parameters)
     series = _series(given, late, block, cycle, pumping)
     return estimate(ready, series, max_step=step_of(series))
@@ -300,6 +303,11 @@ def step_of(series: Sequence[Series]) -> float:
     """
     share = FINE_STEP if any(one.ignored is not None for one in series) else STEP
     return share * min(one.period * one.block for one in series)
+
+
+def _stretches(records: Sequence[Record]) -> tuple[Record, ...]:
+    """The records, cut where commands are missing."""
+    return tuple(stretch for record in records for stretch in cut_at_gaps(record).stretches)
 
 
 def _series(

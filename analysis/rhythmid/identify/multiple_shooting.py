@@ -13,7 +13,7 @@ from scipy.interpolate import PPoly
 
 from rhythmid.identify.descent import first_guess
 from rhythmid.identify.free_run import prepare_run
-from rhythmid.identify.series import Array, Series, dominant_frequency
+from rhythmid.identify.series import Array, Series, dominant_frequency, longest_of_each, record_of
 from rhythmid.model import Model
 from rhythmid.simulation.signal import first_order_hold
 
@@ -45,17 +45,13 @@ def split(series: Series, length: float) -> list[Series]:
         blocks = slice(first // series.block, first // series.block + (window.stop - first) // series.block)
         parts.append(
             replace(
-                series, name=f"{series.name}@{time[0]:.2f}s", time=time, value=series.value[window],
+                series, name=f"{record_of(series)}@{time[0]:.2f}s", record=record_of(series), time=time,
+                value=series.value[window],
                 used=series.used[blocks], ignored=None if series.ignored is None else series.ignored[blocks],
                 command=_around(series.command, time[0], time[-1]), forcing=_around(series.forcing, time[0], time[-1]),
             )
         )  # fmt: skip
     return parts
-
-
-def record_of(series: Series) -> str:
-    """Name of the record that a window was cut from."""
-    return series.name.rpartition("@")[0] or series.name
 
 
 def periods_long(series: Series) -> float:
@@ -76,10 +72,11 @@ def windows(series: Sequence[Series], length: float) -> list[Series]:
 
 
 def forgets(model: Model, series: Sequence[Series]) -> bool:
-    """Whether the effect of a small constant force on the model levels off within every record.
+    """Whether the effect of a small constant force on the model levels off within the longest stretch of every record.
 
     Where it keeps growing the machine integrates or is unstable, and so does the effect of whatever the model leaves out.
     """
+    series = longest_of_each(series)
     run = prepare_run(model, series, disturbed=True)
     for index, (one, start) in enumerate(zip(series, first_guess(model, run))):
         span = one.centres[-1] - one.centres[0]

@@ -36,7 +36,8 @@ class Series:
     what is in neither, like a gap, counts for nothing. `period` [s] is the usual sample period.
     `ignored` (n // block, q) are signals any multiple of which the averages may contain, so that nothing is learnt from
     them (the limit cycle's harmonics, where the cycle is not to be used).
-    `parameters` are values of the model's parameters that the record declares; see `own_model`.
+    `parameters` are values of the model's parameters that the record declares; see `own_model`. `record` is the record that the
+    series is a stretch of, empty for a whole one.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Series:
     ignored: Array | None = None
     hidden: Mask | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
+    record: str = ""
 
     @property
     def blocks(self) -> int:
@@ -205,11 +207,27 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
                 record.input_kind,
                 record.output_kind,
                 parameters=record.parameters,
+                record=record.whole,
             )
         )
     if block is None:
-        block = min(block_length(s.value, s.period) for s in made)
+        block = min(block_length(s.value, s.period) for s in longest_of_each(made))
     return [replace(s, block=block, used=_whole_blocks(s, block)) for s in made]
+
+
+def record_of(series: Series) -> str:
+    """Name of the record that a series is, or is a stretch of."""
+    return series.record or series.name
+
+
+def longest_of_each(series: Sequence[Series]) -> list[Series]:
+    """The longest stretch of each record."""
+    found: dict[str | int, Series] = {}
+    for index, one in enumerate(series):
+        key = one.record or index
+        if key not in found or len(one.time) > len(found[key].time):
+            found[key] = one
+    return list(found.values())
 
 
 def _check(record: Record) -> None:

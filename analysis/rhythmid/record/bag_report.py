@@ -108,7 +108,10 @@ class BagReport:
                 f"jitter {1e6 * timing.jitter_std:.3g} us, {timing.gaps} gaps, {timing.duplicates} duplicates{late}"
             )
         for role, channel in self.channels.items():
-            found.append(f"  {role}: {channel.source}: " + ("; ".join(channel.complaints()) or "flawless"))
+            facts = ", ".join(channel.facts())
+            found.append(
+                f"  {role}: {channel.source}: {facts}: " + ("; ".join(channel.complaints()) or "flawless")
+            )
         found += [f"  note: {note}" for note in self.notes]
         return found
 

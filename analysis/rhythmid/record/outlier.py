@@ -17,7 +17,10 @@ PASSING = 0.25
 NEAR = 101  # samples over which the usual unevenness is taken
 MOST = 0.02  # share of a signal beyond which such samples are no exception and belong to it
 USUAL = 1.4826  # standard deviations in a median absolute deviation
-LEAP = 1.5  # times the step after it, that the step out of repeats is at least: the motion went on meanwhile
+LEAP = 1.5  # times the steps before and after, that the step out of repeats is at least: the motion went on meanwhile
+OFTEN = 0.3  # share of repeats, from which a sensor may be read more often than it measures
+FRESH = 2.5  # new values in a row between repeats, at most, where it is: two at a rate half as high again as its own
+EVEN = 0.8  # share of runs of repeats that are of one length, within one, where it is
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -50,20 +53,33 @@ def stray_samples(value: Array) -> Mask:
 
 
 def repeated_samples(value: Array) -> Mask:
-    """Whether samples (n,) repeat the one before though the motion went on, which shows in a leap after them.
+    """Whether samples (n,) repeat the one before though the motion went on.
 
-    A machine at rest repeats values, too, but does not leap; where values are rounded, repeats say nothing, and what is
-    clipped is another matter.
+    It did where the sensor is read more often than it measures, so that repeats come in even runs, and where they are an exception
+    with a leap after them. A machine that sticks repeats values, too, but starts from rest, and one that does so often sticks and
+    slips; where values are rounded, repeats say nothing, and what is clipped is another matter.
     """
     found = np.zeros(len(value), dtype=bool)
     step = np.diff(value)
     if len(value) < NEAR or not np.any(step == 0.0) or resolution(value) > 0.0:
         return found
     edges = np.diff(np.concatenate([[False], step == 0.0, [False]]).astype(int))
-    for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)):  # of steps of zero
-        if end + 1 < len(step) and abs(step[end]) > LEAP * abs(step[end + 1]):
+    runs = list(zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)))  # of steps of zero
+    lengths = np.array([end - begin for begin, end in runs])
+    share = lengths.sum() / len(step)
+    fresh = (len(step) - lengths.sum()) / len(runs)  # values in a row that are new
+    even = share > OFTEN and fresh < FRESH and np.mean(np.abs(lengths - np.median(lengths)) <= 1) > EVEN
+    for begin, end in runs:
+        if end < len(step) and (even or (share <= MOST and _leaps(step, int(begin), int(end)))):
             found[begin + 1 : end + 1] = True
     return found & ~clipped_samples(value)
+
+
+def _leaps(step: Array, begin: int, end: int) -> bool:
+    """Whether the step `end` after steps of zero from `begin` on is larger than the one before them and the one after it."""
+    if begin == 0 or end + 1 >= len(step):
+        return False
+    return abs(step[end]) > LEAP * max(abs(step[begin - 1]), abs(step[end + 1]))
 
 
 def without_stray(record: Record) -> tuple[Record, tuple[str, ...]]:

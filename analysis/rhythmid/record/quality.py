@@ -13,6 +13,8 @@ from rhythmid.record.timing import Timing
 # of the usual step (rms), from which the steps beside a plateau are those of a machine that goes on: a sine that is cut off at
 # 99 % of its size has 0.2 there, one that comes to rest has none
 MOVING = 0.1
+ROUNDED = 0.97  # share of samples on a grid, from which a channel is rounded: some drivers mix in values of another source
+LEVELS = 8  # values that occur more than once, below which they make no grid
 CLIPPED_RUN = 4  # samples in a row at the extreme value
 HAIR = 1e-7  # of a signal's range, what lies nearer together than this is one value
 CLIPPED_EXCESS = 5  # times as many samples in such runs as at the next value
@@ -26,11 +28,13 @@ class ChannelQuality:
     ----------
     source : where it comes from.
     timing : of its samples, as recorded.
-    nan : number of samples that are not finite. A record has none; a report may.
+    nan : samples that are no number (NaN, or an empty field of a table) and count as missing.
     clipped : samples in runs at the largest or smallest value, as a limit leaves them.
     missing : messages that do not carry the channel's entry, such as those of another joint.
     conflicts : duplicates whose values differ.
-    lateness_mean, lateness_max : receive time minus header stamp [s]; None where there is none.
+    lateness_mean, lateness_max, lateness_min, lateness_std : receive time minus header stamp [s], the last its jitter; None
+        where there is none.
+    resolution : step of the grid that its values are rounded to, in its unit; 0 where they lie on none.
     """
 
     source: str
@@ -41,11 +45,26 @@ class ChannelQuality:
     conflicts: int = 0
     lateness_mean: float | None = None
     lateness_max: float | None = None
+    lateness_min: float | None = None
+    lateness_std: float | None = None
+    resolution: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON, the timing's among them."""
         values = asdict(self)
         return {"source": values.pop("source"), "rate": self.timing.rate, **values.pop("timing"), **values}
+
+    def facts(self) -> list[str]:
+        """Rate, jitter of its times and of its arrival, and rounding, one phrase each."""
+        timing = self.timing
+        found = [f"{timing.rate:.4g} Hz"] if timing.rate > 0.0 else []
+        if timing.jitter_std > 0.0:
+            found.append(f"jitter of its times {timing.jitter_std:.2g} s")
+        if self.lateness_std is not None:
+            found.append(f"jitter of its arrival {self.lateness_std:.2g} s")
+        if self.resolution > 0.0:
+            found.append(f"rounded to {self.resolution:.4g}")
+        return found
 
     def complaints(self) -> list[str]:
         """What deserves mention, one phrase each; empty for a flawless channel."""
@@ -54,7 +73,7 @@ class ChannelQuality:
             f"{timing.gaps} gaps, {timing.lost} samples lost, longest {timing.longest_gap:.4g} s": timing.gaps,
             f"{timing.duplicates} duplicates, {self.conflicts} of them with other values": timing.duplicates,
             f"{timing.late} messages out of order": timing.late,
-            f"{self.nan} samples are not finite": self.nan,
+            f"{self.nan} samples are NaN or empty and count as missing": self.nan,
             f"{self.clipped} samples look clipped": self.clipped,
             f"{self.missing} messages without this entry": self.missing,
         }
@@ -142,15 +161,29 @@ def clipped_samples(value: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def resolution(value: NDArray[np.float64]) -> float:
-    """Step of the grid that values (n,) were rounded to, in their unit; 0 where they lie on none."""
-    steps = np.diff(np.unique(value))
-    steps = steps[steps > HAIR * np.ptp(value)]  # finer ones are the representation of numbers
-    if len(steps) == 0:
+    """Step of the grid that 97 % of the values (n,) at least were rounded to, in their unit; 0 where they lie on none."""
+    levels, count = np.unique(value, return_counts=True)
+    step, on_grid = _grid(levels, np.ptp(value))
+    if step == 0.0 or on_grid.mean() > 0.99:
+        return step
+    common = levels[count > 1]  # a value that was not rounded hardly comes twice
+    if len(common) < LEVELS:
         return 0.0
+    step, on_grid = _grid(common, np.ptp(value))
+    away = (value - common[np.argmax(count[count > 1])]) / max(step, 1e-300)
+    hit = np.abs(away - np.round(away)) < 0.05
+    return step if on_grid.mean() > 0.99 and hit.mean() > ROUNDED else 0.0
+
+
+def _grid(levels: NDArray[np.float64], span: float) -> tuple[float, NDArray[np.bool_]]:
+    """Step of the grid that distinct levels (n,) seem to lie on, 0 without any, and which steps between them are multiples of it."""
+    steps = np.diff(levels)
+    steps = steps[steps > HAIR * span]  # finer ones are the representation of numbers
+    if len(steps) == 0:
+        return 0.0, np.empty(0, dtype=bool)
     step = float(np.median(steps[steps < 1.5 * steps.min()]))
     multiples = steps / step
-    on_grid = np.abs(multiples - np.round(multiples)) < 0.05
-    return step if on_grid.mean() > 0.99 else 0.0
+    return step, np.abs(multiples - np.round(multiples)) < 0.05
 
 
 def _at_limit(value: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -176,13 +209,16 @@ def _at_limit(value: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _moving(value: NDArray[np.float64], runs: list[tuple[int, int]]) -> bool:
-    """Whether a signal (n,) enters and leaves its plateaus at speed, as one does that a sensor cuts off; a machine that comes to
-    rest, at a stop or by friction, slows down and starts from rest."""
+    """Whether a signal (n,) both enters and leaves its plateaus at speed, as one does that a sensor cuts off; a machine that comes
+    to rest by friction slows down, and one that hits a stop starts from rest."""
     step = np.abs(np.diff(value))
-    usual = float(np.sqrt(np.mean(step**2)))
-    ends = []
-    for begin, end in runs:  # the steps outside the ones that the limit itself cuts
-        beside = [*step[max(begin - 2, 0) : max(begin - 1, 0)], *step[end : end + 1]]
-        ends += [min(beside)] if beside else []
+    moves = step[step > 0.0]
+    if len(moves) == 0:
+        return False
+    usual = float(np.sqrt(np.mean(moves**2)))
+    entries = [
+        step[begin - 2] for begin, _ in runs if begin >= 2
+    ]  # outside the step that the limit itself cuts
+    exits = [step[end] for _, end in runs if end < len(step)]
     least = max(MOVING * usual, 1.5 * resolution(value))  # a step of a rounded value may be that of a creep
-    return bool(ends) and float(np.median(ends)) > least
+    return all(ends and float(np.median(ends)) > least for ends in (entries, exits))

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block, Topic
+from rhythmid.record.clocks import clock_notes
 from rhythmid.record.columns import Columns, read_columns
-from rhythmid.record.quality import ChannelQuality, Quality, clipped
+from rhythmid.record.quality import ChannelQuality, Quality, clipped, resolution
 from rhythmid.record.record import SHORTEST, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
 from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
@@ -21,9 +22,8 @@ from rhythmid.record.timing import Timing, put_in_order
 from rhythmid.record.unit_notes import unit_notes
 from rhythmid.simulation.signal import Hold
 
+MOSTLY = 0.5  # share of samples that are no number, beyond which a channel is useless
 AMBIGUOUS = 0.01  # share of samples that may have the time of another one with another value
-# seconds between the ages at receipt of two channels, from which their stamps hardly share a clock
-CLOCKS_APART = 1.0
 RUN_CLOCK = 10.0  # seconds; a clock that reads less at the first sample started with the run
 CALENDAR = (
     1e8  # seconds, three years: a clock that reads more counts from 1970, not from the start of a machine
@@ -62,8 +62,10 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
     time column of a table, unless it counts from 1970, keep their own zero. Messages that overtook one another are put back in order, duplicates
     are dropped, and both are counted in the record's quality.
 
+    A sample that is no number (NaN, an empty field of a table) is a missing one, and counted.
+
     Raises InputError, one line, when there is no such recording, a topic or field is missing or empty, a used sample is
-    not finite, time goes backwards, or too little is recorded.
+    infinite, time goes backwards, or too little is recorded.
     """
     if isinstance(signals, (str, Path)):
         signals = Signals.load(signals)
@@ -130,10 +132,11 @@ def read_tables(signals: Signals) -> Record:
         table = tables[source.file]
         try:
             value = table.column(source.column)
-            if signals.time.kind == "column":
-                time = table.column(signals.time.column) * signals.time.scale
+            clock = source.clock(signals.time)
+            if clock.kind == "column":
+                time = table.column(clock.column) * clock.scale
             else:
-                time = np.arange(len(value)) / signals.time.rate
+                time = np.arange(len(value)) / clock.rate
         except InputError as error:
             raise InputError(f"{source.place}{error}") from None
         if len(time) != len(value):
@@ -213,14 +216,16 @@ def _from_columns(
             f"{source.place}no message of {source.topic} in {bag.path} has {source.field.text}: "
             f"{found.reason[source.field]}"
         )
-    if signals.time.kind == "header" and found.stamp_ns is None:
+    stamped = source.clock(signals.time).kind == "header"
+    if stamped and found.stamp_ns is None:
         raise InputError(
-            f"{source.place}{source.topic}: {found.topic.type} has no time stamp; use  time: receive"
+            f"{source.place}{source.topic}: {found.topic.type} has no time stamp; use  time: receive  for this channel, "
+            "within its braces, or for all"
         )
-    stamp_ns = found.stamp_ns if signals.time.kind == "header" else found.log_ns
+    stamp_ns = found.stamp_ns if stamped else found.log_ns
     assert stamp_ns is not None
     kept = ~missing
-    lateness = np.asarray((found.log_ns - stamp_ns)[kept] * 1e-9) if signals.time.kind == "header" else None
+    lateness = np.asarray((found.log_ns - stamp_ns)[kept] * 1e-9) if stamped else None
     value = found.values[source.field][kept] * source.scale + source.offset
     return stamp_ns[kept], Samples(source, np.empty(0), value, lateness, int(missing.sum()))
 
@@ -237,6 +242,9 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         kept = put_in_order(samples.time, label, mend)
         time, value = samples.time[kept], samples.value[kept]
         conflicts = _conflicts(samples, time, value)
+        absent = np.isnan(value)
+        if absent.mean() > MOSTLY:
+            raise InputError(f"{label}: {int(absent.sum())} of {len(value)} samples are NaN or empty")
         if conflicts > AMBIGUOUS * len(samples.time):
             raise InputError(
                 f"{label}: {conflicts} of {len(samples.time)} samples have the time of another one with another value: "
@@ -245,15 +253,19 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         judged[role] = ChannelQuality(
             str(samples.source),
             timing,
-            nan=int(np.count_nonzero(~np.isfinite(samples.value))),
-            clipped=clipped(value),
+            nan=int(absent.sum()),
+            clipped=clipped(value[~absent]),
             missing=samples.missing,
             conflicts=conflicts,
             lateness_mean=None if samples.lateness is None else float(samples.lateness.mean()),
             lateness_max=None if samples.lateness is None else float(samples.lateness.max()),
+            lateness_min=None if samples.lateness is None else float(samples.lateness.min()),
+            lateness_std=None if samples.lateness is None else float(samples.lateness.std()),
+            resolution=resolution(value[~absent]),
         )
-        channels[role] = Channel(time, value, samples.source.unit, str(samples.source))
-    notes = (*quality.notes, *_clock_notes(judged))
+        channels[role] = Channel(time[~absent], value[~absent], samples.source.unit, str(samples.source))
+    clocks = {role: samples.source.clock(signals.time).kind for role, samples in made.items()}
+    notes = (*quality.notes, *clock_notes(judged, clocks))
     return Record(
         name, input_kind=signals.input_kind, output_kind=signals.output_kind, forcing_law=signals.forcing_law,
         quality=replace(quality, channels=judged, notes=notes), parameters=signals.declared(name), **channels,
@@ -275,7 +287,7 @@ def _finish(record: Record, signals: Signals) -> Record:
         if not finite.all():
             raise InputError(
                 f"{signals.channels[role].place}{channel.source}: {np.count_nonzero(~finite)} of {len(channel)} samples "
-                f"are NaN or infinite, the first at {channel.time[np.argmin(finite)]:.6f} s"
+                f"are infinite, the first at {channel.time[np.argmin(finite)]:.6f} s"
             )
     if len(record.output) < SHORTEST:
         raise InputError(
@@ -315,17 +327,6 @@ def _require_overlap(record: Record) -> None:
             )
 
 
-def _clock_notes(channels: Mapping[str, ChannelQuality]) -> tuple[str, ...]:
-    """A note if channels are stamped by clocks that cannot be the same."""
-    age = {
-        role: channel.lateness_mean for role, channel in channels.items() if channel.lateness_mean is not None
-    }
-    if not age or max(age.values()) - min(age.values()) < CLOCKS_APART:
-        return ()
-    told = ", ".join(f"{role} {seconds:.6g} s" for role, seconds in age.items())
-    return (f"stamps of different clocks: received after their stamps by {told}; use  time: receive",)
-
-
 def _pumping_frequency(record: Record) -> float:
     """Frequency of the forcing [Hz] as far as formula or description tell, else 0."""
     law = record.forcing_law
@@ -338,8 +339,10 @@ def _pumping_frequency(record: Record) -> float:
 
 
 def _measured_hold(record: Record) -> Hold:
-    """How a tabulated, measured input continues: band-limited if evenly spaced, else by straight lines."""
+    """How a tabulated, measured input continues: band-limited if evenly spaced but for gaps, else by straight lines."""
     if record.input is None:
         return "zero"
     step = np.diff(record.input.time)
-    return "band_limited" if len(step) > 2 and np.ptp(step) < 2e-9 else "linear"
+    periods = np.rint(step / record.input.period)  # more than one where samples are missing
+    even = len(step) > 2 and np.abs(step - periods * record.input.period).max() < 2e-9 and periods.min() > 0.0
+    return "band_limited" if even else "linear"

@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rhythmid.errors import InputError
+from rhythmid.record.interpolation import interpolation_errors
 from rhythmid.record.quality import Quality
 from rhythmid.record.signals import ROLES, InputKind, OutputKind, Sinusoid
-from rhythmid.record.timing import GAP, SAME, nominal_period
+from rhythmid.record.timing import SAME, gaps_between, nominal_period
 from rhythmid.simulation.signal import Hold, continuous
 
 Array = NDArray[np.float64]
 SHORTEST = 8  # samples that a record must have in common
-OFTEN = 0.1  # share of steps longer than 1.5 periods, beyond which a channel is not periodic
+AS_GOOD = 3.0  # times the error of a cubic over one missing sample, up to which one over more is as good
 NEAR = 0.1  # periods; samples that follow another sooner are left out of an interpolation
 
 
@@ -84,6 +85,7 @@ class Record:
     forcing_law : the forcing's formula, if that is how it is known; `forcing` then holds samples of it.
     run : the description of the experiment that the recording itself carries.
     parameters : what parameters of the model, by "element.parameter", were in this record, where that is declared.
+    whole : name of the record that this one is a stretch of; empty for a whole one.
     """
 
     name: str
@@ -101,6 +103,7 @@ class Record:
     run: Mapping[str, Any] | None = None
     output_kind: OutputKind = "position"
     parameters: Mapping[str, float] = field(default_factory=dict)
+    whole: str = ""
 
     @property
     def channels(self) -> dict[str, Channel]:
@@ -162,18 +165,17 @@ class Record:
         if self.forcing_law is not None:
             values["forcing"] = self.forcing_law(grid)
         valid = np.ones(len(grid), dtype=bool)
-        for channel in channels.values():
-            valid &= ~_within_gap(channel, grid)
+        for role, channel in channels.items():
+            valid &= ~_within_gap(channel, grid, _held(role, self.hold))
         return Uniform(grid, values.pop("output"), period, valid, **values)
 
     def _last(self, role: str, channel: Channel) -> float:
         """Until when the channel has a value: a held one keeps its last for one more period, a lone one for ever."""
-        held = (role == "input" and self.hold == "zero") or role == "reference"
-        return channel.time[-1] + (channel.period if held else 0.0)
+        return channel.time[-1] + (channel.period if _held(role, self.hold) else 0.0)
 
     def _resample(self, role: str, channel: Channel, grid: Array) -> Array:
         time, value = channel.time, channel.value
-        if (role == "input" and self.hold == "zero") or role == "reference":
+        if _held(role, self.hold):
             return value[np.searchsorted(time, grid + SAME, side="right") - 1]
         nearest = np.clip(np.searchsorted(time, grid - SAME), 0, len(time) - 1)
         hit = np.abs(time[nearest] - grid) <= SAME
@@ -195,19 +197,30 @@ class Record:
         return result
 
 
+def _held(role: str, hold: Hold) -> bool:
+    """Whether a channel keeps each value until the next one."""
+    return (role == "input" and hold == "zero") or role == "reference"
+
+
 def _on_grid(time: Array, anchor: float, period: float) -> NDArray[np.bool_]:
     return np.abs(time - anchor - np.rint((time - anchor) / period) * period) <= SAME
 
 
-def _within_gap(channel: Channel, grid: Array) -> NDArray[np.bool_]:
-    """Whether grid times lie strictly between two samples of the channel that are more than 1.5 periods apart.
+def _within_gap(channel: Channel, grid: Array, held: bool) -> NDArray[np.bool_]:
+    """Whether grid times lie strictly within a gap of the channel that its neighbours do not tell.
 
-    A channel in which that is common, such as a command that is sent when it changes, has no gaps.
+    They do where a cubic through them is nearly as good as the samples themselves, and where a `held` value is the same
+    before and after.
     """
-    time = channel.time
-    wide = np.diff(time, prepend=-np.inf, append=np.inf) > GAP * channel.period
-    if wide[1:-1].mean() > OFTEN if len(time) > 1 else True:
-        return np.zeros(len(grid), dtype=bool)
-    after = np.searchsorted(time, grid - SAME)
-    hit = np.abs(time[np.minimum(after, len(time) - 1)] - grid) <= SAME
-    return wide[after] & ~hit & (after > 0) & (after < len(time))
+    found = np.zeros(len(grid), dtype=bool)
+    first, lost = gaps_between(channel.time)
+    if held:
+        changed = channel.value[first] != channel.value[first + 1]
+        first, lost = first[changed], lost[changed]
+    if len(first) == 0:
+        return found
+    errors = interpolation_errors(channel.value, int(lost.max()))
+    for at, count in zip(first, lost, strict=True):
+        if errors[count] > AS_GOOD * errors[1]:
+            found |= (grid > channel.time[at] + SAME) & (grid < channel.time[at + 1] - SAME)
+    return found

@@ -10,7 +10,8 @@
     parameters: {position_control.proportional: 12.5}      # what the model's parameters were in this record
 
 A channel is a field of a topic, or a `column` of a `file` (.mat, .csv, .npz; relative to signals.yaml; `tables: {file: …}`
-names one file for all; without either it is a column of the table that is read). Its value is `scale` * recorded + `offset`, in `unit`. `input: none` says that nothing but the
+names one file for all; without either it is a column of the table that is read). `time:` may be given for a channel, too, as for
+commands whose messages bear no stamp: `input: {topic: /command, field: data, time: receive}`. Its value is `scale` * recorded + `offset`, in `unit`. `input: none` says that nothing but the
 forcing, if that, drives the machine. `forcing: {amplitude: 1.0, frequency: 1.0, phase: 0.0}` states
 amplitude * cos(2π frequency t + phase) in the record's time. A parameter of the model that differs from record to record, such
 as a controller's gain, is declared by its value, or where one file is for several records, by record:
@@ -68,7 +69,10 @@ class Sinusoid:
 
 @dataclass(frozen=True)
 class Source:
-    """Where one channel comes from: `field` of `topic`, or `column` of `file`, None for the table that is read."""
+    """Where one channel comes from: `field` of `topic`, or `column` of `file`, None for the table that is read.
+
+    `time` is where its times come from, None where that is as for the whole record.
+    """
 
     unit: str
     topic: str = ""
@@ -77,7 +81,12 @@ class Source:
     column: str | int = ""
     scale: float = 1.0
     offset: float = 0.0
+    time: Clock | None = None
     place: str = ""  # "signals.yaml:3: input: ", to begin a complaint with
+
+    def clock(self, usual: Clock) -> Clock:
+        """Where its times come from, `usual` where it has no clock of its own."""
+        return self.time or usual
 
     def __str__(self) -> str:
         if self.topic:
@@ -206,7 +215,10 @@ def _signals(document: Node, path: Path) -> Signals:
         use = ends[0], ends[1]
     else:
         use = -math.inf, math.inf
-    clock = _clock(keys.get("time"), document, not output.topic)
+    if "time" not in keys and all(source.time is not None for source in channels.values()):
+        clock = Clock()
+    else:
+        clock = _clock(keys.get("time"), document, not output.topic)
     parameters = _parameters(keys["parameters"]) if "parameters" in keys else {}
     return Signals(channels, clock, law, kind, measured, hold, use, path=path, parameters=parameters)
 
@@ -232,7 +244,7 @@ def _default_file(node: Node | None, folder: Path) -> Path | None:
 
 
 def _source(node: Node, role: str, unit: str, folder: Path, default_file: Path | None) -> Source:
-    known = ["topic", "field", "file", "column", "unit", "scale", "offset"]
+    known = ["topic", "field", "file", "column", "time", "unit", "scale", "offset"]
     more = {"input": ["kind", "hold"], "output": ["kind"]}.get(role, [])
     keys = node.mapping([*known, *more])
     if "unit" in keys:
@@ -245,6 +257,7 @@ def _source(node: Node, role: str, unit: str, folder: Path, default_file: Path |
     if scale == 0.0 or not math.isfinite(scale) or not math.isfinite(offset):
         node.fail("scale must be finite and other than 0, offset finite")
     place = f"{node.place}: {role}: "
+    clock = _clock(keys["time"], node, "topic" not in keys) if "time" in keys else None
     if "topic" in keys:
         if "file" in keys or "column" in keys:
             node.fail("give either topic and field, or file and column")
@@ -255,13 +268,16 @@ def _source(node: Node, role: str, unit: str, folder: Path, default_file: Path |
             wanted = Field.parse(str(keys["field"].value))
         except InputError as error:
             keys["field"].fail(str(error))
-        return Source(unit, "/" + topic.lstrip("/"), wanted, scale=scale, offset=offset, place=place)
+        return Source(
+            unit, "/" + topic.lstrip("/"), wanted, scale=scale, offset=offset, time=clock, place=place
+        )
     if "field" in keys:
         node.fail("'topic:' is missing: whose field is it?")
     if "column" not in keys:
         node.fail("give topic and field (of a bag) or file and column (of a .mat, .csv or .npz table)")
     file = folder / keys["file"].text() if "file" in keys else default_file
-    return Source(unit, file=file, column=_column(keys["column"]), scale=scale, offset=offset, place=place)
+    column = _column(keys["column"])
+    return Source(unit, file=file, column=column, scale=scale, offset=offset, time=clock, place=place)
 
 
 def _column(node: Node) -> str | int:

@@ -10,6 +10,10 @@ from rhythmid.errors import InputError
 GAP = 1.5  # periods between two samples, beyond which at least one is missing
 LATE = 10.0  # periods by which a message may arrive late and still be put back in order
 SAME = 1e-9  # seconds; times that differ by less are one
+OFTEN = 0.1  # share of steps longer than 1.5 periods, beyond which a channel is not periodic
+NEIGHBOURS = (
+    5  # samples on either side, beyond twice as many as may be missing, whose stamps tell whether any is
+)
 
 Times = NDArray[np.float64]
 
@@ -70,6 +74,29 @@ class Timing:
             round(float(np.sqrt(np.mean((regular - period) ** 2))), 10) if len(regular) else 0.0,
             int(gap.sum()), missing, float(step[gap].max()) if gap.any() else 0.0, duplicates, late,
         )  # fmt: skip
+
+
+def gaps_between(time: Times) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Gaps in increasing times (n,): of each the sample before it, and how many samples are missing; (g,) and (g,).
+
+    A step of more than 1.5 periods that the steps around it make up for is jitter of the stamps, and none. A channel in
+    which long steps are common, such as a command that is sent when it changes, has no gaps.
+    """
+    step = np.diff(time)
+    nothing = np.empty(0, dtype=np.int64)
+    if len(step) < 2:
+        return nothing, nothing
+    period = nominal_period(step)
+    wide = np.flatnonzero(step > GAP * period)
+    if len(wide) == 0 or len(wide) > OFTEN * len(step):
+        return nothing, nothing
+    lost = np.maximum(np.rint(step[wide] / period - 1.0).astype(np.int64), 1)
+    late = time - period * np.arange(len(time))
+    real = np.zeros(len(wide), dtype=bool)
+    for index, (before, count) in enumerate(zip(wide, 2 * lost + NEIGHBOURS, strict=True)):
+        earlier, later = late[max(before + 1 - count, 0) : before + 1], late[before + 1 : before + 1 + count]
+        real[index] = np.median(later) - np.median(earlier) > 0.5 * period * lost[index]
+    return wide[real], lost[real]
 
 
 def nominal_period(step: Times) -> float:

@@ -40,6 +40,34 @@ def spline(time: Array, value: Array) -> PPoly:
 def band_limited(time: Array, value: Array, oversampling: int = 4) -> PPoly:
     """Reconstruct a uniformly sampled band-limited signal (anti-alias filtered measurement); n >= 4.
 
+    Where samples are missing, the stretches on either side are reconstructed each by itself and joined by a straight line.
+    """
+    step = np.diff(time)
+    broken = np.flatnonzero(step > 1.5 * float(np.median(step)))
+    if len(broken) == 0:
+        return _band_limited(time, value, oversampling)
+    knots: list[Array] = []
+    coefficients: list[Array] = []
+    for first, end in zip([0, *(broken + 1)], [*(broken + 1), len(time)], strict=True):
+        if end - first >= 4:
+            part = _band_limited(time[first:end], value[first:end], oversampling)
+        elif end - first >= 2:
+            part = first_order_hold(time[first:end], value[first:end])
+        else:
+            part = None
+        if part is not None:
+            knots.append(part.x[:-1])
+            coefficients.append(np.vstack([np.zeros((4 - len(part.c), part.c.shape[1])), part.c]))
+        if end < len(time):
+            slope = (value[end] - value[end - 1]) / (time[end] - time[end - 1])
+            knots.append(time[end - 1 : end])
+            coefficients.append(np.array([[0.0], [0.0], [slope], [value[end - 1]]]))
+    return PPoly(np.hstack(coefficients), np.append(np.concatenate(knots), time[-1]), extrapolate=True)
+
+
+def _band_limited(time: Array, value: Array, oversampling: int) -> PPoly:
+    """Reconstruct evenly spaced samples.
+
     The samples are mirrored oddly at both ends, so that the periodic continuation has no jump, interpolated with the
     discrete Fourier transform on an `oversampling` times finer grid together with the derivative, and joined by cubic
     Hermite pieces.

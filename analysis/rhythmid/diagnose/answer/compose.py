@@ -79,7 +79,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     )
     fit = found.fit
     if case.holdout:
-        held = f"held out: {', '.join(record.name for record in case.holdout)}"
+        held = f"held out: {', '.join(dict.fromkeys(record.whole or record.name for record in case.holdout))}"
     else:
         held = (
             f"held out: the last fifth of every {'record' if result.scoring.kind == 'free_run' else 'window'}"

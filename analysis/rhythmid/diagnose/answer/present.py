@@ -27,10 +27,9 @@ from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.forward import LEVEL, Search
 from rhythmid.elements.element import Element
 from rhythmid.errors import InputError
-from rhythmid.identify.multiple_shooting import record_of
 from rhythmid.identify.output_error import Fit, noise_of
 from rhythmid.identify.repeats import noise_from_repeats
-from rhythmid.identify.series import Series, bandwidth
+from rhythmid.identify.series import Series, bandwidth, record_of
 from rhythmid.ltp.htf import theoretical_htf
 from rhythmid.ltp.pumping import Pumping, active_pumping
 from rhythmid.model import Model

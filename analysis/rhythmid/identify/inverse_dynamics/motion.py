@@ -88,7 +88,10 @@ def stretches(records: Sequence[Record], model: Model) -> list[Stretch]:
     Raises InputError where a record has neither effort nor a moving base, or is too short.
     """
     found: list[Stretch] = []
-    for number, record in enumerate(records):
+    number, before = -1, ""
+    for record in records:
+        number += not record.whole or record.whole != before  # stretches of one record have one number
+        before = record.whole
         base = record.input is not None and record.input_kind in BASES
         effort = effort_channel(record, model)
         if effort is None and not base:

@@ -1,0 +1,141 @@
+"""Gaps: where a channel lacks samples, which of them its neighbours tell, and a record cut where they do not.
+
+A measurement that is missing is not compared, nothing else happens. A command that is missing acted all the same: where its
+neighbours do not tell what it was, the record is cut, and goes on with an initial state of its own.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.record.interpolation import cubic, interpolation_errors
+from rhythmid.record.record import Channel, Record
+from rhythmid.record.timing import gaps_between
+
+Array = NDArray[np.float64]
+PAST = 0.05  # s of a command that are known before the first measurement behind a gap: it may act so late
+LEAST = 32  # measurements of a stretch, below which its initial state takes all that it tells
+EXACT = (
+    1e-4  # of the motion, below which an error of the command counts for nothing however small the noise is
+)
+
+
+@dataclass(frozen=True)
+class Cut:
+    """The stretches of a record between the gaps of its commands, and what there is to say of them."""
+
+    stretches: tuple[Record, ...]
+    notes: tuple[str, ...]
+
+
+def cut_at_gaps(record: Record) -> Cut:
+    """The record with short gaps of its commands filled in, cut at the long ones.
+
+    A gap is short where a cubic through its neighbours tells the command so well that the error moves the machine by less
+    than the noise of the measurement; how well it does is seen where no sample is missing. A held command that is the same
+    before and after is not missing. The stretches bear the name of the record with the time at which they begin.
+    """
+    notes: list[str] = []
+    spans: list[tuple[float, float]] = []
+    for role in ("input", "forcing"):
+        channel: Channel | None = getattr(record, role)
+        if channel is None or len(channel) < 8 or (role == "forcing" and record.forcing_law is not None):
+            continue
+        held = role == "input" and record.hold == "zero"
+        filled, count, open_ = _bridged(channel, record.output, held)
+        spans += open_
+        if count:
+            record = replace(record, **{role: filled})
+            notes.append(
+                f"{record.name}: {count} lost samples of the {role} are interpolated between their neighbours"
+            )
+    if not spans:
+        return Cut((record,), tuple(notes))
+    stretches = tuple(_between(record, _joined(spans)))
+    if not stretches:
+        return Cut((record,), tuple(notes))  # too often to be cut: what remains is the hold
+    kept = sum(one.duration for one in stretches)
+    gaps = _joined(spans)
+    notes.append(
+        f"{record.name}: cut where commands are missing ({len(gaps)} times, {sum(b - a for a, b in gaps):.3g} s in all) into "
+        f"stretches with initial states of their own ({len(stretches)}, {kept:.4g} s)"
+    )
+    return Cut(stretches, tuple(notes))
+
+
+def _bridged(channel: Channel, output: Channel, held: bool) -> tuple[Channel, int, list[tuple[float, float]]]:
+    """The channel with its short gaps filled, the number of samples filled in, and the long gaps, from and until [s]."""
+    time, value = channel.time, channel.value
+    first, lost = gaps_between(time)
+    if held:
+        changed = value[first] != value[first + 1]
+        first, lost = first[changed], lost[changed]
+    if len(first) == 0:
+        return channel, 0, []
+    tolerable = _tolerable(output)
+    spread = max(float(np.std(value)), 1e-300)
+    errors = interpolation_errors(value, int(lost.max()))
+    told = np.array([errors[n] / spread * n * channel.period < tolerable for n in lost])
+    stamps, values = [time], [value]
+    for at, count in zip(first[told], lost[told]):
+        between = time[at] + (time[at + 1] - time[at]) * np.arange(1, count + 1) / (count + 1)
+        near = slice(max(at - 1, 0), at + 3)
+        stamps.append(between)
+        values.append(cubic(time[near], value[near], between))
+    open_ = [(float(time[at]), float(time[at + 1])) for at in first[~told]]
+    every = np.concatenate(stamps)
+    order = np.argsort(every, kind="stable")
+    filled = replace(channel, time=every[order], value=np.concatenate(values)[order])
+    return filled, int(lost[told].sum()), open_
+
+
+def _tolerable(output: Channel) -> float:
+    """Error of a command, as a share of its size times its duration [s], that moves the machine by less than the noise.
+
+    An impulse J changes the speed by J/m. A command of size U moves a mass at the speed w of its motion by about U/(m w²), so
+    that the share e of U during T moves it by the share e w T.
+    """
+    value, span = output.value - output.value.mean(), output.time[-1] - output.time[0]
+    size = float(np.std(value))
+    speed = float(np.sqrt(np.sum(np.diff(value) ** 2 / np.diff(output.time)) / span))
+    if speed == 0.0 or size == 0.0:
+        return 0.0
+    return max(interpolation_errors(value, 1)[1] / size, EXACT) * size / speed
+
+
+def _joined(spans: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Spans that overlap made one, in order."""
+    found: list[tuple[float, float]] = []
+    for begin, end in sorted(spans):
+        if found and begin <= found[-1][1]:
+            found[-1] = found[-1][0], max(end, found[-1][1])
+        else:
+            found.append((begin, end))
+    return found
+
+
+def _between(record: Record, spans: list[tuple[float, float]]) -> Iterable[Record]:
+    """The stretches of a record between these spans that are long enough."""
+    time = record.output.time
+    begins = [-np.inf, *(end for _, end in spans)]
+    ends = [*(begin for begin, _ in spans), np.inf]
+    for begin, end in zip(begins, ends, strict=True):
+        past = min(PAST, 0.25 * (min(end, time[-1]) - begin)) if np.isfinite(begin) else 0.0
+        inside = (time >= begin + past) & (time <= end)
+        if np.count_nonzero(inside) < LEAST:
+            continue
+        parts = {role: _part(channel, begin, end) for role, channel in record.channels.items()}
+        parts["output"] = replace(
+            record.output, time=record.output.time[inside], value=record.output.value[inside]
+        )
+        if any(len(channel) == 0 for channel in parts.values()):
+            continue
+        name = f"{record.name}@{parts['output'].time[0]:.2f}s"
+        yield replace(record, name=name, whole=record.whole or record.name, **parts)
+
+
+def _part(channel: Channel, begin: float, end: float) -> Channel:
+    inside = (channel.time >= begin) & (channel.time <= end)
+    return replace(channel, time=channel.time[inside], value=channel.value[inside])

@@ -1,0 +1,43 @@
+"""What the neighbours of missing samples tell of them: a cubic through four, and how well it does."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def interpolation_errors(value: Array, longest: int) -> Array:
+    """rms error (longest + 1,) of a cubic through two samples on either side of 0, 1, … missing ones, at their middle.
+
+    Seen on the samples (n,) that there are; infinite where they are too few. Of white noise it is about the noise itself.
+    """
+    found = np.full(longest + 1, np.inf)
+    found[0] = 0.0
+    for count in range(1, longest + 1):
+        reach = count + 3  # from the first to the last of the four
+        if len(value) < 4 * reach:
+            break
+        middle = 1 + (count + 1) // 2
+        nodes = np.array([0.0, 1.0, count + 2.0, count + 3.0])
+        weights = _lagrange(nodes, float(middle))
+        told = sum(
+            w * value[int(k) : len(value) - reach + int(k)] for w, k in zip(weights, nodes, strict=True)
+        )
+        error = value[middle : len(value) - reach + middle] - told
+        found[count] = float(np.sqrt(np.mean(error**2)))
+        if found[count] > np.std(value):
+            break  # longer ones are worse
+    return found
+
+
+def _lagrange(nodes: Array, at: float) -> Array:
+    """Weights (n,) of the values at the nodes in the polynomial through them, at one place."""
+    apart = at - nodes
+    return np.array(
+        [np.prod(np.delete(apart, k)) / np.prod(nodes[k] - np.delete(nodes, k)) for k in range(len(nodes))]
+    )
+
+
+def cubic(time: Array, value: Array, at: Array) -> Array:
+    """The polynomial through at most four samples, at times (n,)."""
+    return np.array([_lagrange(time, float(t)) @ value for t in at])
