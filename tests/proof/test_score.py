@@ -130,6 +130,14 @@ def test_only_parameters_of_an_exact_name_are_held_against_their_intervals():
     assert judged(truth("coulomb_friction"), answer("missing_physics", "backlash")).effects == ()
 
 
+def test_a_special_case_that_is_declared_indistinguishable_from_the_truth_is_no_fault():
+    said = answer("missing_physics", "coulomb_friction")
+    friction = ["coulomb_friction", "stribeck_friction", "backlash"]
+    assert judged(truth("stribeck_friction"), said | {"indistinguishable": [friction]}).outcome == "family"
+    assert judged(truth("backlash"), said | {"indistinguishable": [friction]}).outcome == "wrong"
+    assert judged(truth("stribeck_friction"), said).outcome == "wrong"
+
+
 def test_clutter_that_is_named_beside_the_concealed_effect_is_no_fault():
     true = truth("coulomb_friction", clutter=("quadratic_drag", "magnet"))
     assert judged(true, answer("missing_physics", "coulomb_friction")).outcome == "exact"

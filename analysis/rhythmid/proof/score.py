@@ -1,7 +1,7 @@
 """The answer held against the opened truth."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -35,8 +35,8 @@ class Estimated:
 
 @dataclass(frozen=True)
 class Stated:
-    """A name that an answer states, with its probability, and whether it is right: concealed, or declared indistinguishable from
-    that in a family of two; or clutter that is really there, or of the same family of the catalogue as such clutter, for much
+    """A name that an answer states, with its probability, and whether it is right: concealed; or declared indistinguishable from
+    that, in a family of two or as its special case; or clutter that is really there, or of the same family of the catalogue as such clutter, for much
     of which there is no name."""
 
     name: str
@@ -49,7 +49,7 @@ class Score:
     """How one case came out.
 
     `outcome` exact: named what was concealed, and nothing but perhaps clutter that is really there; family: named, or declared
-    indistinguishable from what was named in a family of two; wrong: something else named. `dominant_first`: what explains most
+    indistinguishable from what was named, in a family of two or as the richer law; wrong: something else named. `dominant_first`: what explains most
     was concealed. `heldout` is the held-out error over the noise floor, where motion was compared.
     """
 
@@ -113,7 +113,8 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
     families = tuple(tuple(group) for group in answer.get("indistinguishable", ()))
     clutter = tuple(sorted(one["effect"]["name"] for one in truth["clutter"]))
     kin = _kin_of(clutter, catalogue)
-    outcome = _outcome(true, named, families, answer, kin)
+    stands_for = {name: _declared(name, families, catalogue) for name in named}
+    outcome = _outcome(true, stands_for, answer, kin)
     ranked = _ranked(answer)
     slots = {catalogue[name].slot for name in true}
     if len(true) == 1:
@@ -133,12 +134,12 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
             Stated(
                 effect["element"],
                 float(effect["probability"]),
-                effect["element"] in kin or _right(effect["element"], set(true), families),
+                effect["element"] in kin or bool(stands_for[effect["element"]] & set(true)),
             )
             for effect in ranked
             if effect.get("probability") is not None
         ),
-        dominant_first=bool(ranked) and _right(ranked[0]["element"], set(true), families),
+        dominant_first=bool(ranked) and bool(stands_for[ranked[0]["element"]] & set(true)),
         verdict=answer.get("verdict", "failed"),
         outcome=outcome,
         slot_right=bool(true) and said == slots,
@@ -164,18 +165,17 @@ def _ranked(answer: dict[str, Any]) -> list[dict[str, Any]]:
     return missing
 
 
-def _small(families: tuple[tuple[str, ...], ...]) -> list[set[str]]:
-    return [set(group) for group in families if len(group) <= FAMILY]
-
-
-def _right(name: str, there: set[str], families: tuple[tuple[str, ...], ...]) -> bool:
-    return name in there or any(name in group and group & there for group in _small(families))
+def _declared(name: str, families: tuple[tuple[str, ...], ...], catalogue: Catalogue) -> set[str]:
+    """What a name stands for: itself, the other one of a family of two, and richer laws that contain it, as far as the answer
+    declares that it cannot tell them apart."""
+    groups = [set(group) for group in families if name in group]
+    richer = set(catalogue[name].special_case_of) if name in catalogue else set()
+    return {name}.union(*(group if len(group) <= FAMILY else group & richer for group in groups))
 
 
 def _outcome(
     true: tuple[str, ...],
-    named: tuple[str, ...],
-    families: tuple[tuple[str, ...], ...],
+    stands_for: Mapping[str, set[str]],
     answer: dict[str, Any],
     kin: Collection[str],
 ) -> Outcome:
@@ -186,12 +186,12 @@ def _outcome(
     }  # fmt: skip
     if answer["verdict"] in plain:
         return plain[answer["verdict"]]
-    beside = [name for name in named if name in true or name not in kin]
+    beside = [name for name in stands_for if name in true or name not in kin]
     if beside == list(true) and true:
         return "exact"
     for name in true:
         match = next((n for n in beside if n == name), None) or next(
-            (n for n in beside if any({n, name} <= group for group in _small(families))), None
+            (n for n in beside if name in stands_for[n]), None
         )
         if match is None:
             return "wrong"
