@@ -25,11 +25,11 @@ from rhythmid.diagnose.free_map import without_free_maps
 from rhythmid.diagnose.free_run import FreeRunResult, free_run
 from rhythmid.diagnose.replay import ledger
 from rhythmid.diagnose.scoring import settle
-from rhythmid.diagnose.unit_check import check_units
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import with_declared
 from rhythmid.identify.inverse_dynamics.applicability import Applicability, applicable
+from rhythmid.identify.plausibility import check_plausible
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.parallel import cores
@@ -125,7 +125,8 @@ def _answers(case: Case, effort: Applicability, count: int, given: Admitted) -> 
         if answer.diagnosis.augmented.train_nrmse < LEFT:
             return
     series = prepare(given.records)
-    check_units(case.nominal, series[:count], case.pool)
+    warned = check_plausible(case.nominal, case.records, case.pool)
+    notes = given.notes if warned is None else (*given.notes, warned)
 
     def by_motion(windows: bool) -> Iterator[Answer]:
         ways = settle(
@@ -133,7 +134,7 @@ def _answers(case: Case, effort: Applicability, count: int, given: Admitted) -> 
         )
         for scoring in ways:
             result = free_run(case, scoring)
-            diagnosis = compose(case, result, given.notes)
+            diagnosis = compose(case, result, notes)
             yield Answer(diagnosis, causal(without_free_maps(result.search.fit.model)), result)
 
     if not effort.applies or not effort.free_run_means_something:
@@ -146,10 +147,10 @@ def _answers(case: Case, effort: Applicability, count: int, given: Admitted) -> 
     if told:
         return
     if driven:
-        yield _by_effort(case, effort, given.notes)
+        yield _by_effort(case, effort, notes)
     yield from by_motion(windows=True)
     if not driven:
-        yield _by_effort(case, effort, given.notes)
+        yield _by_effort(case, effort, notes)
 
 
 def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST) -> Answer:
