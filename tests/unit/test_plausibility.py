@@ -155,7 +155,7 @@ def test_a_mass_of_four_times_the_nominal_and_a_damping_at_zero_are_warnings_wit
     assert mass["name"] == "large_shift" and "the fit may be absorbing missing physics" in mass["text"]
     assert "5 times the nominal 0.2" in mass["text"] and mass["question"].endswith("`rhythmid diagnose`.")
     free = driven(slide(True, damping=0.002), "m", 0.05)
-    (damping,) = [one for one in identify(free, slide(True)).to_dict()["warnings"]]
+    (damping,) = identify(free, slide(True)).to_dict()["warnings"]
     assert damping["parameter"] == "viscous_damper.damping"
     assert damping["name"] in ("value_at_zero", "large_shift")
 

@@ -196,12 +196,19 @@ class HtfEstimate:
     reached : bool[h, n], where the input says something about them.
     operator : the equation that was solved, for its smoothing bias.
     noise : standard deviation of Y in a bin [unit s], as the residual shows it.
+    solution : Ĝ_m in all bins, of either sign.
     """
 
     htf: HarmonicTransferFunctions
     reached: NDArray[np.bool_]
     operator: RegularisedLeastSquares
     noise: float
+    solution: Complex
+
+    @property
+    def bias(self) -> Array:
+        """Standard deviation (h, n) of what the smoothing takes, at positive frequencies."""
+        return self.operator.bias(self.solution)[:, self.operator.positive]
 
 
 def estimate_htf(operator: RegularisedLeastSquares) -> HtfEstimate:
@@ -217,6 +224,6 @@ def estimate_htf(operator: RegularisedLeastSquares) -> HtfEstimate:
         operator.harmonics,
         operator.frequency[keep],
         found[:, keep],
-        np.hypot(noise * gain, operator.bias(found))[:, keep],
+        noise * gain[:, keep],
     )
-    return HtfEstimate(htf, operator.reached[:, keep], operator, noise)
+    return HtfEstimate(htf, operator.reached[:, keep], operator, noise, found)
