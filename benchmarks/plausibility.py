@@ -82,6 +82,8 @@ def main() -> None:
             begin = time.perf_counter()
             mend = likely_mend(model, records)
             seconds.append(time.perf_counter() - begin)
+            if len(seconds) % 10 == 0:
+                print(f"{len(seconds)} sets of records, {len(alarms)} false alarms", flush=True)
             if mend is not None:
                 alarms.append(index)
                 print(f"  {design} {index}: {mend.text}", flush=True)

@@ -151,7 +151,7 @@ def _estimates(result: dict[str, Any]) -> Table:
         value, std = estimate["value"], estimate["std"]
         table.add_row(
             name,
-            "not identifiable" if value is None else rounded(value, std),
+            "not identifiable" if value is None or std is None else rounded(value, std),
             "—" if std is None else f"{std:.2g}",
             escape(estimate["unit"]),
         )

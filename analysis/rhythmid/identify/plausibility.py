@@ -146,17 +146,22 @@ def _convinces(trial: Trial, declared: Trial) -> bool:
 def _shift(record: Record, declared: Trial, model: Model, tried: partial[Trial | None]) -> Mend | None:
     """The change that leads all values back, where they are shifted as declared and the error is none the larger for it."""
     trials = [one for change in likely_changes(record, model) if (one := tried(change)) is not None]
-    common = _common_factor(declared.fit, model)
-    if common is not None and (one := tried(Change("input", 1.0 / common))) is not None:
-        trials.append(one)
-    back = [
-        one for one in trials if one.shift < BACK and one.unexplained <= EQUAL * declared.unexplained + SAME
-    ]
+    back = _back(trials, declared)
+    if not back:  # no unit with a name, such as amperes
+        common = _common_factor(declared.fit, model)
+        one = None if common is None else tried(Change("input", 1.0 / common))
+        back = [] if one is None else _back([one], declared)
     if not back:
         return None
     best = min(one.shift for one in back)
     alike = [one for one in back if one.shift <= best + 0.1 * BACK]
     return Mend(alike[0].change, _words(record, model, declared, alike), False)
+
+
+def _back(trials: Sequence[Trial], declared: Trial) -> list[Trial]:
+    """Trials that lead the values back and explain the record as well."""
+    most = EQUAL * declared.unexplained + SAME
+    return [one for one in trials if one.shift < BACK and one.unexplained <= most]
 
 
 def _common_factor(fit: Fit | None, given: Model) -> float | None:
