@@ -117,7 +117,7 @@ def refused(given: list[Record], *words: str, model: Model | None = None, **opti
 )
 def test_a_unit_that_is_off_by_a_thousand_is_named_with_the_channel_and_the_scale(plain, role, factor):
     wrong = [scaled(one, role, factor) for one in plain]
-    refused(wrong, f"the {role} seems to be in units 1000 times", f"scale: {1.0 / factor:g} under '{role}:'")
+    refused(wrong, f"the {role} looks like", f"scale: {1.0 / factor:g} under '{role}:'")
 
 
 def test_records_in_different_units_are_refused_by_name(plain):

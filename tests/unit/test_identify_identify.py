@@ -108,11 +108,17 @@ def test_nothing_to_identify_from_is_refused() -> None:
         identify([])
 
 
-def test_a_silent_record_is_refused(paper_record) -> None:
+def test_a_silent_record_is_refused_by_the_papers_method(paper_record) -> None:
     made = paper_record()
     assert made.input is not None
     with pytest.raises(InputError, match="silent"):
-        identify(replace(made, input=replace(made.input, value=np.zeros(len(made.input)))))
+        identify(replace(made, input=replace(made.input, value=np.zeros(len(made.input)))), method="paper")
+
+
+def test_a_record_without_noise_closes_within_the_error_of_discretisation(found) -> None:
+    assert abs(found.delays.closure) < 3.0
+    for estimate, truth in ((found.delays.input, 0.04), (found.delays.measurement, 0.05)):
+        assert abs(estimate.value - truth) < 3.0 * estimate.std
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What `identify` refuses in one line: machines that it cannot speak of, and records without an excitation."""
+"""What the paper's method refuses in one line, and joint maximum likelihood identifies without transfer functions."""
 
 import pytest
 import twins
@@ -10,11 +10,19 @@ from rhythmid.model import Model
 
 def test_a_machine_that_does_not_return_to_its_cycle_has_no_transfer_functions():
     twin = twins.axis(friction=0.0, count=1, duration=6.0)
+    model = Model.from_text(twin.nominal)
     with pytest.raises(InputError, match="does not return to its cycle"):
-        identify(twin.records[0], Model.from_text(twin.nominal))
+        identify(twin.records[0], model, method="paper")
+    found = identify(twin.records[0], model)
+    assert found.usable and found.shown.functions is None and found.shown.missing
+    assert found.parameters["inertia.mass"].value == pytest.approx(2.0, rel=0.02)
 
 
-def test_a_record_without_an_excitation_is_refused_and_the_way_out_is_named():
+def test_a_free_decay_is_an_ordinary_record_that_shows_no_delay():
     twin = twins.decay(count=1)
+    model = Model.from_text(twin.nominal)
     with pytest.raises(InputError, match="no input channel.*rhythmid diagnose"):
-        identify(twin.records[0], Model.from_text(twin.nominal))
+        identify(twin.records[0], model, method="paper")
+    found = identify(twin.records[0], model)
+    assert found.delays.sum.value is None
+    assert found.delays.assumption == "nothing that is recorded drives the machine, so no delay shows"

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rhythmid.ltp.htf import LinearisedModel, delay_phase, linearised
+from rhythmid.ltp.nonparametric import smoothed
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.ltp.regularised_least_squares import estimate_htf, regularised_least_squares
 from rhythmid.ltp.spectra import Spectra, Window, spectra
@@ -60,6 +61,16 @@ def test_the_papers_record_gives_the_theoretical_htfs(measured, plant) -> None:
         error = np.abs(found.htf.value[row] - turned[row])[seen] / np.abs(truth[row]).max()
         assert error.max() < worst
         assert np.sqrt(np.mean(error**2)) < typical
+
+
+@pytest.mark.parametrize("share", [2.0, 3.0, 12.0])
+def test_bands_of_smoothed_estimates_contain_their_bias(measured, plant, share: float) -> None:
+    """A record without noise, smoothed too much: what errs is the smoothing alone."""
+    estimate = estimate_htf(regularised_least_squares(measured, 3, window=share * plant.cycle.ring_down))
+    for one in smoothed(estimate).functions:
+        truth = plant.htf(np.array([one.m]), one.frequency)
+        turned = (truth * np.exp(-1j * delay_phase(np.array([one.m]), one.frequency, 0.04, 0.05, 1.0)))[0]
+        assert np.mean(np.abs(one.value - turned) < one.radius) > 0.92
 
 
 @pytest.mark.parametrize("window", [4.0, 8.0, 24.0])

@@ -99,6 +99,19 @@ def test_hypotheses_that_take_no_share_of_the_evidence_have_no_probability():
     assert "%" not in rows[0].split("best")[1].split("│")[1]
 
 
+@pytest.mark.parametrize("verdict", ["unknown_physics", "undecided"])
+def test_an_effect_that_the_verdict_does_not_stand_by_has_no_probability(verdict):
+    text = printed(replace(ANSWER, verdict=verdict))
+    assert "coulomb_friction: F = −F_c sgn v   (92 % of the mismatch)" in text
+    assert "probability" not in text and "97 %" not in text
+    assert "weight of evidence" in text and "0.97" in text
+
+
+def test_a_value_has_the_digits_that_its_standard_deviation_bears():
+    effect = replace(FRICTION, parameters={"force": Estimate(0.81234567, 0.012, "N")})
+    assert "0.812 " in printed(replace(ANSWER, missing=(effect,)))
+
+
 def test_only_a_few_hypotheses_are_shown():
     many = tuple(explanation((f"effect_{i}",), float(i), 0.01) for i in range(20))
     text = printed(replace(ANSWER, hypotheses=many))

@@ -5,10 +5,12 @@ from typing import Annotated, Any, cast, get_args
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from rhythmid.commands.options import Bags, Elements, JsonFile, ReportFile, SignalsFile, command_line
 from rhythmid.output import require_new, write_json
+from rhythmid.report.quantity import rounded
 
 
 def identify(
@@ -92,8 +94,10 @@ def identify(
         write_json(json, result)
     if save_model is not None:
         found.model.save(save_model)
-    if save is not None:
+    if save is not None and found.usable:
         save_latency(found, save)
+    elif save is not None:
+        typer.echo(f"{save}: not written, for no controller should use this fit")
     if report is not None:
         from rhythmid.identify.present import present
         from rhythmid.report.page import write_page
@@ -105,22 +109,13 @@ def identify(
 
 
 def show(result: dict[str, Any]) -> None:
-    """Print an identification."""
+    """Print an identification: what casts doubt on it first."""
     console = Console()
-    table = Table(title="parameters and delays")
-    for column in ("name", "value", "std", "unit"):
-        table.add_column(column)
+    for warning in result["warnings"]:
+        console.print(f"[bold]{escape(warning['text'])}[/]")
+        console.print(f"  {escape(warning['question'])}")
+    console.print(_estimates(result))
     delays = result["delays"]
-    rows = result["parameters"] | {f"delay: {name}": delays[name] for name in ("input", "measurement", "sum")}
-    for name, estimate in rows.items():
-        value, std = estimate["value"], estimate["std"]
-        table.add_row(
-            name,
-            "not to be had" if value is None else f"{value:.6g}",
-            "—" if std is None else f"{std:.2g}",
-            estimate["unit"],
-        )
-    console.print(table)
     console.print(f"assuming that {delays['assumption']}")
     if delays["closure"]["z"] is not None:
         console.print(
@@ -134,12 +129,45 @@ def show(result: dict[str, Any]) -> None:
         )
     for words in delays["undetermined"]:
         console.print(f"not determined: {words}")
-    for name, estimates in result["methods"]["paper"].items():
-        told = ", ".join(f"{which} {1e3 * value:.2f} ms" for which, value in estimates.items())
-        console.print(f"paper's method, {name}: {told}")
-    about, highest = result["transfer_functions"], max(one["m"] for one in result["harmonics"])
-    console.print(f"transfer functions up to ±{highest}, by {about['method'].replace('_', ' ')}")
+    _show_transfer_functions(result, console)
     quality = result["quality"]
     console.print(f"{quality['rate']:.6g} Hz, {quality['gaps']} gaps, free-run NRMSE {quality['nrmse']:.5f}")
     for note in result["notes"]:
-        console.print(f"note: {note}")
+        console.print(f"note: {note}", markup=False)
+
+
+def _estimates(result: dict[str, Any]) -> Table:
+    """Parameters and delays, each to the digits that its standard deviation bears."""
+    table = Table(
+        title="parameters and delays"
+        if result["usable"]
+        else "parameters and delays of a fit that is not usable"
+    )
+    for column in ("name", "value", "std", "unit"):
+        table.add_column(column)
+    delays = result["delays"]
+    rows = result["parameters"] | {f"delay: {name}": delays[name] for name in ("input", "measurement", "sum")}
+    for name, estimate in rows.items():
+        value, std = estimate["value"], estimate["std"]
+        table.add_row(
+            name,
+            "not identifiable" if value is None or std is None else rounded(value, std),
+            "—" if std is None else f"{std:.2g}",
+            escape(estimate["unit"]),
+        )
+    return table
+
+
+def _show_transfer_functions(result: dict[str, Any], console: Console) -> None:
+    """The paper's method and what was found of transfer functions, or in one line what they lack."""
+    methods, about = result["methods"], result["transfer_functions"]
+    for name, estimates in methods["paper"].items():
+        told = ", ".join(f"{which} {1e3 * value:.2f} ms" for which, value in estimates.items())
+        console.print(f"paper's method, {name}: {told}")
+    if result["harmonics"]:
+        highest = max(one["m"] for one in result["harmonics"])
+        console.print(f"transfer functions up to ±{highest}, by {about['method'].replace('_', ' ')}")
+    if about["missing"] is not None:
+        console.print(f"no transfer functions: {about['missing']}", markup=False)
+    if methods["paper_missing"] not in (None, about["missing"]):
+        console.print(f"paper's method not shown: {methods['paper_missing']}", markup=False)

@@ -25,11 +25,11 @@ from rhythmid.diagnose.free_map import without_free_maps
 from rhythmid.diagnose.free_run import FreeRunResult, free_run
 from rhythmid.diagnose.replay import ledger
 from rhythmid.diagnose.scoring import settle
-from rhythmid.diagnose.unit_check import check_units
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import with_declared
 from rhythmid.identify.inverse_dynamics.applicability import Applicability, applicable
+from rhythmid.identify.plausibility import check_plausible
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.parallel import cores
@@ -117,6 +117,8 @@ def _answers(case: Case, effort: Applicability, notes: Sequence[str]) -> Iterato
     A free run that follows the machine comes first. Else the recorded effort does where it is at least as large as the
     inertial force, so that it moves the machine against other forces, and windows where the machine swings by itself.
     """
+    warned = check_plausible(case.nominal, case.records, case.pool)
+    notes = notes if warned is None else (*notes, warned)
     driven = effort.applies and effort.effort_share >= 1.0
     if effort.applies and not effort.free_run_means_something:
         answer = _by_effort(case, effort, notes)
@@ -124,7 +126,6 @@ def _answers(case: Case, effort: Applicability, notes: Sequence[str]) -> Iterato
         if answer.diagnosis.augmented.train_nrmse < LEFT:
             return
     series, count = prepare((*case.records, *case.holdout)), len(case.records)
-    check_units(case.nominal, series[:count], case.pool)
 
     def by_motion(windows: bool) -> Iterator[Answer]:
         ways = settle(

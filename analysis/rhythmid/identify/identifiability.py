@@ -18,6 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model
+from rhythmid.identify.discretisation import discretisation_error
 from rhythmid.identify.harmonic_likelihood import INPUT_DELAY, MEASUREMENT_DELAY, visible_sidebands
 from rhythmid.identify.identification import Delays, Estimate, Observables
 from rhythmid.identify.joint import JointFit, without_forcing
@@ -156,6 +157,8 @@ def observables(joint: JointFit) -> Observables | None:
     inverse = np.linalg.pinv((joined / norms).T @ (joined / norms), rcond=1e-13, hermitian=True)
     covariance = inverse / np.outer(norms, norms)
     step = -covariance @ (joined.T @ fit.linearisation.residual)
+    moved = covariance @ (joined.T @ discretisation_error(fit))
+    covariance = covariance + np.outer(moved, moved)
     u, y, gap = fit.names.index(INPUT_DELAY), fit.names.index(MEASUREMENT_DELAY), len(fit.names)
     delays = {u: fit.model.value(INPUT_DELAY), y: fit.model.value(MEASUREMENT_DELAY), gap: 0.0}
 
@@ -246,6 +249,9 @@ def delays_of(
     total = _estimate(fit, INPUT_DELAY, MEASUREMENT_DELAY)
     nothing = Estimate(None, None, "s")
     directions = tuple(d.words for d in undetermined(fit))
+    if not {INPUT_DELAY, MEASUREMENT_DELAY} & set(fit.names) and joint.pumping is None:
+        words = "nothing that is recorded drives the machine, so no delay shows"
+        return Delays(nothing, nothing, nothing, False, words, undetermined=directions)
     if joint.pumping is None or not joint.pumping.active:
         words = "no forcing is known, so nothing tells when the cycle is at which phase: only the sum of the delays shows"
         return Delays(nothing, nothing, total, False, words, undetermined=directions)

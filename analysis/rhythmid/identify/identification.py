@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.identify.caution import Caution
 from rhythmid.identify.joint import JointFit
 from rhythmid.identify.paper import PaperResult
 from rhythmid.ltp.harmonic_estimate import HarmonicEstimate, HarmonicEstimates
@@ -86,6 +87,17 @@ class Delays:
 
 
 @dataclass(frozen=True, eq=False)
+class Shown:
+    """What is shown of transfer functions: the `functions` Ĥ_m found in the first record without a model, whether the `paper`'s
+    method is, and for each what is missing where it is not."""
+
+    functions: HarmonicEstimates | None
+    paper: bool
+    missing: str | None = None
+    paper_missing: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Identification:
     """The answer to `rhythmid identify`.
 
@@ -94,37 +106,53 @@ class Identification:
     model : the model with all estimates in it, delays included.
     parameters : estimates by "element.parameter".
     delays : of the command and measurement paths.
-    harmonics : Ĥ_m found in the first record without a model, with what is known of their errors.
-    paper : the paper's method, record by record.
+    shown : transfer functions, as far as their conditions hold.
+    paper : the paper's method, record by record; empty where it finds nothing.
     quality : rate [Hz], gaps, jitter_std [s], nrmse and what else tells how far to trust the rest.
     joint : the joint fit; None where another method was asked for.
     notes : what the user should know, one line each.
+    cautions : what should keep a user from believing the estimates.
     """
 
     model: Model
     records: tuple[Record, ...]
     parameters: Mapping[str, Estimate]
     delays: Delays
-    harmonics: HarmonicEstimates
+    shown: Shown
     paper: tuple[PaperResult, ...]
     quality: Mapping[str, Any]
     notes: tuple[str, ...] = field(default_factory=tuple)
     joint: JointFit | None = None
+    cautions: tuple[Caution, ...] = ()
+
+    @property
+    def usable(self) -> bool:
+        """Whether the fit explains enough of the records to be called an identification."""
+        return not any(caution.name == "not_identified" for caution in self.cautions)
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `identify --json`; plain numbers, lists and strings."""
+        functions = self.shown.functions
+        paper = self.paper[0].delays if self.shown.paper else {}
         return {
+            "usable": self.usable,
+            "warnings": [caution.to_dict() for caution in self.cautions],
             "parameters": {name: estimate.to_dict() for name, estimate in self.parameters.items()},
             "delays": self.delays.to_dict(),
-            "harmonics": [_harmonic(one) for one in self.harmonics.functions],
+            "harmonics": [] if functions is None else [_harmonic(one) for one in functions.functions],
             "transfer_functions": {
-                "method": self.harmonics.method,
-                "false_alarm": self.harmonics.false_alarm,
+                "method": None if functions is None else functions.method,
+                "missing": self.shown.missing,
+                "false_alarm": 0.0 if functions is None else functions.false_alarm,
                 "tested": [
-                    {"m": t.m, "p_value": t.p_value, "visible": t.visible} for t in self.harmonics.tested
+                    {"m": t.m, "p_value": t.p_value, "visible": t.visible}
+                    for t in (() if functions is None else functions.tested)
                 ],
             },
-            "methods": {"paper": {harmonic_name(m): d.to_dict() for m, d in self.paper[0].delays.items()}},
+            "methods": {
+                "paper": {harmonic_name(m): d.to_dict() for m, d in paper.items()},
+                "paper_missing": self.shown.paper_missing,
+            },
             "quality": dict(self.quality),
             "notes": list(self.notes),
         }

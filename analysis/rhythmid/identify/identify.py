@@ -1,8 +1,8 @@
 """Identify a model and its delays from records: by joint maximum likelihood, with the paper's method beside it."""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from typing import Any, Literal
 
@@ -11,13 +11,18 @@ from numpy.typing import NDArray
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.caution import Caution, not_identified, other_unit
 from rhythmid.identify.declared import own_model, with_declared
-from rhythmid.identify.delay_fit import DelayEstimate
+from rhythmid.identify.discretisation import with_discretisation_error
 from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.identifiability import Forcing, Offset, delays_of
-from rhythmid.identify.identification import Delays, Estimate, Identification
-from rhythmid.identify.joint import joint_likelihood
+from rhythmid.identify.identification import Delays, Estimate, Identification, Shown
+from rhythmid.identify.joint import POOR, JointFit, best_fit
+from rhythmid.identify.large_shifts import large_shifts
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
+from rhythmid.identify.paper_conditions import LEAKAGE, lacks_paper_method, lacks_transfer_functions
+from rhythmid.identify.paper_delays import combined, paper_delays
+from rhythmid.identify.plausibility import SHIFTED, check_plausible, shift
 from rhythmid.identify.timing import compensated, measurement_jitter
 from rhythmid.ltp.harmonic_estimate import HarmonicEstimates
 from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, smoothed
@@ -39,21 +44,7 @@ SOURCES = {
     "stated formula": "the forcing stated by its formula",
     "model": "the model's periodic_forcing, which was not recorded,",
 }
-ON_ROBOT = "the forcing acts on the machine undelayed"
-ASSUMPTIONS = {
-    "forcing channel": f"{ON_ROBOT}, and the recorded forcing has the phase that acts, on the clock of the measurements",
-    "stated formula": f"{ON_ROBOT}, with the phase stated for it in the record's time",
-    "model": f"{ON_ROBOT}, with the phase that the model's periodic_forcing has in the record's time; it was not recorded",
-}
-LEAKAGE = 0.05  # above which a record's leakage is told
 MISFIT = 0.1  # of the magnitudes above which the fit is called into question
-NO_PHASE = (
-    "the excitation reaches too few frequencies to read a delay from phases; excite more of them, or a chirp"
-)
-NO_SIDEBANDS = (
-    "the excitation reaches the sidebands at too few frequencies to tell the two delays apart by their phases"
-)
-NO_FORCING = "no forcing is known, so nothing tells when the machine's cycle is at which phase"
 
 
 def paper_hopper() -> Model:
@@ -103,60 +94,6 @@ def free_run_nrmse(model: Model, record: Record, start: Array) -> float:
     return float(np.sqrt(np.mean((simulated - record.output.value) ** 2)) / np.std(record.output.value))
 
 
-def _combined(estimates: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Mean of independent (value, std), each weighed by its variance."""
-    if len(estimates) == 1:
-        return estimates[0]
-    values = np.array([value for value, _ in estimates])
-    weight = np.array([1.0 / max(std, 1e-300) ** 2 if math.isfinite(std) else 0.0 for _, std in estimates])
-    if weight.sum() == 0.0:
-        return float(values.mean()), math.inf
-    return float(weight @ values / weight.sum()), float(1.0 / math.sqrt(weight.sum()))
-
-
-def _cycle_delay(result: PaperResult) -> float:
-    """Measurement delay [s], modulo the period, by which the limit cycle's fundamental lags behind the model's."""
-    model = result.fit.linearised.cycle.harmonics(1)[1]
-    return float(-np.angle(result.spectra.cycle[1] / model) / result.pumping.omega)
-
-
-def _closure(result: PaperResult, combined: DelayEstimate) -> float | None:
-    """(A + C − B) / std with A the limit cycle's phase, C the sidebands' offset, B the slope of G_0."""
-    whole, sided = result.delays.get(0), [d for m, d in result.delays.items() if m != 0]
-    if whole is None or not sided or combined.input is None or combined.measurement is None:
-        return None
-    best = min(sided, key=lambda d: d.input_std or math.inf)
-    assert best.input is not None and best.input_std is not None
-    period = result.pumping.period
-    gap = _cycle_delay(result) + best.input - whole.sum
-    gap = (gap + 0.5 * period) % period - 0.5 * period
-    return gap / math.hypot(best.input_std, whole.sum_std)
-
-
-def _delays(results: Sequence[PaperResult], source: str) -> Delays:
-    def estimate(pairs: Sequence[tuple[float, float]]) -> Estimate:
-        return Estimate(*_combined(pairs), "s")
-
-    nothing = Estimate(None, None, "s")
-    found = [result.combined for result in results]
-    if source == "none" or any(one is None for one in found):
-        whole = [result.delays[0] for result in results if 0 in result.delays]
-        if not whole:
-            raise InputError(NO_PHASE)
-        total = estimate([(one.sum, one.sum_std) for one in whole])
-        return Delays(nothing, nothing, total, False, NO_FORCING if source == "none" else NO_SIDEBANDS)
-    pairs = [one for one in found if one is not None]
-    return Delays(
-        estimate([(one.input or 0.0, one.input_std or 0.0) for one in pairs]),
-        estimate([(one.measurement or 0.0, one.measurement_std or 0.0) for one in pairs]),
-        estimate([(one.sum, one.sum_std) for one in pairs]),
-        True,
-        ASSUMPTIONS.get(source, ON_ROBOT),
-        _closure(results[0], pairs[0]),
-        pairs[0].aliases,
-    )
-
-
 def identify(
     records: Record | Sequence[Record],
     model: Model | None = None,
@@ -178,7 +115,8 @@ def identify(
     htf : how the harmonic transfer functions of the first record are found; see `harmonic_transfer_functions`. The paper's
         method brings its own, equation (5), where this is `auto`.
 
-    Raises InputError when the joint search did not arrive (never is a stuck fit returned), and when a record has no
+    A fit that leaves more than a fifth of the motion is returned as not `usable`. Raises InputError when a channel seems to be in
+    another unit, to have its sign turned round or to be exchanged with another, and by the paper's method when a record has no
     input, is shorter than a period, or the model has no limit cycle.
     """
     given = (records,) if isinstance(records, Record) else tuple(records)
@@ -200,49 +138,126 @@ def _identified(
     htf: HtfMethod,
 ) -> Identification:
     nominal = with_declared(model or paper_hopper(), given)
-    results: list[PaperResult] = []
     pumpings: list[Pumping] = []
+    results: list[PaperResult | str] = []
     for record in given:
         own, pumping = forced_by(own_model(nominal, record), record)
-        results.append(paper_method(record, own, pumping, harmonics if pumping.active else 0))
         pumpings.append(pumping)
-    if method == "joint":
         try:
-            return _joint(given, nominal, results, pumpings[0].source, forcing, offset, htf)
-        except InputError:
-            if any(pumping.active for pumping in pumpings):
+            results.append(paper_method(record, own, pumping, harmonics if pumping.active else 0))
+        except InputError as error:
+            if method == "paper":
                 raise
-            # a cycle whose forcing is unknown cannot be simulated; the transfer functions around it can still be fitted
+            results.append(str(error))
+    seen = _Seen(given, nominal, tuple(pumpings), tuple(results))
+    found = _by_likelihood(seen, forcing, offset, htf) if method == "joint" else None
+    return found or _by_paper(
+        seen, htf if method == "joint" or htf != "auto" else "regularised_least_squares", method
+    )
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Records with the nominal model, their pumping, and what the paper's method finds in them or why it finds nothing."""
+
+    records: tuple[Record, ...]
+    nominal: Model
+    pumpings: tuple[Pumping, ...]
+    results: tuple[PaperResult | str, ...]
+
+    @property
+    def paper(self) -> tuple[PaperResult, ...]:
+        """What was found, record by record; nothing where one record gives nothing."""
+        found = tuple(one for one in self.results if not isinstance(one, str))
+        return found if len(found) == len(self.results) else ()
+
+    @property
+    def source(self) -> str:
+        return self.pumpings[0].source
+
+    def shown(self, method: Method, htf: HtfMethod) -> "Shown":
+        """What is shown of transfer functions; all of it where it was asked for by name."""
+        pumping, result = self.pumpings[0], self.results[0]
+        missing = lacks_transfer_functions(pumping, result) if method == "joint" and htf == "auto" else None
+        lacks = lacks_paper_method(pumping, result) if method == "joint" else None
+        if isinstance(result, str):
+            return Shown(None, False, missing or result, lacks or result)
+        functions = None if missing else _harmonics(result, htf)
+        if (
+            functions is not None
+            and functions.method == "regularised_least_squares"
+            and htf == "auto"
+            and lacks
+        ):
+            functions, missing = None, lacks  # equation (5) of the paper has the same needs
+        return Shown(functions, lacks is None, missing, lacks)
+
+    def judged(
+        self,
+        fitted: Model,
+        parameters: Mapping[str, Estimate],
+        delays: Delays,
+        joint: JointFit | None,
+        nrmse: float,
+    ) -> tuple[Caution, ...]:
+        """What should keep a user from believing the estimates. Raises InputError where a channel is in another unit."""
+        stuck = joint is not None and not joint.search.arrived
+        cautions = large_shifts(self.nominal, parameters, delays, self.records[0].output.period)
+        if not stuck and nrmse <= POOR and shift(self.nominal, fitted) <= SHIFTED:
+            return cautions
+        mend = check_plausible(self.nominal, self.records)
+        told = () if mend is None else (other_unit(mend),)
+        if not stuck and nrmse <= POOR:
+            return (*told, *cautions)
+        response = joint.search.response if joint is not None and nrmse <= POOR else None
+        return (not_identified(nrmse, response), *told, *cautions)
+
+
+def _by_paper(seen: _Seen, htf: HtfMethod, method: Method) -> Identification:
+    """Parameters and delays by the paper's method, each record's weighed by its variance."""
+    records, results = seen.records, seen.paper
     first = results[0]
     units = first.fit.model.parameters
     parameters = {
-        name: Estimate(*_combined([(r.fit.values[i], r.fit.std[name]) for r in results]), units[name].unit)
+        name: Estimate(*combined([(r.fit.values[i], r.fit.std[name]) for r in results]), units[name].unit)
         for i, name in enumerate(first.fit.names)
     }
-    delays = _delays(results, pumpings[0].source)
+    delays = paper_delays(results, seen.source)
     fitted = first.fit.model.with_values({n: e.value for n, e in parameters.items() if e.value is not None})
     if delays.separable:
         assert delays.input.value is not None and delays.measurement.value is not None
         fitted = with_delays(fitted, delays.input.value, delays.measurement.value)
     else:  # what a simulation needs is the sum, wherever it stands
         fitted = with_delays(fitted, delays.sum.value or 0.0, 0.0)
+    nrmse = _nrmse(fitted, records, results)
+    cautions = seen.judged(fitted, parameters, delays, None, nrmse)
+    notes = tuple(note for result, one in zip(results, records) for note in _notes(one, result))
     return Identification(
-        fitted, given, parameters, delays, _harmonics(first, htf if method == "joint" or htf != "auto" else "regularised_least_squares"),
-        tuple(results), _quality(_nrmse(fitted, given, results), given, results), tuple(note for r, one in zip(given, results) for note in _notes(r, one)),
+        fitted, records, parameters, delays, seen.shown("paper", htf), results, _quality(nrmse, records, results),
+        notes, cautions=cautions,
     )  # fmt: skip
 
 
-def _joint(
-    records: tuple[Record, ...],
-    nominal: Model,
-    results: Sequence[PaperResult],
-    source: str,
-    forcing: Forcing | None,
-    offset: Offset | None,
-    htf: HtfMethod,
-) -> Identification:
-    """Parameters and delays by joint maximum likelihood; HTFs without a model."""
-    joint, notes = compensated(joint_likelihood(records, nominal))
+def _by_likelihood(
+    seen: _Seen, forcing: Forcing | None, offset: Offset | None, htf: HtfMethod
+) -> Identification | None:
+    """Parameters and delays by joint maximum likelihood; HTFs without a model.
+
+    None where a cycle whose forcing is unknown cannot be simulated, but transfer functions around it can still be fitted.
+    """
+    records, paper = seen.records, seen.paper
+    unforced = paper and not any(pumping.active for pumping in seen.pumpings)
+    try:
+        found = best_fit(records, seen.nominal)
+    except InputError:
+        if unforced:
+            return None
+        check_plausible(seen.nominal, records)
+        raise
+    if unforced and not found.search.arrived and paper[0].fit.misfit < MISFIT:
+        return None
+    joint, notes = compensated(found) if found.search.arrived else (found, ())
+    joint = replace(joint, fit=with_discretisation_error(joint.fit))
     fit = joint.fit
     own = [name for name in fit.names if name not in DELAYS]
     values = fit.model.parameters
@@ -252,23 +267,24 @@ def _joint(
         else Estimate(None, None, values[name].unit)
         for name in own
     }
-    first = results[0]
     jitter = measurement_jitter(fit)
-    quality = _quality(fit.nrmse(), records, results) | {
+    quality = _quality(fit.nrmse(), records, paper) | {
         "unexplained_response": joint.search.response,
         "noise_std": math.sqrt(fit.noise.variance * fit.run.series[0].block),
         "measurement_jitter": jitter.to_dict(),
     }
-    delays = delays_of(joint, forcing, offset, SOURCES.get(source, "the forcing"))
+    delays = delays_of(joint, forcing, offset, SOURCES.get(seen.source, "the forcing"))
+    cautions = seen.judged(fit.model, parameters, delays, joint, fit.nrmse())
     if _open(delays, records[0].output.period):
         notes += (
             f"limit cycle and response to the command disagree about the delays by {delays.closure:+.1f} standard "
             "deviations: the model lacks physics, or the forcing's phase is not the acting one; run `rhythmid diagnose`",
         )
+    shown = seen.shown("joint", htf)
+    results = paper if shown.paper else (None,) * len(records)
     notes += tuple(note for result, one in zip(results, records) for note in _notes(one, result))
     return Identification(
-        fit.model, records, parameters, delays, _harmonics(first, htf), tuple(results), quality,
-        notes, joint,
+        fit.model, records, parameters, delays, shown, paper, quality, notes, joint, cautions,
     )  # fmt: skip
 
 
@@ -288,9 +304,11 @@ def _harmonics(result: PaperResult, method: HtfMethod) -> HarmonicEstimates:
     return harmonic_transfer_functions(result.spectra, result.fit.linearised.cycle.ring_down, method)
 
 
-def _notes(record: Record, result: PaperResult) -> Iterator[str]:
-    """What should make a user doubt the record, or the paper's method here."""
+def _notes(record: Record, result: PaperResult | None) -> Iterator[str]:
+    """What should make a user doubt the record, or the paper's method where its `result` is shown."""
     yield from (f"{record.name}: {note}" for note in record.quality.notes)
+    if result is None:
+        return
     window, operator = result.spectra.window, result.estimate.operator
     if window.leakage > LEAKAGE:
         yield (
@@ -319,12 +337,16 @@ def _nrmse(model: Model, records: Sequence[Record], results: Sequence[PaperResul
 
 def _quality(nrmse: float, records: Sequence[Record], results: Sequence[PaperResult]) -> dict[str, Any]:
     channels = [record.quality for record in records]
-    first = results[0]
-    return {
+    quality = {
         "rate": 1.0 / records[0].output.period,
         "gaps": sum(q.gaps for q in channels if q.channels),
         "jitter_std": max((q.jitter_std for q in channels if q.channels), default=0.0),
         "nrmse": nrmse,
+    }
+    if not results:
+        return quality
+    first = results[0]
+    return quality | {
         "periods": first.spectra.window.periods,
         "leakage": first.spectra.window.leakage,
         "smoothing_window": first.estimate.operator.window,

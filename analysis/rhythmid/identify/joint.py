@@ -28,7 +28,7 @@ from rhythmid.record.record import Record
 Array = NDArray[np.float64]
 LONGEST = 0.5  # [s] delays that are looked for on either side, if not told otherwise
 STUCK = 0.5  # unexplained share (rms) of the response to the command, beyond which a fit is no answer
-POOR = 0.3  # the same of the whole motion
+POOR = 0.2  # the same of the whole motion: what leaves more than a fifth of it is not identified
 CYCLE_HARMONICS = 24  # that are projected out where the limit cycle is not to be used
 STEP, FINE_STEP = (
     0.2,
@@ -133,7 +133,7 @@ def cycle_columns(series: Series, pumping: Pumping) -> Array:
     return np.hstack([np.ones((len(angle), 1)), np.cos(angle), np.sin(angle)])
 
 
-def _explained(fit: Fit, pumping: Pumping | None) -> Search:
+def explained(fit: Fit, pumping: Pumping | None) -> Search:
     """Compare what the fit leaves with the motion, with the response to the command and with the noise."""
     left = response = floor = count = 0.0
     for one, residual in zip(fit.run.series, fit.residuals):
@@ -237,6 +237,28 @@ def joint_likelihood(
     block: int | None = None,
     pool: ThreadPoolExecutor | None = None,
 ) -> JointFit:
+    """The estimate that `best_fit` finds.
+
+    Arguments as there. Raises InputError when the records have nothing to fit, and when the search did not arrive: a fit that is
+    stuck is never returned.
+    """
+    found = best_fit(records, model, cycle, longest, block, pool)
+    if found.search.arrived:
+        return found
+    raise InputError(
+        f"no answer: {found.search}; either the search is stuck or the machine has physics that the model lacks: "
+        "start from better values, look for delays elsewhere, or run `rhythmid diagnose`"
+    )
+
+
+def best_fit(
+    records: Record | Sequence[Record],
+    model: Model,
+    cycle: bool = True,
+    longest: float = LONGEST,
+    block: int | None = None,
+    pool: ThreadPoolExecutor | None = None,
+) -> JointFit:
     """Estimate all free parameters of the model and its delays from all records at once.
 
     Parameters
@@ -247,8 +269,7 @@ def joint_likelihood(
     longest : largest delay on either side [s] that is looked for.
     block : samples that are averaged into one; None chooses by the bandwidth.
 
-    Raises InputError when the records have nothing to fit, and when the search did not arrive: a fit that is stuck is
-    never returned.
+    The best that was found, whose `search` tells whether it arrived. Raises InputError when the records have nothing to fit.
     """
     given = (records,) if isinstance(records, Record) else tuple(records)
     if not given:
@@ -273,14 +294,9 @@ def joint_likelihood(
             return trial
     series = _series(given, 0.0 if pumping is None else 0.2, block, cycle, pumping)
     trial = _judged(_search_in_time(model, series, longest, pool), pumping, given)
-    if trial.search.arrived:
+    if trial.search.arrived or best is None or trial.search.motion < best.search.motion:
         return trial
-    if best is None or trial.search.motion < best.search.motion:
-        best = trial
-    raise InputError(
-        f"no answer: {best.search}; either the search is stuck or the machine has physics that the model lacks: "
-        "start from better values, look for delays elsewhere, or run `rhythmid diagnose`"
-    )
+    return best
 
 
 def fit_from(
@@ -320,4 +336,4 @@ def _series(
 
 
 def _judged(fit: Fit, pumping: Pumping | None, records: Sequence[Record]) -> JointFit:
-    return JointFit(fit, pumping, _explained(fit, pumping), tuple(records))
+    return JointFit(fit, pumping, explained(fit, pumping), tuple(records))

@@ -32,7 +32,10 @@ def _transfer(found: Identification) -> list[TransferFunction]:
 
     The model's function turns by the identified delays, equation (7) of the paper.
     """
-    pumping, delays = found.paper[0].pumping, found.delays
+    functions, delays = found.shown.functions, found.delays
+    if functions is None:
+        return []
+    pumping = found.paper[0].pumping
     both = delays.separable and delays.input.value is not None and delays.measurement.value is not None
     input_delay, measurement_delay = (
         (delays.input.value or 0.0, delays.measurement.value or 0.0)
@@ -44,7 +47,7 @@ def _transfer(found: Identification) -> list[TransferFunction]:
     except InputError:  # a motion without forcing has no cycle to linearise around
         machine = None
     made = []
-    for one in found.harmonics.functions:
+    for one in functions.functions:
         model = None
         if machine is not None and (both or one.m == 0):
             m = np.array([one.m])

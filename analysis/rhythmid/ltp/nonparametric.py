@@ -95,13 +95,15 @@ def _local(
 
 
 def smoothed(estimate: HtfEstimate) -> HarmonicEstimates:
-    """What equation (5) found, where the excitation reaches; its residual does not tell one kind of error from another."""
+    """What equation (5) found, where the excitation reaches, with noise and the bias of its smoothing in its bands; the residual does
+    not tell one kind of error from another."""
     found = []
+    assert estimate.htf.std is not None
+    whole = np.hypot(estimate.htf.std, estimate.bias)
     for row, m in enumerate(estimate.htf.harmonics):
         at = estimate.reached[row]
         count = int(at.sum())
-        assert estimate.htf.std is not None
-        std = estimate.htf.std[row, at]
+        std = whole[row, at]
         used = np.any(estimate.operator.shifted != 0.0, axis=0).sum()
         freedom = np.full(count, max(2.0, float(used) / 2.0 - estimate.operator.noise_gain[1] / 2.0))
         unknown: Array = np.full(count, np.nan)

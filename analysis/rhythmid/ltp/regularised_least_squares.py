@@ -51,7 +51,10 @@ class RegularisedLeastSquares:
 
     def solve(self, output: Complex) -> Complex:
         """Ĝ of equation (5) from Y in the bins (n,); shape (h, n)."""
-        right = self.shifted.conj() * output[None, :]
+        return self._solved(self.shifted.conj() * output[None, :])
+
+    def _solved(self, right: Complex) -> Complex:
+        """Solution of the normal equations for a right-hand side (h, n)."""
         return cho_solve_banded((self.factor, True), right.T.ravel()).reshape(-1, len(self.harmonics)).T
 
     def smooth(self, htf: Complex) -> Complex:
@@ -102,6 +105,23 @@ class RegularisedLeastSquares:
             variance += np.abs(found) ** 2 / PROBES
             taken += np.vdot(output, np.einsum("hn,hn->n", self.shifted, found)).real / PROBES
         return np.sqrt(self._around(variance)), float(np.clip(taken, 0.0, used.sum() - 1.0))
+
+    def bias(self, found: Complex) -> Array:
+        """Standard deviation (h, n) of what the smoothing takes from functions that bend as `found` (h, n) does.
+
+        The estimate is off by −α (Uᴴ U + α (D²)ᵀ D²)⁻¹ (D²)ᵀ D² G. The second differences of G are taken as random, as large as
+        those of the estimate around each bin, so that what no input resolves counts with what it resolves (G. Wahba, J. R. Stat.
+        Soc. B 45 (1983) 133; D. Nychka, J. Am. Stat. Assoc. 83 (1988) 1134: such bands cover on the average over frequency).
+        """
+        bends = np.abs(np.diff(found, 2, axis=1)) ** 2
+        size = np.sqrt(self._around(np.pad(bends, ((0, 0), (1, 1)), mode="edge")))[:, 1:-1]
+        rng = np.random.default_rng(0)
+        variance = np.zeros(found.shape)
+        for _ in range(PROBES):
+            real, imaginary = rng.standard_normal((2, *size.shape))
+            drawn = np.pad(size * (real + 1j * imaginary) / np.sqrt(2.0), ((0, 0), (2, 2)))
+            variance += np.abs(self._solved(np.diff(drawn, 2, axis=1))) ** 2 / PROBES
+        return self.alpha * np.sqrt(self._around(variance))
 
     @cached_property
     def spacing(self) -> int:
@@ -176,12 +196,19 @@ class HtfEstimate:
     reached : bool[h, n], where the input says something about them.
     operator : the equation that was solved, for its smoothing bias.
     noise : standard deviation of Y in a bin [unit s], as the residual shows it.
+    solution : Ĝ_m in all bins, of either sign.
     """
 
     htf: HarmonicTransferFunctions
     reached: NDArray[np.bool_]
     operator: RegularisedLeastSquares
     noise: float
+    solution: Complex
+
+    @property
+    def bias(self) -> Array:
+        """Standard deviation (h, n) of what the smoothing takes, at positive frequencies."""
+        return self.operator.bias(self.solution)[:, self.operator.positive]
 
 
 def estimate_htf(operator: RegularisedLeastSquares) -> HtfEstimate:
@@ -194,6 +221,9 @@ def estimate_htf(operator: RegularisedLeastSquares) -> HtfEstimate:
     noise = float(np.sqrt(np.sum(np.abs(residual) ** 2) / (used.sum() - taken)))
     keep = operator.positive
     htf = HarmonicTransferFunctions(
-        operator.harmonics, operator.frequency[keep], found[:, keep], noise * gain[:, keep]
+        operator.harmonics,
+        operator.frequency[keep],
+        found[:, keep],
+        noise * gain[:, keep],
     )
-    return HtfEstimate(htf, operator.reached[:, keep], operator, noise)
+    return HtfEstimate(htf, operator.reached[:, keep], operator, noise, found)

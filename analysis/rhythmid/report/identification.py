@@ -55,16 +55,14 @@ def identification_page(
     return Page(
         title="rhythmid identification",
         kicker=f"Identification of {source}",
-        verdict="Identified"
-        if result["delays"].get("separable")
-        else "Identified, but for the split of the delays",
+        verdict=_verdict(result),
         words=_words(result),
-        tone="good" if result["delays"].get("separable") else "open",
+        tone="good" if result.get("usable", True) and result["delays"].get("separable") else "open",
         tiles=_tiles(result),
         sections=(
             Section("Parameters", (parameters_table(result["parameters"]),)),
             _delays(result),
-            transfer_section(functions, unit, *_errors(result, unit)),
+            transfer_section(functions, unit, *_errors(result, unit), *_missing(result)),
             *_paper(result),
             _remarks(result),
             quality_section(records),
@@ -86,8 +84,17 @@ def functions_of(result: Mapping[str, Any]) -> list[TransferFunction]:
     ]
 
 
+def _verdict(result: Mapping[str, Any]) -> str:
+    if not result.get("usable", True):
+        return "Not identified"
+    separable = result["delays"].get("separable")
+    return "Identified" if separable else "Identified, but for the split of the delays"
+
+
 def _words(result: Mapping[str, Any]) -> str:
     delays = result["delays"]
+    if not result.get("usable", True):
+        return " ".join(f"{sentence(one['text'])} {one['question']}" for one in result["warnings"])
     if delays.get("separable"):
         first = (
             f"The command acts {told(delays['input'], MILLISECONDS)} late, and the measurement arrives "
@@ -161,6 +168,13 @@ def transfer_section(functions: Sequence[TransferFunction], unit: str = "m/N", *
     if further:
         blocks.append(Fold("Further harmonics", (transfer_grid(further, unit),)))
     return Section("Transfer functions", (*blocks, *more))
+
+
+def _missing(result: Mapping[str, Any]) -> tuple[Block, ...]:
+    """What transfer functions, or the paper's method, lack here."""
+    about, methods = result.get("transfer_functions") or {}, result.get("methods") or {}
+    lacks = dict.fromkeys((about.get("missing"), methods.get("paper_missing")))
+    return tuple(Paragraph(sentence(text), "note") for text in lacks if text)
 
 
 def _errors(result: Mapping[str, Any], unit: str) -> tuple[Block, ...]:
@@ -240,6 +254,7 @@ def _remarks(result: Mapping[str, Any]) -> Section:
     lines = [
         f"In free run the identified model's error is {percent(quality.get('nrmse'))} of the motion's standard deviation."
     ]
+    lines += [f"{sentence(one['text'])} {one['question']}" for one in result.get("warnings") or ()]
     lines += [sentence(str(note)) for note in result.get("notes") or ()]
     return Section("How far to trust this", (Bullets(tuple(lines)),))
 

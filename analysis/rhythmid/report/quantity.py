@@ -7,6 +7,7 @@ from rhythmid.statistics import NORMAL_95
 
 MINUS = "\u2212"
 NONE = "—"
+DECIMALS = 12  # printed at most: a double has no more near 1
 RARE = 1e-3  # probability below which only that is told
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 PREFIXED = {"m", "s", "N", "rad", "V", "A", "Hz", "N*m"}
@@ -74,13 +75,30 @@ def plus_minus(value: float, half: float) -> str:
     exponent = math.floor(math.log10(size))
     shift = exponent if exponent >= 6 or exponent < -3 else 0
     value, half = value / 10.0**shift, half / 10.0**shift
-    decimals = 1 - math.floor(math.log10(half))
-    if decimals < 0:
-        value, half, decimals = round(value, decimals), round(half, decimals), 0
-    decimals = min(decimals, 12)
-    value = value if round(value, decimals) else 0.0  # no minus zero
-    text = f"{value:.{decimals}f} ±\u00a0{half:.{decimals}f}".replace("-", MINUS)
+    places = decimals(half)
+    if places < 0:
+        value, half, places = round(value, places), round(half, places), 0
+    places = min(places, DECIMALS)
+    value = value if round(value, places) else 0.0  # no minus zero
+    text = f"{value:.{places}f} ±\u00a0{half:.{places}f}".replace("-", MINUS)
     return f"({text}) × 10{str(shift).translate(_SUPERSCRIPT)}" if shift else text
+
+
+def decimals(std: float) -> int:
+    """Decimals up to the second significant digit of a standard deviation; negative ones are digits before the point."""
+    return 1 - math.floor(math.log10(std))
+
+
+def rounded(value: float, std: float | None) -> str:
+    """A value to the second significant digit of its standard deviation, plain text for a terminal; four digits without one."""
+    if std is None or not (math.isfinite(value) and math.isfinite(std)) or std <= 0.0:
+        return f"{value:.4g}"
+    places = min(decimals(std), DECIMALS)
+    exponent = math.floor(math.log10(max(abs(value), std)))
+    if exponent >= 6 or exponent < -4:
+        return f"{value:.{max(exponent + places, 0)}e}"
+    value = round(value, places)
+    return f"{value if value else 0.0:.{max(places, 0)}f}"  # no minus zero
 
 
 def estimate(value: float | None, std: float | None, unit: str, factor: float = 1.0) -> str:

@@ -9,6 +9,7 @@ from rich.table import Table
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate, MissingEffect, Remainder, Scored
 from rhythmid.diagnose.rejections import Rejection
 from rhythmid.report.hypotheses import grouped, most_weighed
+from rhythmid.report.quantity import rounded
 
 HYPOTHESES_SHOWN = 6
 REJECTIONS_SHOWN = 5
@@ -24,10 +25,12 @@ def show(found: Diagnosis, console: Console) -> None:
     lines.told(verdict, found.summary.removeprefix(f"{verdict.capitalize()}: "))
     lines.said("where", found.location.where)
     for effect in found.missing:
-        sizes = f"probability {_probability(effect.probability)}, {_percent(effect.share)} of the mismatch"
+        sizes = f"{_percent(effect.share)} of the mismatch"
+        if found.verdict == "missing_physics":  # else the verdict does not stand by the name
+            sizes = f"probability {_probability(effect.probability)}, {sizes}"
         lines.told(effect.element, f"{effect.equation}   ({sizes})")
         console.print(_parameters(effect))
-    if len(found.missing) > 1:
+    if len(found.missing) > 1 and found.verdict == "missing_physics":
         lines.said("all of these names together", _probability(found.joint_probability))
     for group in found.indistinguishable:
         lines.said("indistinguishable here", ", ".join(group))
@@ -71,7 +74,7 @@ def _parameters(effect: MissingEffect) -> Table:
     for column in ("parameter", "value", "std", "unit"):
         table.add_column(column)
     for name, value in effect.parameters.items():
-        table.add_row(name, f"{value.value:.6g}", _std(value), escape(value.unit))
+        table.add_row(name, rounded(value.value, value.std), _std(value), escape(value.unit))
     return table
 
 
@@ -85,8 +88,9 @@ def _hypotheses(found: Diagnosis) -> Table:
     table = Table(
         title=f"the {len(shown)} best of {len(found.hypotheses)} hypotheses, by their predictions of unseen data"
     )
+    stands = found.verdict in ("missing_physics", "consistent")
     table.add_column("hypothesis", overflow="fold")
-    for column in ("kind", "worse by", "probability", "held-out error"):
+    for column in ("kind", "worse by", "probability" if stands else "weight of evidence", "held-out error"):
         table.add_column(column, justify="left" if column == "kind" else "right")
     for one in shown:
         behind = "best" if one.score_difference == 0.0 else _worse(one.score_difference, one.standard_error)
@@ -95,7 +99,7 @@ def _hypotheses(found: Diagnosis) -> Table:
             escape(" + ".join(one.elements)) or NOMINAL,
             one.kind.replace("_", " "),
             behind,
-            _probability(one.probability) if len(one.elements) <= weighed else NONE,
+            _weight(one.probability, stands) if len(one.elements) <= weighed else NONE,
             held,
         )
     return table
@@ -144,6 +148,12 @@ def _probability(value: float) -> str:
     if value < LEAST:
         return f"< {100.0 * LEAST:g} %"
     return f"> {100.0 * (1.0 - LEAST):g} %" if value > 1.0 - LEAST else _percent(value)
+
+
+def _weight(value: float, stands: bool) -> str:
+    """A hypothesis' weight: a probability in percent where the verdict stands, else a plain share between 0 and 1, for among
+    hypotheses of which none explains the records a weight only says which is the nearest."""
+    return _probability(value) if stands else f"{value:.2f}"
 
 
 def _percent(share: float) -> str:

@@ -10,6 +10,7 @@ from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.identify.output_error import Fit
 from rhythmid.model import Model
+from rhythmid.report.quantity import rounded
 
 SENTENCES = {
     "command": "between the command u and the point where the forcing joins it",
@@ -114,6 +115,6 @@ def recalibrated(nominal: Model, fit: Fit) -> list[str]:
         new, std = fit.model.value(name), fit.std[name]
         if math.isfinite(std) and abs(new - value.value) > max(4.0 * std, 0.02 * abs(value.value)):
             said.append(
-                f"{name}: {value.value:.6g} in the nominal model, {new:.6g} ± {std:.2g} {value.unit} in the records"
+                f"{name}: {value.value:.6g} in the nominal model, {rounded(new, std)} ± {std:.2g} {value.unit} in the records"
             )
     return said

@@ -1,0 +1,39 @@
+"""Cautions: what should keep a user from believing an estimate, each with the question that decides it."""
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+Name = Literal["not_identified", "other_unit", "large_shift", "value_at_zero", "long_delay"]
+
+
+@dataclass(frozen=True)
+class Caution:
+    """What to doubt, in words, and the `question` that decides it; with the parameter, the value found and the nominal one."""
+
+    name: Name
+    text: str
+    question: str
+    parameter: str | None = None
+    value: float | None = None
+    nominal: float | None = None
+    unit: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def not_identified(motion: float, response: float | None) -> Caution:
+    """A fit that leaves too much of the `motion`, or of the `response` to the command (rms shares), to be an answer."""
+    left = f"{100.0 * motion:.0f} % of the motion" if motion < 1.0 else "more than all of the motion"
+    if response is not None:
+        left = f"{100.0 * min(response, 9.99):.0f} % of the response to the command"
+    return Caution(
+        "not_identified",
+        f"not identified: the fit leaves {left} unexplained, so none of its values can be used",
+        "Are the values that the model is given near the machine's? If so, `rhythmid diagnose` names the physics that it lacks.",
+    )
+
+
+def other_unit(text: str) -> Caution:
+    """Values that are all shifted as another unit of a channel would shift them."""
+    return Caution("other_unit", text, "In which unit was the channel recorded?")

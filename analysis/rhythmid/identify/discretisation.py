@@ -1,0 +1,59 @@
+"""What discretisation does to estimates: an error that is no noise, and the only one where a record has none.
+
+A fit integrates in steps of about a block and takes the average over a block's samples from differences between blocks. Both are
+repeated here as they should be, in steps of half the size and with every sample simulated. The difference, led through the
+estimator like a residual, tells by how much each estimate would move; its square belongs to the variance.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.identify.free_run import FreeRun
+from rhythmid.identify.output_error import Fit
+from rhythmid.identify.sensitivity import Problem
+from rhythmid.model import Model
+
+Array = NDArray[np.float64]
+
+
+def discretisation_error(fit: Fit) -> Array:
+    """Change of the output of all series when nothing is approximated, whitened, with what the initial states make up for left out:
+    in the rows (n,) of `fit.linearisation`. Zero where the model diverges."""
+    problem = Problem(fit.run, fit.names, fit.noise, None)
+    coarse = fit.run.outputs(fit.model, fit.starts)
+    parts = []
+    for index, basis in enumerate(fit.linearisation.bases):
+        fine = _block_averages(fit.run, index, fit.model, fit.starts[index])
+        if coarse is None or fine is None:
+            return np.zeros(len(fit.linearisation.residual))
+        change = np.concatenate([[0.0], fine - coarse[index][1:]])
+        white = problem.whitened(index, change)
+        parts.append(white - basis @ (basis.T @ white))
+    return np.concatenate(parts)
+
+
+def _block_averages(run: FreeRun, index: int, model: Model, start: Array) -> Array | None:
+    """Averages (blocks - 1,) of the output over the samples of all blocks but the first, in whose middle the `start` is."""
+    one = run.series[index]
+    later = one.time[one.block : one.blocks * one.block]
+    times = np.concatenate([one.centres[:1], later])
+    every = replace(
+        one, block=1, time=times, value=np.zeros(len(times)), used=np.ones(len(times), bool), hidden=None
+    )
+    series = (*run.series[:index], every, *run.series[index + 1 :])
+    rows = replace(run, series=series, max_step=0.5 * run.max_step).rows(model, index, start)
+    return None if rows is None else rows[1:, run.states].reshape(-1, one.block).mean(axis=1)
+
+
+def with_discretisation_error(fit: Fit) -> Fit:
+    """The fit whose covariance holds the error of discretisation, too."""
+    known = np.isfinite(np.diag(fit.covariance))
+    if not known.any():
+        return fit
+    covariance = fit.covariance.copy()
+    block = covariance[np.ix_(known, known)]
+    moved = block @ (fit.linearisation.jacobian[:, known].T @ discretisation_error(fit))
+    covariance[np.ix_(known, known)] = block + np.outer(moved, moved)
+    return replace(fit, covariance=covariance)

@@ -1,0 +1,61 @@
+"""Whether harmonic transfer functions, and the paper's method, mean anything for a record: what they need, and what is missing."""
+
+import numpy as np
+
+from rhythmid.identify.paper import PaperResult
+from rhythmid.ltp.pumping import Pumping
+
+LEAKAGE = 0.05  # of the command that may differ before and at the end of the window
+# of the limit cycle's motion (rms) that the response to the command may have: a quadratic law bends the response by as much
+SMALL = 0.1
+FREEDOM = (
+    0.8  # of the equations' degrees of freedom that the estimate may take; a fifth is left to tell its error
+)
+NO_FORCING = "no periodic forcing is known: harmonic transfer functions are those of a machine that a forcing keeps on a limit cycle"
+
+
+def lacks_transfer_functions(pumping: Pumping, result: PaperResult | str) -> str | None:
+    """What is missing for harmonic transfer functions; None where nothing is. `result` is the reason where there is none."""
+    if not pumping.active:
+        return NO_FORCING
+    if isinstance(result, str):
+        return result
+    share = response_share(result)
+    if share > SMALL:
+        return (
+            f"the excitation is not small: the response to it is {share:.0%} of the limit cycle's motion, and a linearisation bears "
+            f"{SMALL:.0%}; excite less"
+        )
+    return None
+
+
+def lacks_paper_method(pumping: Pumping, result: PaperResult | str) -> str | None:
+    """What is missing for the paper's method; None where nothing is."""
+    missing = lacks_transfer_functions(pumping, result)
+    if missing is not None or isinstance(result, str):
+        return missing
+    window, operator = result.spectra.window, result.estimate.operator
+    if window.leakage > LEAKAGE:
+        return (
+            f"the command does not repeat over whole pumping periods ({window.leakage:.0%} of it differs): begin with a warm-up "
+            "repetition, or leave silence at both ends"
+        )
+    used = int(np.any(operator.shifted != 0.0, axis=0).sum())
+    taken = operator.noise_gain[1] / used
+    if taken > FREEDOM:
+        return (
+            f"too few repetitions: the estimate takes {taken:.0%} of what {window.periods} pumping periods tell, which leaves too "
+            "little to judge it by; record longer"
+        )
+    return None
+
+
+def response_share(result: PaperResult) -> float:
+    """Size (rms) of the response to the command as a share of the limit cycle's motion about its mean."""
+    spectra = result.spectra
+    bins = np.arange(1, len(spectra.output))
+    beside = bins[bins % spectra.window.periods != 0]
+    length = spectra.window.periods * spectra.pumping.period
+    response = float(np.sum(np.abs(spectra.output[beside]) ** 2)) / length**2
+    cycle = float(np.sum(np.abs(spectra.cycle[1:]) ** 2))
+    return float(np.sqrt(response / cycle)) if cycle > 0.0 else np.inf
