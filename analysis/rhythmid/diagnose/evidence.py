@@ -167,7 +167,8 @@ def prediction(
         density[rows] = log_density(found.error[rows], float(spread))
     density -= found.penalty * (blocks.fold[blocks.block] != UNSEEN)
     error = found.error if measured is None else measured
-    return Prediction(blocks.sums(density) / time, blocks.sums(error**2), blocks.sums(np.ones(len(density))))
+    counts = blocks.sums(np.ones(len(density)))
+    return Prediction(blocks.sums(density) / time, blocks.sums(error**2), counts, blocks.fold == UNSEEN)
 
 
 def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[Prediction]:
@@ -185,7 +186,23 @@ def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[P
 
 def difference(first: Prediction, second: Prediction) -> tuple[float, float]:
     """By how much the first predicts better than the second, and the standard error of that, both in log density."""
-    gain = first.log_density - second.log_density
+    return _summed(first.log_density - second.log_density)
+
+
+def gain_ahead(first: Prediction, second: Prediction) -> float:
+    """By how many standard errors the first predicts better what no fit has seen; infinite where nothing is held out.
+
+    A line that is no more than the ringing of a resonance, or a drift that is none, predicts blocks between others that its
+    fit saw. It does not predict what comes after them.
+    """
+    if first.unseen is None or not first.unseen.any():
+        return math.inf
+    gain, error = _summed((first.log_density - second.log_density)[first.unseen])
+    return gain / error if 0.0 < error < math.inf else math.inf
+
+
+def _summed(gain: Array) -> tuple[float, float]:
+    """Sum of differences in each block and its standard error."""
     count = len(gain)
     error = math.sqrt(count) * float(np.std(gain, ddof=1)) if count > 1 else math.inf
     return float(gain.sum()), error

@@ -20,12 +20,14 @@ class Prediction:
     """What a hypothesis predicts of each block (b,) of data that its fit has not seen.
 
     `log_density` is the sum of the block's log predictive densities, divided by the autocorrelation time of the residual;
-    `squared_error` the sum of squared errors, and `samples` their number.
+    `squared_error` the sum of squared errors, and `samples` their number. `unseen` marks the blocks of which no fit has seen even
+    the neighbours: the held-out ends of records, and separate held-out ones.
     """
 
     log_density: Array
     squared_error: Array
     samples: Array
+    unseen: NDArray[np.bool_] | None = None
 
     @property
     def score(self) -> float:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from scipy.stats import t as student
 
-from rhythmid.diagnose.constants import EDGE, FALSE_ALARM, MISMATCH, REST
-from rhythmid.diagnose.evidence import difference
+from rhythmid.diagnose.constants import EDGE, EQUIVALENT, FALSE_ALARM, MISMATCH, REST
+from rhythmid.diagnose.evidence import difference, gain_ahead
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 
 
@@ -105,6 +105,13 @@ RULES: tuple[Rule, ...] = (
         "less would be found by chance among as many candidates",
         _gain_in_errors,
         lambda claim: significance(claim.hypothesis.prediction, claim.candidates),
+    ),
+    Rule(
+        "predicts_ahead",
+        "the same gain on the held-out ends and records alone, in its standard errors",
+        "what it describes does not go on where the fit has not looked",
+        lambda claim: gain_ahead(claim.hypothesis.prediction, claim.without.prediction),
+        lambda _: -EQUIVALENT,
     ),
     Rule(
         "share_of_rest",

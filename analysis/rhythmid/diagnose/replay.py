@@ -39,15 +39,18 @@ def ledger(contest: Contest, detectable: float) -> dict[str, Any]:
     }
 
 
-def _written(one: Prediction) -> dict[str, list[float]]:
-    return {
+def _written(one: Prediction) -> dict[str, list[float] | list[bool] | None]:
+    numbers = {
         name: [float(f"{value:.{DIGITS}g}") for value in getattr(one, name)]
         for name in ("log_density", "squared_error", "samples")
     }
+    return {**numbers, "unseen": None if one.unseen is None else one.unseen.tolist()}
 
 
 def _read(data: dict[str, Any]) -> Prediction:
-    return Prediction(*(np.array(data[name]) for name in ("log_density", "squared_error", "samples")))
+    numbers = (np.array(data[name]) for name in ("log_density", "squared_error", "samples"))
+    unseen = data.get("unseen")
+    return Prediction(*numbers, None if unseen is None else np.array(unseen, dtype=bool))
 
 
 def contest_of(data: dict[str, Any]) -> Contest:

@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rhythmid.diagnose.constants import BLIND, EXPLAINED, MAINLY, STATED
-from rhythmid.diagnose.evidence import difference
+from rhythmid.diagnose.constants import BLIND, EQUIVALENT, EXPLAINED, MAINLY, STATED
+from rhythmid.diagnose.evidence import difference, gain_ahead
 from rhythmid.diagnose.hypothesis import Hypothesis, Verdict
 from rhythmid.diagnose.probability import adequacy, joint_probability, weights_of
 from rhythmid.diagnose.rejections import significance
@@ -67,7 +67,8 @@ def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
     for words, one, count in rivals:
         gain, error = difference(one, chosen.prediction)
         removed = chosen.prediction.mean_square - one.mean_square
-        if error > 0.0 and removed > 0.0 and gain > significance(one, count) * error:
+        ahead = gain_ahead(one, chosen.prediction) >= -EQUIVALENT
+        if error > 0.0 and removed > 0.0 and ahead and gain > significance(one, count) * error:
             found.append((removed, words))
     if not found or whole <= 0.0:
         return Unexplained(0.0, False, None)
