@@ -1,6 +1,7 @@
 """Contests made by hand: hypotheses whose predictions are plain numbers, for tests of what is decided on them."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,6 +35,14 @@ def predicted(
         score = -0.5 * BLOCKS * float(np.log(mean_square))
     blocks = np.full(BLOCKS, SAMPLES)
     return Prediction(score / BLOCKS + departures, mean_square * blocks, blocks)
+
+
+def ends(one: Prediction, gain: float, mood: float = 0.5, last: int = 12) -> Prediction:
+    """The prediction with its last blocks held out, and a log density there of `gain` in each, give or take `mood`."""
+    unseen = np.arange(BLOCKS) >= BLOCKS - last
+    density = one.log_density.copy()
+    density[unseen] = gain + np.resize([mood, -mood], last)
+    return replace(one, log_density=density, unseen=unseen)
 
 
 def supposed(

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from contests import BLOCKS, SIZE, contest, decided, predicted, supposed, verdict
+from contests import BLOCKS, SIZE, contest, decided, ends, predicted, supposed, verdict
 
 from rhythmid.diagnose.rejections import RULES
 
@@ -48,6 +48,21 @@ def test_an_effect_of_a_thousandth_of_the_motion_is_not_named_and_one_of_a_hundr
     assert verdict(contest(nominal, supposed("friction", predicted(quiet, 1e4)))) == expected
 
 
+@pytest.mark.parametrize(("gain", "expected"), [(2.0, NAMED), (0.0, NAMED), (-2.0, NOTHING)])
+def test_an_effect_that_does_worse_on_held_out_data_is_not_named(gain, expected):
+    nominal = supposed("", ends(NOMINAL.prediction, 0.0, mood=0.0))
+    found = supposed("friction", ends(friction().prediction, gain))
+    assert verdict(contest(nominal, found)) == expected
+
+
+@pytest.mark.parametrize(("gain", "expected"), [(2.0, "unknown_physics"), (-2.0, "consistent")])
+def test_a_line_that_does_not_go_on_in_held_out_data_is_no_unknown_physics(gain, expected):
+    quiet = replace(predicted(1e-4), unseen=None)
+    nominal = supposed("", ends(NOMINAL.prediction, 0.0, mood=0.0))
+    line = {"a vibration at 2 Hz": ends(quiet, gain)}
+    assert verdict(contest(nominal, maps=line))[0] == expected
+
+
 @pytest.mark.parametrize(("left", "expected"), [(0.19, 1), (0.05, 2)])
 def test_a_further_effect_has_to_remove_more_than_a_small_part_of_what_can_still_be_explained(left, expected):
     both = supposed("friction cubic", predicted(left, 400.0))
@@ -84,8 +99,8 @@ def test_an_effect_that_has_lost_its_shape_is_no_name_and_the_next_best_comes_in
 
 def test_every_rule_of_the_table_is_one_whose_effect_on_the_verdict_is_tested():
     tested = {
-        "predicts_better", "share_of_rest", "share_of_mismatch", "practical_size", "within_bounds", "acts_within_records",
-        "own_frequency",
+        "predicts_better", "predicts_ahead", "share_of_rest", "share_of_mismatch", "practical_size", "within_bounds",
+        "acts_within_records", "own_frequency",
     }  # fmt: skip
     assert {rule.name for rule in RULES} == tested
 
