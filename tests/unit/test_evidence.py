@@ -20,9 +20,11 @@ from rhythmid.diagnose.evidence import (
     Linearised,
     cross_validate,
     difference,
+    gain_ahead,
     predict,
     prediction,
     probabilities,
+    weight_for,
 )
 from rhythmid.identify.student import DEGREES, autocorrelation_time, log_density, scale_of, weights_of
 
@@ -280,6 +282,32 @@ def test_a_difference_and_its_standard_error_are_those_of_the_blocks():
     assert gain == pytest.approx(first.score - second.score)
     assert error == pytest.approx(math.sqrt(60) * (first.log_density - second.log_density).std(ddof=1))
     assert difference(second, first) == (pytest.approx(-gain), pytest.approx(error))
+
+
+@pytest.mark.parametrize("effect", [0.1, 0.5, 2.0])
+def test_odds_against_a_true_hypothesis_are_as_rare_as_they_are_large(effect):
+    # log likelihood ratios of a mean that is `effect` against one that is zero, which is true
+    rng, often = np.random.default_rng(5), 0
+    for _ in range(400):
+        gain = effect * rng.standard_normal(60) - 0.5 * effect**2
+        first = replace(predicted(1.0), log_density=gain)
+        often += weight_for(first, replace(first, log_density=np.zeros(60))) > math.log(20.0)
+    assert often <= 0.05 * 400
+
+
+def test_no_block_counts_for_more_than_strong_evidence_but_harm_counts_in_full():
+    none = replace(predicted(1.0), log_density=np.zeros(3))
+    mixed = replace(none, log_density=np.array([50.0, 1.0, -30.0]))
+    assert weight_for(mixed, none) == pytest.approx(math.log(20.0) + 1.0 - 30.0)
+
+
+def test_what_goes_on_where_no_fit_has_looked_is_told_in_standard_errors():
+    unseen = np.arange(60) >= 48
+    none = replace(predicted(1.0), log_density=np.zeros(60), unseen=unseen)
+    density = np.where(unseen, np.resize([-1.0, -3.0], 60), 5.0)
+    ahead = gain_ahead(replace(none, log_density=density), none)
+    assert ahead == pytest.approx(-24.0 / (math.sqrt(12) * np.std(density[unseen], ddof=1)))
+    assert gain_ahead(replace(none, unseen=None), none) == math.inf
 
 
 def test_one_block_alone_tells_no_standard_error():

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from contests import SIZE, predicted, supposed
 
-from rhythmid.diagnose.rejections import RULES, Claim, rejections_of, significance, table
+from rhythmid.diagnose.rejections import RULES, Claim, decisive, rejections_of, table
 from rhythmid.diagnose.selection import SHAPE_RULES
 
 NOMINAL = supposed("", predicted(1.0))
@@ -54,11 +54,18 @@ def test_a_statistic_that_is_no_number_rejects():
     assert rejected(broken) == ["within_bounds"]
 
 
-def test_more_candidates_and_fewer_blocks_ask_for_more():
-    one = GOOD.hypothesis.prediction
-    few = replace(one, log_density=one.log_density[:6])
-    assert significance(one, 1) < significance(one, 30) < significance(few, 30)
-    assert significance(one, 0) == significance(one, 1)
+def test_more_candidates_ask_for_more():
+    assert decisive(0) == decisive(1) < decisive(30)
+    assert math.exp(-decisive(1)) == pytest.approx(0.025)
+
+
+@pytest.mark.parametrize(("blocks", "believed"), [(1, False), (2, False), (5, True)])
+def test_an_effect_that_acts_in_few_blocks_is_believed_and_in_one_it_is_not(blocks, believed):
+    without = NOMINAL.prediction
+    density = without.log_density.copy()
+    density[:blocks] += 100.0
+    claim = replace(GOOD, hypothesis=supposed("friction", replace(predicted(0.1), log_density=density)))
+    assert ("predicts_better" not in rejected(claim)) == believed
 
 
 def test_predictions_that_agree_to_the_last_digit_gain_nothing():

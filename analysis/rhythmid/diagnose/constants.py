@@ -24,6 +24,9 @@ EFFECT_PRIOR = 1.0
 # --- what an effect has to bring ------------------------------------------------------------------------------------
 # false-alarm rate of a further effect, over all candidates (C. E. Bonferroni)
 FALSE_ALARM = 0.025
+# odds that one block of data brings at most for an effect: strong evidence (R. E. Kass, A. E. Raftery, J. Am. Stat. Assoc. 90
+# (1995) 773). An effect may act in few blocks, such as a limit that is met in fast moves; it is not believed for one of them
+BLOCK_ODDS = 20.0
 # share of what can still be explained that a further effect has to remove: less is a part of something else
 # (real recordings: an axis, six arm joints, a frame, pendulums; shares of right effects were 0.3 and more)
 REST = 0.2

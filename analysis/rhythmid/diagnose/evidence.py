@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.constants import (
+    BLOCK_ODDS,
     BLOCKS,
     BLOCKS_OF_A_RECORD,
     DRAWS,
@@ -187,6 +188,16 @@ def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[P
 def difference(first: Prediction, second: Prediction) -> tuple[float, float]:
     """By how much the first predicts better than the second, and the standard error of that, both in log density."""
     return _summed(first.log_density - second.log_density)
+
+
+def weight_for(first: Prediction, second: Prediction) -> float:
+    """Logarithm of the odds that the data bring for the first against the second, no block more than `BLOCK_ODDS`.
+
+    Of the second, were it true, the odds of a block are at most one in the mean, however rarely they are large. So they exceed
+    1/a by chance in a share a of cases at most (Markov's inequality; V. Vovk, R. Wang, Ann. Stat. 49 (2021) 1736). What a block
+    says against the first counts in full: an effect that helps here and harms there has no weight.
+    """
+    return float(np.minimum(first.log_density - second.log_density, math.log(BLOCK_ODDS)).sum())
 
 
 def gain_ahead(first: Prediction, second: Prediction) -> float:

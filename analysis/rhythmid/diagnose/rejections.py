@@ -8,11 +8,9 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from scipy.stats import t as student
-
 from rhythmid.diagnose.constants import EDGE, EQUIVALENT, FALSE_ALARM, MISMATCH, REST
-from rhythmid.diagnose.evidence import difference, gain_ahead
-from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
+from rhythmid.diagnose.evidence import gain_ahead, weight_for
+from rhythmid.diagnose.hypothesis import Hypothesis
 
 
 @dataclass(frozen=True)
@@ -67,15 +65,9 @@ class Rejection:
     reason: str
 
 
-def _gain_in_errors(claim: Claim) -> float:
-    gain, error = difference(claim.hypothesis.prediction, claim.without.prediction)
-    return gain / error if error > 0.0 else math.copysign(math.inf, gain)
-
-
-def significance(prediction: Prediction, candidates: int) -> float:
-    """Standard errors that the best of so many candidates has to gain, by Student's t over the blocks."""
-    blocks = len(prediction.log_density)
-    return float(student.isf(FALSE_ALARM / max(candidates, 1), max(blocks - 1, 1)))
+def decisive(candidates: int) -> float:
+    """Logarithm of the odds that the best of so many candidates has to have."""
+    return math.log(max(candidates, 1) / FALSE_ALARM)
 
 
 def _share(part: float, whole: float) -> float:
@@ -101,14 +93,14 @@ def _of_shape(name: str) -> Callable[[Claim], float]:
 RULES: tuple[Rule, ...] = (
     Rule(
         "predicts_better",
-        "gain in predictive log density over the best hypothesis with one effect less, in its standard errors over blocks",
+        "log odds against the best hypothesis with one effect less, of which no block of data brings more than 20 to 1",
         "less would be found by chance among as many candidates",
-        _gain_in_errors,
-        lambda claim: significance(claim.hypothesis.prediction, claim.candidates),
+        lambda claim: weight_for(claim.hypothesis.prediction, claim.without.prediction),
+        lambda claim: decisive(claim.candidates),
     ),
     Rule(
         "predicts_ahead",
-        "the same gain on the held-out ends and records alone, in its standard errors",
+        "gain in predictive log density on the held-out ends and records alone, in its standard errors over blocks",
         "what it describes does not go on where the fit has not looked",
         lambda claim: gain_ahead(claim.hypothesis.prediction, claim.without.prediction),
         lambda _: -EQUIVALENT,

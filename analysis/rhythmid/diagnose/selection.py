@@ -100,7 +100,9 @@ def select(contest: Contest) -> Selection:
             continue
         best = _simplest(sound, contest)
         if any(row.hypothesis == best.elements for row in told):
-            smaller = max(smaller, best, key=lambda one: one.prediction.score)
+            smaller = max(
+                smaller, best, key=lambda one: round(one.prediction.score, 6)
+            )  # rounding decides nothing
         else:
             grown.append(best)
             smaller = best

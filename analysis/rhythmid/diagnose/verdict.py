@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rhythmid.diagnose.constants import BLIND, EQUIVALENT, EXPLAINED, MAINLY, STATED
-from rhythmid.diagnose.evidence import difference, gain_ahead
+from rhythmid.diagnose.evidence import gain_ahead, weight_for
 from rhythmid.diagnose.hypothesis import Hypothesis, Verdict
 from rhythmid.diagnose.probability import adequacy, joint_probability, weights_of
-from rhythmid.diagnose.rejections import significance
+from rhythmid.diagnose.rejections import decisive
 from rhythmid.diagnose.selection import Contest, Selection, equivalent
 
 
@@ -65,10 +65,9 @@ def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
     ]
     found: list[tuple[float, str]] = []
     for words, one, count in rivals:
-        gain, error = difference(one, chosen.prediction)
         removed = chosen.prediction.mean_square - one.mean_square
         ahead = gain_ahead(one, chosen.prediction) >= -EQUIVALENT
-        if error > 0.0 and removed > 0.0 and ahead and gain > significance(one, count) * error:
+        if removed > 0.0 and ahead and weight_for(one, chosen.prediction) > decisive(count):
             found.append((removed, words))
     if not found or whole <= 0.0:
         return Unexplained(0.0, False, None)

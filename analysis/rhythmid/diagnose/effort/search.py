@@ -9,11 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import t as student_t
 from threadpoolctl import threadpool_limits
 
 from rhythmid.diagnose.case import Budget
-from rhythmid.diagnose.constants import EQUIVALENT, FALSE_ALARM, MISMATCH, PRACTICAL_EFFORT, REST
+from rhythmid.diagnose.constants import EQUIVALENT, MISMATCH, PRACTICAL_EFFORT, REST
 from rhythmid.diagnose.effort.candidate import (
     DELAY,
     Screened,
@@ -28,8 +27,9 @@ from rhythmid.diagnose.effort.candidate import (
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.reference import reference_of
 from rhythmid.diagnose.effort.scales import scales_of
-from rhythmid.diagnose.evidence import Blocks, Linearised, difference, predict
+from rhythmid.diagnose.evidence import Blocks, Linearised, difference, predict, weight_for
 from rhythmid.diagnose.hypothesis import Prediction
+from rhythmid.diagnose.rejections import decisive
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -183,13 +183,11 @@ class _Search:
 
     def _worth(self, new: Prediction, old: Prediction, free: Prediction, tried: int) -> bool:
         """Whether a further effect is more than chance and of practical size."""
-        gain, error = difference(new, old)
-        threshold = float(student_t.ppf(1.0 - FALSE_ALARM / max(tried, 1), self.blocks.count - 1))
         removed = old.mean_square - new.mean_square
         explainable = max(old.mean_square - free.mean_square, 0.0)
         start = float(np.mean(self.nominal.fit.residual**2))
         return bool(
-            gain > threshold * error
+            weight_for(new, old) > decisive(tried)
             and removed > REST * explainable
             and removed > MISMATCH * start
             and removed > (PRACTICAL_EFFORT * size_of(self.balance)) ** 2
