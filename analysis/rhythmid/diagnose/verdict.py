@@ -121,7 +121,7 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     left = unexplained(contest, chosen)
     shares = shares_of(contest, chosen)
     weights = weights_of(contest, selection)
-    labels = tuple(sorted(chosen.elements, key=lambda label: -shares[label]))
+    labels = tuple(sorted(chosen.elements, key=lambda label: -round(shares[label], 6)))
     names = dict(zip(chosen.elements, chosen.names))
     if chosen.kind == "free_map":  # the map is no name
         labels = tuple(label for label in labels if label != chosen.elements[-1])
