@@ -69,7 +69,7 @@ def alternatives(
         "delay": list(_longer_delay(nominal, series)),
         "location": moved,
         "free_map": list(_one_law(chosen, known, sizes)),
-        "effects": kin,
+        "effects": [*kin, *_reduced(chosen, weighed)],
     }
     kinds: dict[tuple[str, ...], Kind] = {
         proposal.added: kind for kind, group in made.items() for proposal in group
@@ -80,6 +80,20 @@ def alternatives(
     every = [proposal for group in made.values() for proposal in group]
     trials, _ = run_trials(every, series, chosen.starts, states, noise, step)
     return [(trial, kinds[trial.added]) for trial in trials]
+
+
+def _reduced(chosen: Trial, weighed: Sequence[Trial]) -> Iterator[Proposal]:
+    """Models that fit better than the chosen one, without each of their effects in turn: one effect may carry all the gain, and
+    have found its deepest minimum only beside another."""
+    known = {tuple(sorted(trial.added)) for trial in weighed}
+    for trial in weighed:
+        if len(trial.added) < 2 or trial.chi2 >= chosen.chi2:
+            continue
+        for label in trial.added:
+            rest = tuple(name for name in trial.added if name != label)
+            if tuple(sorted(rest)) not in known:
+                known.add(tuple(sorted(rest)))
+                yield Proposal(rest, trial.model.without(label), ({},))
 
 
 def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Trial]) -> Iterator[Proposal]:

@@ -25,12 +25,14 @@ from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.multiple_shooting import periods_long, windows
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.output_error import Fit, minimise
+from rhythmid.identify.series import Series
 
 MISFIT = 0.1  # error, as a share of the motion, and
 # power of the residual over what its own past leaves of it, beyond both of which it is no noise
 PREDICTED = 25.0
 # windows in which the catalogue is scored: enough to see every amplitude, few enough to cost less than the records
 WINDOWS = 40
+REMEMBERED = 4  # times what the noise remembers, that a window is longer than at least
 
 
 @dataclass(frozen=True)
@@ -131,9 +133,16 @@ def scored_in_windows(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor |
     cut = cut[:: math.ceil(len(cut) / WINDOWS)]
     try:
         run = prepare_run(fit.model, cut, fit.run.max_step)
-        local = minimise(fit.model, run, fit.names, fit.noise, None, 10, pool)
+        local = minimise(fit.model, run, fit.names, _within(fit.noise, cut), None, 10, pool)
         known = trajectories(local)
         changes = changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
-        return score(under(local, noise_without(local, changes), pool), changes)
+        return score(under(local, _within(noise_without(local, changes), cut), pool), changes)
     except InputError:
         return []
+
+
+def _within(noise: NoiseModel, cut: Sequence[Series]) -> NoiseModel:
+    """The noise as short windows can be whitened: one that remembers more than a quarter of a window counts as white."""
+    if REMEMBERED * noise.order < min(one.blocks for one in cut):
+        return noise
+    return NoiseModel(np.empty(0), noise.variance**0.5)
