@@ -150,9 +150,13 @@ def test_what_is_no_recording_of_a_machine_is_refused_with_one_line(reader, name
     assert words in refused(*READERS[reader], name.rstrip("."))
 
 
-def test_identify_refuses_a_silent_excitation(topics, bag, refused):
-    silent = changed(U, effort=lambda u: 0 * u)(topics)
-    assert "the input is silent" in refused("identify", bag(silent))
+def test_a_silent_excitation_leaves_the_cycle_to_identify_and_no_transfer_function(
+    topics, bag, refused, command
+):
+    silent = bag(changed(U, effort=lambda u: 0 * u)(topics))
+    answer = command("identify", silent)
+    assert answer.code == 0 and "the input is silent" in " ".join(answer.out.split())
+    assert "the input is silent" in refused("identify", silent, "--method", "paper")
 
 
 def test_check_reports_what_it_can_before_it_refuses(topics, bag, command, tmp_path):

@@ -12,7 +12,7 @@ from rhythmid.record.timing import Timing
 
 # of the usual step (rms), from which the steps beside a plateau are those of a machine that goes on: a sine that is cut off at
 # 99 % of its size has 0.2 there, one that comes to rest has none
-MOVING = 0.1
+MOVING = 0.05
 ROUNDED = 0.97  # share of samples on a grid, from which a channel is rounded: some drivers mix in values of another source
 LEVELS = 8  # values that occur more than once, below which they make no grid
 CLIPPED_RUN = 4  # samples in a row at the extreme value
