@@ -22,12 +22,13 @@ from rhythmid.experiment import Delay
 from .clock import Clock, Worker, sleep_in_slices
 from .joint_state import restamped, stamp_of
 from .lateness import Lateness
-from .node import PRIORITY, TIME_MODE, GraphNode, run
+from .node import PRIORITY, RATE, TIME_MODE, GraphNode, run
 from .parameters import Parameter
 from .qos import AdaptiveSubscription, latched, message_type, stream
 
 DELAY = Parameter("delay", 0.0, "time by which every message is held back", "s", (0.0, 10.0), settable=True)
 PARAMETERS = (
+    RATE,
     TIME_MODE,
     PRIORITY,
     DELAY,
@@ -65,7 +66,7 @@ class DelayInjector(GraphNode):
         self._last_ns = -1
         self._relayed = self._dropped = 0
         self._applied_ns = 0
-        self._error = Lateness()
+        self._error = Lateness(self.period_ns)
         self._wall = Clock()
         self._queue: deque[tuple[int, int, bytes]] = deque()
         self._arrived = threading.Event()
@@ -89,7 +90,11 @@ class DelayInjector(GraphNode):
         }
         if self.lockstep:
             return figures
-        queue = {"queued": str(len(self._queue)), "dropped": str(self._dropped)}
+        queue = {
+            "queued": str(len(self._queue)),
+            "dropped": str(self._dropped),
+            "late": str(self._error.late),
+        }
         return {**figures, **queue, **self._error.summary("delay_error")}
 
     def obstacles(self) -> list[str]:

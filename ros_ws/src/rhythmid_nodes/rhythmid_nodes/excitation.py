@@ -25,6 +25,7 @@ from rhythmid.experiment import Safety, ramped
 
 from .clock import Clock, Grid
 from .joint_state import JointStateReader, JointStateWriter
+from .lateness import Lateness
 from .lockstep import Credit
 from .node import COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
 from .parameters import Parameter
@@ -60,6 +61,7 @@ class ExcitationNode(GraphNode):
         self._low, self._high = self._envelope()
         self._state = "idle"  # idle -> running (-> ramping) -> finished | stopped
         self._sent = 0
+        self._lateness = Lateness(self.period_ns)  # of the commands sent, against their stamps
         self._start_ns = 0
         self._fade_from: int | None = None
         self._fade_length = round(self.values["ramp"] * self.values["rate"])
@@ -120,6 +122,7 @@ class ExcitationNode(GraphNode):
             "of": str(len(self._effort)),
             "peak_effort": f"{np.max(np.abs(self._effort), initial=0.0):g}",
             **(self._grid.figures() if self._grid else {}),
+            **({} if self.lockstep else self._lateness.summary("lateness")),
         }
 
     def obstacles(self) -> list[str]:
@@ -181,7 +184,7 @@ class ExcitationNode(GraphNode):
                 return "in lockstep a run cannot be repeated; start the graph anew"
             if obstacles := self.obstacles():
                 return "; ".join(obstacles)
-            self._sent, self._fade_from = 0, None
+            self._sent, self._fade_from, self._lateness = 0, None, Lateness(self.period_ns)
             self._start_ns = 0 if self.lockstep else (self._wall.now() // self.period_ns + 2) * self.period_ns
             self._enter("running")
         if self.lockstep:
@@ -201,6 +204,8 @@ class ExcitationNode(GraphNode):
         said = {**json.loads(self.values["run"]), "state": state, "start_ns": self._start_ns}
         if state != "running":
             said["samples"] = self._sent
+            if not self.lockstep:
+                said["timing"] = {"excitation": self._lateness.to_dict()}
         if reason:
             said["reason"] = reason
         self._run.publish(String(data=json.dumps(said)))
@@ -243,6 +248,7 @@ class ExcitationNode(GraphNode):
                 self._end()
                 return
             self._send()
+            self._lateness.add(max(0, self._wall.now() - stamp_ns))
 
     def _end(self) -> None:
         if self._fade_from is None:
