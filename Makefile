@@ -55,7 +55,6 @@ demo: install ## Run the real graph, identify it from its bag; then conceal an e
 	$(BIN)/python docs/demo_concealed.py
 
 benchmark: install ## Compare the simulator with scipy and MuJoCo
-	$(BIN)/python -m pip install --quiet --constraint requirements.lock mujoco
 	$(BIN)/python benchmarks/simulator.py
 
 naming: install ## Compare the naming of missing physics with PySINDy and a Gaussian process

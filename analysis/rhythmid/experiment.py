@@ -141,6 +141,7 @@ class Experiment:
                 "rhythmid_nodes", "delay_injector", name,
                 {
                     "time_mode": self.time.mode,
+                    "rate": self.time.rate,
                     "delay": delay.constant,
                     "profile": str(delay.profile or ""),
                     "stamp_mode": "arrival",

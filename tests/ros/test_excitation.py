@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 from rclpy.qos import qos_profile_sensor_data
-from std_msgs.msg import String
+from std_msgs.msg import Float64, Float64MultiArray, String
 
 from rhythmid.errors import InputError
 from rhythmid.excitation.sequence import build
@@ -186,3 +186,39 @@ def test_a_node_that_is_ended_leaves_a_zero_behind(graph, excite):
 def test_what_cannot_work_is_refused(graph, parameters, said):
     with pytest.raises(InputError, match=said):
         graph.add(ExcitationNode, **parameters)
+
+
+@pytest.mark.parametrize(
+    ("kind", "parameters", "expected"),
+    [
+        (Float64, {}, 0.5),
+        (Float64MultiArray, {}, [0.5]),
+        (Float64MultiArray, {"command_joints": ["hip", "leg", "toe"]}, [0.0, 0.5, 0.0]),
+    ],
+)
+def test_it_speaks_the_command_type_of_the_robot_on_its_topic(graph, kind, parameters, expected):
+    heard = graph.listen("effort_commands", kind)
+    graph.add(
+        ExcitationNode, max_effort=1.0, excitation=json.dumps(CONSTANT), command_type=kind.__name__,
+        command_topic="effort_commands", **parameters,
+    )  # fmt: skip
+    Robot(graph)
+    start(graph)
+    graph.until(lambda: len(heard) > 20, "commands")
+    found = heard[10].data
+    assert (list(found) if kind is Float64MultiArray else found) == expected
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        (
+            {"command_type": "Float64MultiArray", "command_joints": ["hip"]},
+            "the joint 'leg' is not among them",
+        ),
+        ({"command_type": "Float64", "time_mode": "lockstep"}, "a command needs a stamp; use JointState"),
+    ],
+)
+def test_a_command_that_cannot_be_made_is_refused(graph, parameters, said):
+    with pytest.raises(InputError, match=said):
+        graph.add(ExcitationNode, max_effort=1.0, excitation=json.dumps(CONSTANT), **parameters)

@@ -172,6 +172,13 @@ def test_real_time_loses_nothing_and_reports_its_lateness(rhythmid, tmp_path):
         assert np.all(applied >= delay) and np.median(applied) < delay + 20_000_000
     for said in ("lateness_p99_ms", "delay_error_max_ms", "applied_delay_mean_ms", "late_commands"):
         assert said in done.stderr
+    timing = run[-1]["timing"]
+    assert timing["excitation"]["of"] == 3000 and timing["plant"]["of"] == 3001 and timing["lost"] == 0
+    for stage in ("excitation", "command_delay", "plant", "measurement_delay"):
+        assert 0 <= timing[stage]["late"] <= timing[stage]["of"], stage
+        assert 0.0 <= timing[stage]["mean"] <= timing[stage]["max"], stage
+    concealed = json.dumps(run)
+    assert "40.3" not in concealed and "0.0403" not in concealed and "stiffness" not in concealed
 
 
 def test_an_existing_bag_is_refused_before_anything_starts(rhythmid, tmp_path):

@@ -146,3 +146,12 @@ def test_a_band_limited_signal_with_a_gap_is_itself_on_either_side():
     assert float(signal(5.5)) == pytest.approx(
         0.5 * (value[TIME < 5.0][-1] + value[TIME >= 6.0][0]), abs=0.02
     )
+
+
+def test_commands_that_were_held_up_and_came_in_a_burst_are_not_lost():
+    due = 1e-3 * np.arange(6000)
+    arrived = np.where((due >= 1.0) & (due < 1.02), 1.02 + 0.1 * (due - 1.0), due)
+    assert len(gaps_between(arrived)[0]) == 0
+    kept = (due < 3.0) | (due >= 3.02)
+    first, lost = gaps_between(arrived[kept])
+    assert (arrived[kept][first].round(3).tolist(), lost.tolist()) == ([2.999], [20])

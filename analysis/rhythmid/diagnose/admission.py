@@ -14,6 +14,7 @@ from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
 from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.outlier import without_stray
+from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import clipped_samples
 from rhythmid.record.record import Record
 
@@ -46,6 +47,7 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
     notes = dict.fromkeys(
         (
             remark,
+            *(f"{one.name}: {note}" for one in whole for note in punctuality_notes(one.run)),
             *(note for _, said in (*tidy, *cleaned) for note in said),
             *(drive_of(a, b) for (a, _), b in zip(cleaned, given)),
             *(note for one in cut for note in one.notes),

@@ -14,6 +14,7 @@ from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block, Topic
 from rhythmid.record.clocks import clock_notes
 from rhythmid.record.columns import Columns, read_columns
+from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality, clipped, resolution
 from rhythmid.record.record import SHORTEST, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
@@ -111,7 +112,7 @@ def read_bag(bag: Bag, signals: Signals | None = None) -> Record:
     start_ns = 0 if 0 <= first < RUN_CLOCK * 1e9 else first
     made = {role: replace(part, time=(stamp_ns - start_ns) * 1e-9) for role, stamp_ns, part in samples}
     mend = "use  time: receive" if chosen.time.kind == "header" else "split the recording there"
-    quality = Quality({}, bag.truncated, (*bag.notes, *notes))
+    quality = Quality({}, bag.truncated, (*bag.notes, *notes, *punctuality_notes(description)))
     record = _record(bag.name, made, chosen, mend, quality)
     return _finish(replace(record, start_ns=start_ns, hold=chosen.hold or "zero", run=description), chosen)
 

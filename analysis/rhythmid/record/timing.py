@@ -12,7 +12,7 @@ LATE = 10.0  # periods by which a message may arrive late and still be put back 
 SAME = 1e-9  # seconds; times that differ by less are one
 OFTEN = 0.1  # share of steps longer than 1.5 periods, beyond which a channel is not periodic
 NEIGHBOURS = (
-    5  # samples on either side, beyond twice as many as may be missing, whose stamps tell whether any is
+    25  # samples on either side, beyond twice as many as may be missing, whose stamps tell whether any is
 )
 
 Times = NDArray[np.float64]
@@ -79,7 +79,8 @@ class Timing:
 def gaps_between(time: Times) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Gaps in increasing times (n,): of each the sample before it, and how many samples are missing; (g,) and (g,).
 
-    A step of more than 1.5 periods that the steps around it make up for is jitter of the stamps, and none. A channel in
+    A step of more than 1.5 periods that the steps around it make up for is jitter of the stamps or a burst of messages that were
+    held up, and none: nothing comes early, so that after a real gap even the earliest of the next samples is late. A channel in
     which long steps are common, such as a command that is sent when it changes, has no gaps.
     """
     step = np.diff(time)
@@ -95,7 +96,7 @@ def gaps_between(time: Times) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     real = np.zeros(len(wide), dtype=bool)
     for index, (before, count) in enumerate(zip(wide, 2 * lost + NEIGHBOURS, strict=True)):
         earlier, later = late[max(before + 1 - count, 0) : before + 1], late[before + 1 : before + 1 + count]
-        real[index] = np.median(later) - np.median(earlier) > 0.5 * period * lost[index]
+        real[index] = later.min() - earlier.min() > 0.5 * period * lost[index]
     return wide[real], lost[real]
 
 

@@ -6,12 +6,15 @@ import json
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.duration import Duration
 from rclpy.node import Node
 from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 
 from rhythmid_nodes.lockstep import ACK_TOPIC
 from rhythmid_nodes.qos import latched
+
+from .punctuality import timing
 
 
 class Observer(Node):
@@ -21,6 +24,7 @@ class Observer(Node):
     ----------
     obstacles : node name -> what keeps the node from its work ("" when it is ready), as /diagnostics says.
     figures : node name -> its key-value pairs, the newest.
+    heard : node name -> how many sets of them have come.
     run : content of the topic `run`, the newest; empty before the start.
     acknowledged_ns : simulated time up to which the recorder has everything (lockstep).
     """
@@ -29,11 +33,13 @@ class Observer(Node):
         super().__init__("supervisor", namespace=namespace)
         self.obstacles: dict[str, str] = {}
         self.figures: dict[str, dict[str, str]] = {}
+        self.heard: dict[str, int] = {}
         self.run: dict[str, Any] = {}
         self.acknowledged_ns = 0
         self.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, latched(100))
         self.create_subscription(String, "run", self._on_run, latched())
         self.create_subscription(Header, ACK_TOPIC, self._on_ack, latched())
+        self._run = self.create_publisher(String, "run", latched())
         self._start = self.create_client(Trigger, "excitation/start")
         self._stop = self.create_client(Trigger, "excitation/stop")
         self._answer: Any = None
@@ -61,12 +67,20 @@ class Observer(Node):
         if self._stop.service_is_ready():
             self._stop.call_async(Trigger.Request())
 
+    def tell_timing(self) -> None:
+        """Say on `run` how punctual the run was, if there was one."""
+        if self.run:
+            self.run["timing"] = timing(self.figures, self.run)
+            self._run.publish(String(data=json.dumps(self.run)))
+            self._run.wait_for_all_acked(Duration(seconds=0.5))
+
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             namespace, _, name = status.name.rpartition("/")
             if namespace == self.get_namespace().rstrip("/"):
                 self.obstacles[name] = status.message.removeprefix("not ready: ").removeprefix("ok")
                 self.figures[name] = {pair.key: pair.value for pair in status.values}
+                self.heard[name] = self.heard.get(name, 0) + 1
 
     def _on_run(self, message: String) -> None:
         self.run = json.loads(message.data)

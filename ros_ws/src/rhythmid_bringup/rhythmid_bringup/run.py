@@ -51,8 +51,8 @@ def run_graph(path: Path, out: Path | None) -> int:
         shutil.rmtree(folder, ignore_errors=True)
     if outcome.code == 2:
         raise InputError(outcome.sentence)
-    show(console, experiment, supervisor.observed, outcome)
     mend(experiment.record.path)
+    show(console, experiment, supervisor.observed, outcome)
     if outcome.code == 1:
         console.print(f"parameters and logs of the nodes: {folder}")
     return outcome.code

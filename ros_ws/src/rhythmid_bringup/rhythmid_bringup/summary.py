@@ -7,6 +7,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from rhythmid.experiment import Experiment
+from rhythmid.record.punctuality import punctuality_notes
 
 from .supervisor import Observed, Outcome
 
@@ -24,3 +25,5 @@ def show(console: Console, experiment: Experiment, observed: Observed, outcome: 
     console.print(
         f"[{colour}]{escape(outcome.sentence)}[/]: {observed.played:.3f} s played in {observed.elapsed:.1f} s"
     )
+    for note in punctuality_notes(observed.run):
+        console.print(f"[bold]{escape(note)}[/]")

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import rclpy
 from rclpy.experimental.events_executor import EventsExecutor
@@ -25,6 +26,7 @@ from .processes import Supervised, end
 
 READY_WITHIN = 60.0  # seconds; importing ROS and compiling the model take most of it on a busy machine
 STALLED_AFTER = 30.0  # seconds
+FIGURES_WITHIN = 2.0  # seconds; every node tells its figures once a second
 POST_ROLL = 0.25  # seconds recorded in real time after the last response can have arrived
 
 
@@ -38,8 +40,10 @@ class Outcome:
 
 @dataclass
 class Observed:
-    """What the supervisor saw: the figures of every node, simulated or real seconds played, and how long it took."""
+    """What the supervisor saw: the figures of every node, what `run` said last, simulated or real seconds played, and how
+    long it took."""
 
+    run: dict[str, Any] = field(default_factory=dict)
     figures: dict[str, dict[str, str]] = field(default_factory=dict)
     played: float = 0.0
     elapsed: float = 0.0
@@ -74,11 +78,12 @@ class Supervisor:
         try:
             self._launch()
             outcome = self._wait_until_ready(observer) or self._play(observer)
+            self._tell_timing(observer)
             end([process for process in self._processes if process.name != "recorder"], self._listen)
             end(self._processes, self._listen)  # the recorder hears the others' last words
             for process in self._processes:
                 process.join_output()
-            self.observed.figures = observer.figures
+            self.observed.figures, self.observed.run = observer.figures, observer.run
         finally:
             for process in self._processes:
                 process.signal(signal.SIGKILL)
@@ -209,6 +214,18 @@ class Supervisor:
         while observer.state == "running" and time.monotonic() < patience:
             self._listen()
         self._record_tail()
+
+    def _tell_timing(self, observer: Observer) -> None:
+        """Let the bag say how punctual the run was; simulated time knows no lateness."""
+        if self._lockstep or not observer.run:
+            return
+        before = dict(observer.heard)
+        patience = time.monotonic() + FIGURES_WITHIN
+        while any(observer.heard[name] == before[name] for name in before):
+            if time.monotonic() > patience:
+                break
+            self._listen()
+        observer.tell_timing()
 
 
 def longest(delay: Delay) -> float:

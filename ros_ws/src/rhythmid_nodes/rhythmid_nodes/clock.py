@@ -83,7 +83,7 @@ class Grid(Worker):
     def __init__(self, clock: Clock, period_ns: int, tick: Callable[[int], None], priority: int = 0) -> None:
         super().__init__("grid", self._loop, priority)
         self._clock, self._period_ns, self._tick = clock, period_ns, tick
-        self._lateness = Lateness()
+        self._lateness = Lateness(period_ns)
         self._first_ns = self._last_ns = 0
 
     def figures(self) -> dict[str, str]:

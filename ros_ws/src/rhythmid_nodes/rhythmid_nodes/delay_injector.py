@@ -22,12 +22,13 @@ from rhythmid.experiment import Delay
 from .clock import Clock, Worker, sleep_in_slices
 from .joint_state import restamped, stamp_of
 from .lateness import Lateness
-from .node import PRIORITY, TIME_MODE, GraphNode, run
+from .node import PRIORITY, RATE, TIME_MODE, GraphNode, run
 from .parameters import Parameter
 from .qos import AdaptiveSubscription, latched, message_type, stream
 
 DELAY = Parameter("delay", 0.0, "time by which every message is held back", "s", (0.0, 10.0), settable=True)
 PARAMETERS = (
+    RATE,
     TIME_MODE,
     PRIORITY,
     DELAY,
@@ -65,7 +66,7 @@ class DelayInjector(GraphNode):
         self._last_ns = -1
         self._relayed = self._dropped = 0
         self._applied_ns = 0
-        self._error = Lateness()
+        self._error = Lateness(self.period_ns)
         self._wall = Clock()
         self._queue: deque[tuple[int, int, bytes]] = deque()
         self._arrived = threading.Event()
@@ -89,7 +90,11 @@ class DelayInjector(GraphNode):
         }
         if self.lockstep:
             return figures
-        queue = {"queued": str(len(self._queue)), "dropped": str(self._dropped)}
+        queue = {
+            "queued": str(len(self._queue)),
+            "dropped": str(self._dropped),
+            "late": str(self._error.late),
+        }
         return {**figures, **queue, **self._error.summary("delay_error")}
 
     def obstacles(self) -> list[str]:
@@ -123,15 +128,17 @@ class DelayInjector(GraphNode):
         since = 0 if self._start_ns is None else stamp_ns - self._start_ns
         return int(np.rint(np.interp(since * 1e-9, *self._profile) * 1e9))
 
-    def _on_lockstep(self, data: bytes) -> None:
+    def _on_lockstep(self, data: bytes, _received_ns: int) -> None:
         stamp_ns = stamp_of(data)
         self._last_ns = max(stamp_ns + self._delay_at(stamp_ns), self._last_ns + 1)
         self._relayed += 1
         self._applied_ns += self._last_ns - stamp_ns
         self._output.publish(restamped(data, self._last_ns))
 
-    def _on_realtime(self, data: bytes) -> None:
-        origin_ns = stamp_of(data) if self.values["delay_from"] == "header" else self._wall.now()
+    def _on_realtime(self, data: bytes, received_ns: int) -> None:
+        origin_ns = (
+            stamp_of(data) if self.values["delay_from"] == "header" else received_ns or self._wall.now()
+        )
         if len(self._queue) >= self.values["queue_size"]:
             self._dropped += 1
             return

@@ -1,4 +1,4 @@
-"""excitation: publishes u(t) on `excitation` when told to, and stops by itself when the machine is not safe.
+"""excitation: publishes u(t) on `excitation` (or `command_topic`, as `command_type`) when told to, and stops by itself when the machine is not safe.
 
 Services `~/start` and `~/stop` (std_srvs/Trigger). In real time it listens to `joint_states` and stops at once, with a
 last command of zero, when the newest measurement is older than `stale_after` or leaves `envelope`.
@@ -24,7 +24,9 @@ from rhythmid.excitation.sequence import build
 from rhythmid.experiment import Safety, ramped
 
 from .clock import Clock, Grid
-from .joint_state import JointStateReader, JointStateWriter
+from .command import STAMPED, TYPES, Commander
+from .joint_state import JointStateReader
+from .lateness import Lateness
 from .lockstep import Credit
 from .node import COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
 from .parameters import Parameter
@@ -44,8 +46,11 @@ PARAMETERS = (
     Parameter("ramp", 0.0, "fading in at the start and out at the end or on stop", "s", (0.0, 3600.0)),
     Parameter("stale_after", 0.5, "realtime: stop when the newest measurement is older; 0: never", "s", (0.0, _FAR)),
     Parameter("envelope", [-_FAR, _FAR], "realtime: stop when the position leaves [low, high] in m"),
+    Parameter("command_type", STAMPED, "message type of the commands", choices=tuple(TYPES)),
+    Parameter("command_topic", "excitation", "topic of the commands"),
+    Parameter("command_joints", None, "order of a Float64MultiArray's joints; not given: the one joint", items=str),
     Parameter("run", "{}", "JSON published on `run`"),
-    Parameter("subscribers", 1, "subscribers of `excitation` to wait for before starting", "", (0, 1000)),
+    Parameter("subscribers", 1, "subscribers of the commands to wait for before starting", "", (0, 1000)),
     Parameter("unattended", False, "start as soon as ready and end the process a second after the last sample"),
     Parameter("consumers", ["plant", "recorder"], "lockstep: nodes whose announcements the excitation waits for"),
 )  # fmt: skip
@@ -60,6 +65,7 @@ class ExcitationNode(GraphNode):
         self._low, self._high = self._envelope()
         self._state = "idle"  # idle -> running (-> ramping) -> finished | stopped
         self._sent = 0
+        self._lateness = Lateness(self.period_ns)  # of the commands sent, against their stamps
         self._start_ns = 0
         self._fade_from: int | None = None
         self._fade_length = round(self.values["ramp"] * self.values["rate"])
@@ -69,8 +75,7 @@ class ExcitationNode(GraphNode):
         self._position = float("nan")
         self._lock = threading.Lock()  # measurements and services come on another thread than ticks
         self._reader = JointStateReader(self.values["joint"])
-        self._writer = JointStateWriter(self.values["joint"], "effort")
-        self._output = self.create_publisher(JointState, "excitation", stream(self.lockstep))
+        self._output = self._commander()
         self._run = self.create_publisher(String, "run", latched())
         self.create_service(Trigger, "~/start", self._on_start)
         self.create_service(Trigger, "~/stop", self._on_stop)
@@ -107,6 +112,17 @@ class ExcitationNode(GraphNode):
         safety = Safety(max_effort=values["max_effort"], ramp=values["ramp"])
         return ramped(excitation, safety, grid, count * self.period_ns * 1e-9)
 
+    def _commander(self) -> Commander:
+        values = self.values
+        if self.lockstep and values["command_type"] != STAMPED:
+            raise InputError(
+                f"parameter command_type = {values['command_type']!r}: in lockstep a command needs a stamp; use {STAMPED}"
+            )
+        return Commander(
+            self, values["command_topic"], values["command_type"], values["joint"], values["command_joints"] or (),
+            stream(self.lockstep),
+        )  # fmt: skip
+
     def _envelope(self) -> tuple[float, float]:
         envelope = self.values["envelope"]
         if len(envelope) != 2 or not envelope[0] < envelope[1]:
@@ -120,13 +136,14 @@ class ExcitationNode(GraphNode):
             "of": str(len(self._effort)),
             "peak_effort": f"{np.max(np.abs(self._effort), initial=0.0):g}",
             **(self._grid.figures() if self._grid else {}),
+            **({} if self.lockstep else self._lateness.summary("lateness")),
         }
 
     def obstacles(self) -> list[str]:
         found = []
-        matched, wanted = self._output.get_subscription_count(), self.values["subscribers"]
+        matched, wanted = self._output.publisher.get_subscription_count(), self.values["subscribers"]
         if matched < wanted:
-            found.append(f"{matched} of {wanted} subscribers of {self._output.topic}")
+            found.append(f"{matched} of {wanted} subscribers of {self._output.publisher.topic}")
         if not self.lockstep and (danger := self._danger()):
             found.append(danger)
         return found
@@ -153,7 +170,7 @@ class ExcitationNode(GraphNode):
                 self._halt(self._wall.now(), "the node was ended")
         super().close()
         if playing:
-            for publisher in (self._output, self._run):
+            for publisher in (self._output.publisher, self._run):
                 publisher.wait_for_all_acked(Duration(seconds=0.5))
 
     # Start and stop
@@ -181,7 +198,7 @@ class ExcitationNode(GraphNode):
                 return "in lockstep a run cannot be repeated; start the graph anew"
             if obstacles := self.obstacles():
                 return "; ".join(obstacles)
-            self._sent, self._fade_from = 0, None
+            self._sent, self._fade_from, self._lateness = 0, None, Lateness(self.period_ns)
             self._start_ns = 0 if self.lockstep else (self._wall.now() // self.period_ns + 2) * self.period_ns
             self._enter("running")
         if self.lockstep:
@@ -201,6 +218,8 @@ class ExcitationNode(GraphNode):
         said = {**json.loads(self.values["run"]), "state": state, "start_ns": self._start_ns}
         if state != "running":
             said["samples"] = self._sent
+            if not self.lockstep:
+                said["timing"] = {"excitation": self._lateness.to_dict()}
         if reason:
             said["reason"] = reason
         self._run.publish(String(data=json.dumps(said)))
@@ -216,7 +235,7 @@ class ExcitationNode(GraphNode):
 
     def _send(self) -> None:
         stamp_ns = self._start_ns + self._sent * self.period_ns
-        self._output.publish(self._writer.write(stamp_ns, self._value(self._sent)))
+        self._output.send(stamp_ns, self._value(self._sent))
         self._sent += 1
 
     def _send_lockstep(self) -> None:
@@ -239,10 +258,11 @@ class ExcitationNode(GraphNode):
             faded = self._fade_from is not None and self._sent - self._fade_from >= self._fade_length
             if faded or self._sent >= len(self._effort):
                 # whoever holds the last command holds zero from now on
-                self._output.publish(self._writer.write(stamp_ns, 0.0))
+                self._output.send(stamp_ns, 0.0)
                 self._end()
                 return
             self._send()
+            self._lateness.add(max(0, self._wall.now() - stamp_ns))
 
     def _end(self) -> None:
         if self._fade_from is None:
@@ -252,7 +272,7 @@ class ExcitationNode(GraphNode):
 
     def _halt(self, stamp_ns: int, danger: str) -> None:
         """Stop at once, without fading, with a last command of zero."""
-        self._output.publish(self._writer.write(stamp_ns, 0.0))
+        self._output.send(stamp_ns, 0.0)
         self._enter("stopped", danger)
         self.get_logger().error(f"excitation stopped: {danger}")
 

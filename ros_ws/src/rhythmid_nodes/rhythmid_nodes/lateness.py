@@ -7,10 +7,14 @@ _BINS = 10_000
 
 
 class Lateness:
-    """A histogram of delays past a due time, 10 us bins up to 100 ms; mean and maximum are exact."""
+    """A histogram of delays past a due time, 10 us bins up to 100 ms; mean and maximum are exact.
 
-    def __init__(self) -> None:
-        self.count = 0
+    `late` counts the events that came more than `limit_ns` after they were due.
+    """
+
+    def __init__(self, limit_ns: int) -> None:
+        self.count = self.late = 0
+        self._limit_ns = limit_ns
         self.max_ns = 0
         self._sum_ns = 0
         self._bins = [0] * (_BINS + 1)
@@ -18,6 +22,7 @@ class Lateness:
     def add(self, late_ns: int) -> None:
         """Count one event that came `late_ns` >= 0 after it was due."""
         self.count += 1
+        self.late += late_ns > self._limit_ns
         self._sum_ns += late_ns
         if late_ns > self.max_ns:
             self.max_ns = late_ns
@@ -35,6 +40,16 @@ class Lateness:
             if seen >= wanted and seen and index < _BINS:
                 return min((index + 1) * _BIN_NS, self.max_ns)
         return self.max_ns
+
+    def to_dict(self) -> dict[str, float]:
+        """Counts and times [s] for the topic `run`."""
+        return {
+            "of": self.count,
+            "late": self.late,
+            "mean": round(1e-9 * self.mean_ns, 9),
+            "p99": 1e-9 * self.percentile_ns(99.0),
+            "max": 1e-9 * self.max_ns,
+        }
 
     def summary(self, name: str) -> dict[str, str]:
         """Diagnostic values `<name>_mean|p99|max` in milliseconds."""

@@ -17,6 +17,7 @@ from rhythmid.simulation.plant import Plant
 
 from .clock import Clock, Grid
 from .joint_state import JointStateReader, JointStateWriter
+from .lateness import Lateness
 from .lockstep import Acknowledger, Credit, block
 from .node import COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
 from .parameters import Parameter
@@ -59,7 +60,7 @@ class PlantNode(GraphNode):
         self._states = self.create_publisher(JointState, "plant/joint_states", profile)
         self._forcing = self.create_publisher(JointState, "forcing", profile)
         self._command_topic = self.resolve_topic_name("command")
-        self._commands = self._late = self._foreign = self._samples = 0
+        self._commands = self._foreign = self._samples = 0
         self._newest_ns = -1
         self._grid: Grid | None = None
         if self.lockstep:
@@ -81,7 +82,7 @@ class PlantNode(GraphNode):
         else:
             self._wall = Clock()
             self._origin_ns: int | None = None
-            self._transport_ns = 0  # by which all commands together acted later than they were stamped
+            self._transport = Lateness(self.period_ns)  # by which commands acted later than they were stamped
             self._done_ns = 0  # time since the origin up to which the plant has been integrated
             self._arrived: deque[tuple[int, int, float]] = deque()
             self.create_subscription(JointState, "command", self._on_realtime, profile, raw=True)
@@ -114,8 +115,8 @@ class PlantNode(GraphNode):
         if self._grid is None:
             return figures
         late = {
-            "late_commands": str(self._late),
-            "transport_mean_ms": f"{1e-6 * self._transport_ns / max(1, self._commands):.6f}",
+            "late_commands": str(self._transport.late),
+            **self._transport.summary("transport"),
             "foreign_commands": str(self._foreign),
         }
         return {**figures, **late, **self._grid.figures()}
@@ -164,7 +165,7 @@ class PlantNode(GraphNode):
             self._publish(until_ns, origin_ns=0)
 
     # Real time: a command acts from its stamp on, which is when it was released, even between two ticks; one that
-    # comes after the plant has passed its stamp acts at once and is counted as late.
+    # comes after the plant has passed its stamp acts at once; later than a sample period, it is counted as late.
 
     def _on_realtime(self, data: bytes) -> None:
         sample = self._reader.read(data)
@@ -179,10 +180,9 @@ class PlantNode(GraphNode):
         while self._arrived:
             released_ns, received_ns, effort = self._arrived.popleft()
             act_ns = min(released_ns, received_ns) - self._origin_ns  # a foreign clock may be ahead of ours
-            self._late += act_ns < self._done_ns
             stamped_ns = act_ns
             act_ns = max(act_ns, self._done_ns, self._newest_ns + 1)
-            self._transport_ns += act_ns - stamped_ns
+            self._transport.add(act_ns - stamped_ns)
             self._plant.push(act_ns, effort)
             self._newest_ns = act_ns
             self._commands += 1

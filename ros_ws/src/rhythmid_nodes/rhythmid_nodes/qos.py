@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from rclpy.event_handler import QoSMessageLostInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -64,7 +65,8 @@ def message_type(name: str) -> type:
 class AdaptiveSubscription:
     """A raw subscription made as soon as a publisher shows its type and quality of service.
 
-    `found(type_name, publishers)` is called once, before the first message. `lost` counts the messages that the
+    `callback(data, received_ns)` gets a message and when the middleware received it [ns since the epoch], which on a busy machine
+    is long before the callback's turn; 0 if it does not say. `found(type_name, publishers)` is called once, before the first message. `lost` counts the messages that the
     transport says it could not deliver.
     """
 
@@ -72,7 +74,7 @@ class AdaptiveSubscription:
         self,
         node: Node,
         topic: str,
-        callback: Callable[[bytes], None],
+        callback: Callable[[bytes, int], None],
         found: Callable[[str, Sequence[TopicEndpointInfo]], None] | None = None,
         depth: int = 2000,
     ) -> None:
@@ -95,9 +97,15 @@ class AdaptiveSubscription:
         if self._found is not None:
             self._found(type_name, publishers)
         self.subscription = self._node.create_subscription(
-            message_type(type_name), self.topic, self._callback, adapted(publishers, self._depth), raw=True,
+            message_type(type_name), self.topic, self._receive, adapted(publishers, self._depth), raw=True,
             event_callbacks=SubscriptionEventCallbacks(message_lost=self._on_lost),
         )  # fmt: skip
+        # the events executor hands over message and info as one pair; rclpy would not ask for the info of such a callback
+        self.subscription._callback_type = Subscription.CallbackType.WithMessageInfo
+
+    def _receive(self, *taken: Any) -> None:
+        data, about = taken[0] if len(taken) == 1 else taken
+        self._callback(data, about["received_timestamp"])
 
     def _on_lost(self, event: QoSMessageLostInfo) -> None:
         self.lost = event.total_count

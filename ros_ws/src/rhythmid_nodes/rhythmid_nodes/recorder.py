@@ -139,12 +139,12 @@ class Recorder(GraphNode):
             if all(known.type_name for known in self._tracks.values()):
                 self._streams = [known for known in self._tracks.values() if known.is_stream]
 
-        def receive(data: bytes) -> None:
-            self._receive(topic, track, data)
+        def receive(data: bytes, received_ns: int) -> None:
+            self._receive(topic, track, data, received_ns)
 
         return AdaptiveSubscription(self, topic, receive, found)
 
-    def _receive(self, topic: str, track: Track, data: bytes) -> None:
+    def _receive(self, topic: str, track: Track, data: bytes, received_ns: int) -> None:
         track.received += 1
         stamp_ns = stamp_of(data) if track.has_header else 0
         if self._paused:
@@ -152,14 +152,14 @@ class Recorder(GraphNode):
         else:
             if track.has_header:
                 track.add(stamp_ns)
-            self._bag.put(topic, self._receive_time(track, stamp_ns), data)
+            self._bag.put(topic, self._receive_time(track, stamp_ns, received_ns), data)
         if self._ack is not None and self._streams:
             self._ack.taken(min([stream.received for stream in self._streams]))
 
-    def _receive_time(self, track: Track, stamp_ns: int) -> int:
-        """The machine's time, or in lockstep the simulated one: the newest stamp of any stream."""
+    def _receive_time(self, track: Track, stamp_ns: int, received_ns: int) -> int:
+        """When the middleware received it, or in lockstep the simulated time: the newest stamp of any stream."""
         if not self.lockstep:
-            return self._wall.now()
+            return received_ns or self._wall.now()
         if track.is_stream:
             self._simulated_ns = max(self._simulated_ns, stamp_ns)
             return stamp_ns

@@ -1,0 +1,44 @@
+"""How punctual the graph was that made a recording, by its topic `run`, and what of it matters for the analysis."""
+
+from collections.abc import Mapping
+from typing import Any
+
+# share of late messages, from which they are told: the 99th percentile of the lateness then exceeds a sample period
+NOTABLE = 0.01
+# stages that messages pass; where the command path holds them back until they are due, a late sender does not matter
+_PATHS = {"commands": ("command_delay", "plant"), "measurements": ("measurement_delay",)}
+_SENDER = "excitation"
+_MEND = "use lockstep or a quieter machine"
+
+
+def punctuality_notes(run: Mapping[str, Any] | None) -> tuple[str, ...]:
+    """What deserves mention, one line each; empty for a punctual run and for a recording that says nothing of it.
+
+    Parameters
+    ----------
+    run : what the topic `run` says. `timing` has for each stage of the path that worked in real time how many messages
+        (`of`) came more than a sample period `late`, and the longest delay of one [s] (`max`); and how many were `lost`.
+    """
+    timing = (run or {}).get("timing")
+    if not isinstance(timing, Mapping):
+        return ()
+    found = []
+    for what, path in _PATHS.items():
+        if what == "commands" and not any(name in timing for name in path):
+            path = (_SENDER,)
+        stages = [timing[name] for name in path if isinstance(timing.get(name), Mapping)]
+        worst = max(stages, key=lambda stage: _number(stage, "late"), default={})
+        late, of = _number(worst, "late"), _number(worst, "of")
+        if late > NOTABLE * of:
+            by = f"up to {1e3 * _number(worst, 'max'):.3g} ms"
+            found.append(f"{late:.0f} of {of:.0f} {what} were late, by {by}: {_MEND}")
+    lost = _number(timing, "lost")
+    if lost > 0:
+        found.append(f"{lost:.0f} messages were lost: {_MEND}")
+    return tuple(found)
+
+
+def _number(values: Mapping[str, Any], name: str) -> float:
+    """A number of a foreign document; 0 for what is none."""
+    value = values.get(name)
+    return float(value) if isinstance(value, (int, float)) else 0.0

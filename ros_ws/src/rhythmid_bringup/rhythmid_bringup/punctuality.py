@@ -1,0 +1,39 @@
+"""How punctual a run in real time was: the part of the nodes' figures that the topic `run` repeats.
+
+What would tell a delay that is to be found (how long an injector holds messages back) stays out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+# node: keys of its figures for the number of messages, of late ones, and the prefix of how late they were
+_STAGES = {
+    "command_delay": ("relayed", "late", "delay_error"),
+    "plant": ("commands", "late_commands", "transport"),
+    "measurement_delay": ("relayed", "late", "delay_error"),
+}
+_LOSSES = (
+    ("command_delay", "dropped"),
+    ("measurement_delay", "dropped"),
+    ("recorder", "dropped"),
+    ("recorder", "lost"),
+)
+
+
+def timing(figures: Mapping[str, Mapping[str, str]], said: Mapping[str, Any]) -> dict[str, Any]:
+    """Counts and lateness [s] of every stage of the path, and the messages lost.
+
+    Parameters
+    ----------
+    figures : of every node by its name, as /diagnostics has them.
+    said : what `run` has said so far: the excitation counts for itself.
+    """
+    found: dict[str, Any] = dict(said.get("timing", {}))
+    for node, (of, late, prefix) in _STAGES.items():
+        if node in figures and late in figures[node]:
+            told = figures[node]
+            times = {name: 1e-3 * float(told[f"{prefix}_{name}_ms"]) for name in ("mean", "p99", "max")}
+            found[node] = {"of": int(told[of]), "late": int(told[late]), **times}
+    return {**found, "lost": sum(int(figures.get(node, {}).get(key, 0)) for node, key in _LOSSES)}
