@@ -1,8 +1,8 @@
 """Probabilities of names: how much of the evidence is for hypotheses that hold them.
 
 Hypotheses with no more effects than the chosen one share the evidence, as pseudo-BMA weights. A name's probability is the
-share of those that hold it, times the chance that the catalogue holds the truth at all, given how much of what anything
-explains the chosen hypothesis leaves.
+share of those that hold it, times the chance that the catalogue holds the truth at all, given how much is left that something
+else explains, beside the part of the mismatch that the name explains.
 """
 
 from collections.abc import Sequence

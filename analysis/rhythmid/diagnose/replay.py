@@ -48,9 +48,9 @@ def _written(one: Prediction) -> dict[str, list[float] | list[bool] | None]:
 
 
 def _read(data: dict[str, Any]) -> Prediction:
-    numbers = (np.array(data[name]) for name in ("log_density", "squared_error", "samples"))
+    density, error, samples = (np.array(data[name]) for name in ("log_density", "squared_error", "samples"))
     unseen = data.get("unseen")
-    return Prediction(*numbers, None if unseen is None else np.array(unseen, dtype=bool))
+    return Prediction(density, error, samples, None if unseen is None else np.array(unseen, dtype=bool))
 
 
 def contest_of(data: dict[str, Any]) -> Contest:

@@ -1,7 +1,7 @@
 """The verdict: consistent, missing physics, unknown physics or undecided."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from rhythmid.diagnose.constants import BLIND, EQUIVALENT, EXPLAINED, MAINLY, STATED
@@ -126,10 +126,15 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     if chosen.kind == "free_map":  # the map is no name
         labels = tuple(label for label in labels if label != chosen.elements[-1])
     explained = 1.0 - left.share
-    sure = adequacy(explained)
-    each = {label: sure * joint_probability([names[label]], contest, chosen, weights) for label in labels}
-    stated = _stated(labels, names, contest, chosen, weights, sure)
-    joint = sure * joint_probability([names[label] for label in stated or labels], contest, chosen, weights)
+    sure = {label: adequacy(_own_share(shares[label], left.share)) for label in labels}
+
+    def probability(some: Sequence[str]) -> float:
+        held = joint_probability([names[label] for label in some], contest, chosen, weights)
+        return min((sure[label] for label in some), default=1.0) * held
+
+    each = {label: probability([label]) for label in labels}
+    stated = _stated(labels, probability)
+    joint = probability(stated or labels)
     groups = _groups(contest, selection)
 
     def answer(verdict: Verdict, reason: str, named: tuple[str, ...] = labels) -> Decision:
@@ -179,19 +184,16 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     return answer("undecided", "the evidence does not separate several explanations")
 
 
-def _stated(
-    labels: Sequence[str],
-    names: dict[str, str],
-    contest: Contest,
-    chosen: Hypothesis,
-    weights: dict[tuple[str, ...], float],
-    sure: float,
-) -> tuple[str, ...]:
+def _own_share(share: float, left: float) -> float:
+    """Of the part of the mismatch that an effect is to explain, what it does explain: what is left may be that part's."""
+    return share / (share + left) if share + left > 0.0 else 0.0
+
+
+def _stated(labels: Sequence[str], probability: Callable[[Sequence[str]], float]) -> tuple[str, ...]:
     """As many of the effects, those with the largest shares first, as are jointly probable enough to be stated."""
     found: tuple[str, ...] = ()
     for count in range(1, len(labels) + 1):
-        joint = sure * joint_probability([names[label] for label in labels[:count]], contest, chosen, weights)
-        if joint < STATED:
+        if probability(labels[:count]) < STATED:
             break
         found = tuple(labels[:count])
     return found
