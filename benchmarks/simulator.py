@@ -18,6 +18,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -102,8 +103,9 @@ def by_scipy(times: np.ndarray, efforts: np.ndarray, smooth: bool) -> np.ndarray
 
 def by_mujoco(times: np.ndarray, efforts: np.ndarray) -> np.ndarray:
     """mj_step, RK4, four steps a sample; the switch and the drive are set from Python before each step."""
-    import mujoco  # type: ignore[import-not-found]
+    import mujoco as library
 
+    mujoco: Any = library  # its names are made at run time
     model = mujoco.MjModel.from_xml_string(MJCF)
     data = mujoco.MjData(model)
     data.qpos[0], data.qvel[0] = START
@@ -140,7 +142,7 @@ def side_by_side(duration: float) -> list[Row]:
         ("same, command smoothed by hand", lambda: by_scipy(times, efforts, True), 1),
     ]
     try:
-        import mujoco  # type: ignore[import-not-found]  # noqa: F401
+        import mujoco  # noqa: F401
 
         contenders.append(("MuJoCo mj_step, RK4, 4 substeps", lambda: by_mujoco(times, efforts), 1))
     except ImportError:
