@@ -1,7 +1,7 @@
 """Selection: effects are granted their places one after the other, and whatever speaks against others is told."""
 
 import pytest
-from contests import contest, predicted, supposed
+from contests import contest, ends, predicted, supposed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -113,6 +113,16 @@ def test_two_effects_that_mask_one_another_are_granted_together():
     together = supposed("a b", predicted(0.01, 300.0, seed=3))
     chosen = select(contest(NOMINAL, alone, together))
     assert [step.elements for step in chosen.grown] == [(), ("a", "b")]
+
+
+def test_a_third_effect_does_not_bring_in_a_second_that_was_refused():
+    # "b" beside "a" predicts well but for the held-out end; a delay that changes nothing comes with both of them
+    one, two = supposed("a", predicted(0.2)), predicted(0.1)
+    nominal = supposed("", ends(predicted(1.0), 0.0, mood=0.0))
+    first = supposed("a", ends(one.prediction, 10.0, mood=0.0))
+    second, late = (supposed(names, ends(two, 8.0)) for names in ("a b", "a b delay"))
+    plain = supposed("a c", ends(predicted(0.19), 5.0), free=5)
+    assert select(contest(nominal, first, second, plain, late)).chosen.elements == ("a",)
 
 
 def test_a_second_effect_that_adds_nothing_to_a_refused_one_is_not_granted_with_it():

@@ -8,10 +8,10 @@ where no row of the table of rejections speaks against the best of them.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rhythmid.diagnose.constants import EQUIVALENT, REST
-from rhythmid.diagnose.evidence import difference
+from rhythmid.diagnose.constants import REST
+from rhythmid.diagnose.evidence import weight_for
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
-from rhythmid.diagnose.rejections import Claim, Rejection, rejections_of
+from rhythmid.diagnose.rejections import Claim, Rejection, decisive, rejections_of
 
 SHAPE_RULES = ("within_bounds", "acts_within_records", "own_frequency")
 
@@ -100,9 +100,8 @@ def select(contest: Contest) -> Selection:
             continue
         best = _simplest(sound, contest)
         if any(row.hypothesis == best.elements for row in told):
-            smaller = max(
-                smaller, best, key=lambda one: round(one.prediction.score, 6)
-            )  # rounding decides nothing
+            # rounding decides nothing
+            smaller = max(smaller, sound[0], key=lambda one: round(one.prediction.score, 6))
         else:
             grown.append(best)
             smaller = best
@@ -132,8 +131,9 @@ def special_case(first: Hypothesis, second: Hypothesis) -> bool:
 def equivalent(other: Hypothesis, best: Hypothesis, contest: Contest) -> bool:
     """Whether another hypothesis predicts as well as the better one: within standard errors, or but for a small share of what it
     leaves, or for what is of no practical size."""
-    gain, error = difference(best.prediction, other.prediction)
     left = other.prediction.mean_square - contest.floor
     practical = (contest.practical * contest.size) ** 2
     removed = other.prediction.mean_square - best.prediction.mean_square
-    return gain <= EQUIVALENT * error or removed < max(REST * left, practical)
+    return weight_for(best.prediction, other.prediction) <= decisive(1) or removed < max(
+        REST * left, practical
+    )

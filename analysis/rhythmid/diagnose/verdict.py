@@ -4,11 +4,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from rhythmid.diagnose.constants import BLIND, EQUIVALENT, EXPLAINED, MAINLY, STATED
-from rhythmid.diagnose.evidence import gain_ahead, weight_for
-from rhythmid.diagnose.hypothesis import Hypothesis, Verdict
+from scipy.stats import t as student
+
+from rhythmid.diagnose.constants import BLIND, EQUIVALENT, EXPLAINED, FALSE_ALARM, MAINLY, STATED
+from rhythmid.diagnose.evidence import difference, gain_ahead
+from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, Verdict
 from rhythmid.diagnose.probability import adequacy, joint_probability, weights_of
-from rhythmid.diagnose.rejections import decisive
 from rhythmid.diagnose.selection import Contest, Selection, equivalent
 
 
@@ -65,14 +66,22 @@ def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
     ]
     found: list[tuple[float, str]] = []
     for words, one, count in rivals:
+        gain, error = difference(one, chosen.prediction)
         removed = chosen.prediction.mean_square - one.mean_square
         ahead = gain_ahead(one, chosen.prediction) >= -EQUIVALENT
-        if removed > 0.0 and ahead and weight_for(one, chosen.prediction) > decisive(count):
+        if removed > 0.0 and ahead and 0.0 < significance(one, count) * error < gain:
             found.append((removed, words))
     if not found or whole <= 0.0:
         return Unexplained(0.0, False, None)
     removed, words = max(found)
     return Unexplained(float(min(removed / whole, 1.0)), True, words)
+
+
+def significance(prediction: Prediction, candidates: int) -> float:
+    """Standard errors that the best of so many rivals has to gain, by Student's t over the blocks: what is left has to show all
+    over the records, or it says nothing of the names."""
+    blocks = len(prediction.log_density)
+    return float(student.isf(FALSE_ALARM / max(candidates, 1), max(blocks - 1, 1)))
 
 
 def _further(other: Hypothesis, chosen: Hypothesis) -> str:
