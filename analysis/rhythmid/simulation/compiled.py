@@ -4,12 +4,16 @@
 """
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rhythmid.model import Model, Term
 from rhythmid.simulation.generated_source import InputKind, Layout, OutputKind, generate, generate_rates
-from rhythmid.simulation.machine_code import load_run
+from rhythmid.simulation.machine_code import Module, load_run
 
 
 @dataclass(frozen=True)
@@ -19,11 +23,28 @@ class Compiled:
     `run(times, ku, cu, kw, cw, kd, cd, parameters, start, max_step, out)` integrates from times[0], where the state is
     `start`, and fills a row of `out` for each time; it returns how many rows are finite. Knots and cubic pieces belong
     to the command (ku, cu), the forcing (kw, cw) and, where compiled with `disturbed`, to a further force on the mass
-    (kd, cd). The global interpreter lock is released meanwhile.
+    (kd, cd). `resume` takes one more argument, what is known of the past, none of it in `NO_HISTORY`, and returns with the rows what
+    the next run needs of it to go on where this one ends. The global interpreter lock is released meanwhile.
     """
 
     layout: Layout
     run: Callable[..., int]
+    resume: Callable[..., tuple[int, NDArray[np.float64]]]
+
+
+NO_HISTORY = np.empty((0, 0))
+
+
+def _of(module: Module, layout: Layout) -> Compiled:
+    run: Callable[..., Any] = load_run(module)
+    if not layout.history:
+        return Compiled(layout, run, lambda *given: (run(*given[:-1]), NO_HISTORY))
+
+    def resume(*given: Any) -> tuple[int, NDArray[np.float64]]:
+        *before, past = given
+        return run(*before, past if past.size else np.empty((0, layout.history)))
+
+    return Compiled(layout, lambda *given: resume(*given, NO_HISTORY)[0], resume)
 
 
 def _key(terms: tuple[Term, ...]) -> Hashable:
@@ -31,7 +52,8 @@ def _key(terms: tuple[Term, ...]) -> Hashable:
     return tuple(
         (
             term.label, term.element.name, term.element.slot, term.element.acts, term.element.family,
-            term.element.states, term.element.memories, tuple(term.element.borrows.items()),
+            term.element.states, term.element.memories, term.element.history, term.element.dead_time,
+            tuple(term.element.borrows.items()),
             tuple(parameter.name for parameter in term.element.parameters),
             getattr(term.element.kernel, "__code__", None),
         )
@@ -44,7 +66,7 @@ def _structure(
     key: Hashable, terms: "_Terms", disturbed: bool, excited: InputKind, smooth: bool, measured: OutputKind
 ) -> Compiled:
     module, layout = generate(terms.terms, disturbed, excited, smooth, measured)
-    return Compiled(layout, load_run(module))
+    return _of(module, layout)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +101,7 @@ def compile_model(
 @lru_cache(maxsize=256)
 def _rates(key: Hashable, terms: "_Terms", excited: InputKind) -> Compiled:
     module, layout = generate_rates(terms.terms, excited)
-    return Compiled(layout, load_run(module))
+    return _of(module, replace(layout, history=0))
 
 
 def compile_rates(model: Model, excited: InputKind = "force") -> Compiled:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rhythmid.elements.element import DISSIPATIVE, ELAPSED, LEADING, STEP, Element
 from rhythmid.errors import InputError
 from rhythmid.model import Model
-from rhythmid.simulation.generated_source import kernel_module
+from rhythmid.simulation.kernel_source import kernel_module
 from rhythmid.simulation.machine_code import Module, load_run
 
 Array = NDArray[np.float64]
