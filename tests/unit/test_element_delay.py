@@ -9,6 +9,8 @@ from scipy.integrate import solve_ivp
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.elements.element import Element, Parameter
 from rhythmid.errors import InputError
+from rhythmid.ltp.htf import linearised
+from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
 from rhythmid.simulation.signal import spline, zero_order_hold
 from rhythmid.simulation.simulate import simulate
@@ -113,6 +115,25 @@ def test_without_a_controller_an_actuator_delay_is_a_delay_of_the_measurement(ri
     assert got.effort[times < 0.3 + delay] == pytest.approx(0.0)
 
 
+@pytest.mark.parametrize("delays", [(0.012, 0.0), (0.0, 0.012), (0.02, 0.008)])
+def test_transfer_function_and_cycle_of_a_controlled_machine_with_dead_times_are_those_of_theory(delays):
+    """For the loop with e^(-s(tau_a + tau_f)); a linear machine answers at no other frequency."""
+    model = SERVO
+    for name, delay in zip(DELAYS, delays, strict=True):
+        model = model.with_element(CATALOGUE[name], {"delay": delay}) if delay else model
+    frequency = np.array([0.3, 1.3, 3.1, 7.2])
+    machine = linearised(model, Pumping.cosine(1.0, 1.0), effort=0.1)
+    got = machine.htf(np.array([0, 1]), frequency)
+
+    def loop(s):
+        return s**2 + SPRING + np.exp(-s * sum(delays)) * (GAIN + RATE * s)
+
+    s, w = 2j * np.pi * frequency, 2j * np.pi
+    assert got[0] == pytest.approx(GAIN * np.exp(-s * delays[0]) / loop(s), rel=3e-6)
+    assert np.abs(got[1]).max() < 1e-6 * np.abs(got[0]).max()
+    assert machine.cycle.harmonics(1)[1] == pytest.approx(0.5 * np.exp(-w * delays[0]) / loop(w), rel=1e-8)
+
+
 def test_a_delay_of_a_controllers_measurement_needs_a_controller():
     with pytest.raises(InputError, match="feedback_delay.* needs 'position_control'"):
         SERVO.without("position_control").with_element(CATALOGUE["feedback_delay"], {"delay": 0.01})
@@ -121,10 +142,13 @@ def test_a_delay_of_a_controllers_measurement_needs_a_controller():
 def test_an_element_with_a_history_names_a_signal_of_its_kernel_and_a_dead_time():
     given = {
         "name": "late", "slot": "actuator", "title": "", "equation": "", "reference": "",
-        "parameters": (Parameter("delay", "s", ""),), "kernel": lambda f, t, delay, past_f: past_f,
+        "parameters": (Parameter("delay", "s", "", bounds=(0.0, 1.0)),), "kernel": lambda f, t, delay, past_f: past_f,
     }  # fmt: skip
     assert Element(**given, history=("f",), dead_time="delay").arguments == ("f", "t", "delay", "past_f")
     with pytest.raises(TypeError, match="history names 'x'"):
         Element(**given, history=("x",), dead_time="delay")
     with pytest.raises(TypeError, match="needs a parameter that is its dead_time"):
         Element(**given, history=("f",))
+    endless = given | {"parameters": (Parameter("delay", "s", "", bounds=(0.0, np.inf)),)}
+    with pytest.raises(TypeError, match="with bounds from 0 to at most 1 s"):
+        Element(**endless, history=("f",), dead_time="delay")

@@ -37,6 +37,7 @@ from rhythmid.elements.first_guess import generic_guesses
 
 Slot = Literal["command", "actuator", "force", "sensor", "timing"]
 STEP = "simulation.step"  # borrowed under this name: the largest integration step [s], which no effect can be faster than
+LONGEST_DEAD_TIME = 1.0  # [s] of an element with a history: what is kept of the past grows with it
 ELAPSED = "simulation.elapsed"  # borrowed under this name: the time [s] since the integration step began
 SLOTS: tuple[Slot, ...] = ("command", "actuator", "force", "sensor", "timing")
 Acts = Literal["body", "leg", "transmission", "modifier", "drive", "feedback", "observation", "transducer"]
@@ -205,8 +206,12 @@ class Element:
             raise TypeError(
                 f"element {self.name}: history names {unknown[0]!r}, which its kernel is not given"
             )
-        if self.history and self.dead_time not in [parameter.name for parameter in self.parameters]:
-            raise TypeError(f"element {self.name}: a history needs a parameter that is its dead_time")
+        lasting = [parameter.bounds for parameter in self.parameters if parameter.name == self.dead_time]
+        if self.history and not (lasting and 0.0 <= lasting[0][0] <= lasting[0][1] <= LONGEST_DEAD_TIME):
+            raise TypeError(
+                f"element {self.name}: a history needs a parameter that is its dead_time, with bounds from 0 to at most "
+                f"{LONGEST_DEAD_TIME:g} s"
+            )
 
     @property
     def leading(self) -> tuple[str, ...]:

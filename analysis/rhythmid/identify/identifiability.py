@@ -205,7 +205,7 @@ def _estimate(fit: Fit, *names: str) -> Estimate:
     norm = np.linalg.norm(fit.linearisation.jacobian[:, places].sum(axis=1)) if places.any() else 0.0
     variance = float(pick @ fit.covariance @ pick)
     if (
-        places.sum() > 1 and not 0.0 <= variance < 1.0
+        places.sum() > 1 and not 0.0 < variance < 1.0
     ):  # the sum of two undetermined ones is lost in their rounding
         variance = 1.0 / max(_projected(fit, places) ** 2, 1e-300) if norm > 0.0 else math.inf
     std = math.sqrt(variance) if variance >= 0.0 else math.inf

@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -63,9 +63,15 @@ def _key(terms: tuple[Term, ...]) -> Hashable:
 
 @lru_cache(maxsize=512)
 def _structure(
-    key: Hashable, terms: "_Terms", disturbed: bool, excited: InputKind, smooth: bool, measured: OutputKind
+    key: Hashable,
+    terms: "_Terms",
+    disturbed: bool,
+    excited: InputKind,
+    smooth: bool,
+    measured: OutputKind,
+    rational: bool,
 ) -> Compiled:
-    module, layout = generate(terms.terms, disturbed, excited, smooth, measured)
+    module, layout = generate(terms.terms, disturbed, excited, smooth, measured, rational)
     return _of(module, layout)
 
 
@@ -88,27 +94,29 @@ def compile_model(
     excited: InputKind = "force",
     smooth: bool = False,
     measured: OutputKind = "position",
+    rational: bool = False,
 ) -> Compiled:
     """The compiled structure of a model; parameter values play no part.
 
-    With `disturbed` the structure takes a further, arbitrary force on the mass as a signal; `excited`, `smooth` and
-    `measured` as in `generate`.
+    With `disturbed` the structure takes a further, arbitrary force on the mass as a signal; `excited`, `smooth`,
+    `measured` and `rational` as in `generate`.
     """
     terms = tuple(term for term in model.terms if term.element.kernel is not None)
-    return _structure(_key(terms), _Terms(terms), disturbed, excited, smooth, measured)
+    return _structure(_key(terms), _Terms(terms), disturbed, excited, smooth, measured, rational)
 
 
 @lru_cache(maxsize=256)
 def _rates(key: Hashable, terms: "_Terms", excited: InputKind) -> Compiled:
     module, layout = generate_rates(terms.terms, excited)
-    return _of(module, replace(layout, history=0))
+    return _of(module, layout)
 
 
 def compile_rates(model: Model, excited: InputKind = "force") -> Compiled:
     """The model's right-hand side at given points, for its linearisation.
 
     `run(times (n,), command (n,), forcing (n,), states (n, q), parameters, out (n, q + 2))` fills rows of state rates,
-    sensor output and total actuator force. Signals in the command path are taken as they are, without its delays. A
+    sensor output and total actuator force. Signals in the command path are taken as they are, without its delays;
+    dead times of elements are states (`rational`). A
     memory's rate is its change over a step of the length that the parameter `ELAPSED` says.
     """
     terms = tuple(term for term in model.terms if term.element.kernel is not None)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rhythmid.elements.element import DISSIPATIVE, ELAPSED, STEP
 from rhythmid.errors import InputError
 from rhythmid.model import INERTIA, Model, Term
-from rhythmid.simulation.generated_history import DelayedSignal, HistoryLines
+from rhythmid.simulation.generated_history import PADE, DelayedSignal, HistoryLines, rational_past
 from rhythmid.simulation.kernel_source import history_module, kernel_module, pieces_module
 from rhythmid.simulation.machine_code import Module
 
@@ -51,7 +51,8 @@ class Layout:
 class _Writer:
     """Collects parameters, states and the lines of the right-hand side while walking along the signal path."""
 
-    def __init__(self) -> None:
+    def __init__(self, rational: bool) -> None:
+        self.rational = rational
         self.parameters: dict[str, float | None] = {INERTIA: None}
         self.states = ["position", "velocity"]
         self.memories: list[int] = []
@@ -86,23 +87,29 @@ class _Writer:
         self.lines.append(f"{targets} = {element.name}({', '.join([*arguments, *values, *states, *past])})")
 
     def _past(self, term: Term, name: str, value: str) -> str:
-        """What a signal was before the term's dead time, in the right-hand side: what the loop says, and its share of the present."""
-        m = len(self.delayed)
+        """What a signal was before the term's dead time: what the loop says, and its share of the present."""
         delay = self._parameter(f"{term.label}.{term.element.dead_time}")
+        if self.rational:
+            first = len(self.states)
+            self.states += [f"{term.label}.past_{name}_{k}" for k in range(PADE)]
+            past, lines = rational_past(value, delay, self._parameter(STEP, 1e-3), first)
+            self.lines += lines
+            return past
+        m = len(self.delayed)
         self.delayed.append(DelayedSignal(delay, jumps=name == "f"))
         self.lines += [f"now{m} = {value}", f"past{m} = old{m} + share{m} * (now{m} - old{m})"]
         return f"past{m}"
 
 
 def _right_hand_side(
-    terms: tuple[Term, ...], excited: InputKind, disturbed: bool, measured: OutputKind
+    terms: tuple[Term, ...], excited: InputKind, disturbed: bool, measured: OutputKind, rational: bool
 ) -> _Writer:
     if excited == "base_acceleration" and (room := [term for term in terms if term.against == "room"]):
         raise InputError(
             f"element {room[0].label!r} acts against the room, whose speed cannot be told where only the base's acceleration is "
             "known; give its displacement, or leave out 'against: room'"
         )
-    writer = _Writer()
+    writer = _Writer(rational)
     kernels = [term for term in terms if term.element.kernel is not None]
     force = [term for term in kernels if term.element.slot == "force"]
     writer.lines.append("f = u" if excited in DRIVES else "f = 0.0")
@@ -161,15 +168,16 @@ def generate(
     excited: InputKind = "force",
     smooth: bool = False,
     measured: OutputKind = "position",
+    rational: bool = False,
 ) -> tuple[Module, Layout]:
     """The module for this list of terms, and the layout of its arrays.
 
     `excited` says what the command is: a force on the mass; the reference of a controller in the command path; the
     displacement of the base that the leg stands on; or the base's acceleration, where position and velocity are
     relative to the base. Steps end at the command's knots, where a held command jumps, unless it is `smooth`.
-    `measured` is what the sensor sees; an acceleration is the mass's own, whatever the base does.
+    With `rational` dead times are approximated by states, see `rational_past`. `measured` is what the sensor sees; an acceleration is the mass's own, whatever the base does.
     """
-    writer = _right_hand_side(terms, excited, disturbed, measured)
+    writer = _right_hand_side(terms, excited, disturbed, measured, rational)
     n, memories = len(writer.states), writer.memories
     history = HistoryLines(tuple(writer.delayed), smooth)
     p = ", ".join(f"p{i}" for i in range(len(writer.parameters)))
@@ -330,18 +338,15 @@ def run(times, ku, cu, kw, cw, kd, cd, parameters, start, max_step, out{", past"
 
 
 def generate_rates(terms: tuple[Term, ...], excited: InputKind = "force") -> tuple[Module, Layout]:
-    """A module whose `run` evaluates the right-hand side at given points, and the layout of its arrays."""
-    whole, layout = generate(terms, False, excited)
-    writer = _right_hand_side(terms, excited, False, "position")
+    """A module whose `run` evaluates the right-hand side at given points, with dead times as states, and its arrays' layout."""
+    whole, layout = generate(terms, False, excited, rational=True)
+    writer = _right_hand_side(terms, excited, False, "position", rational=True)
     n, p = len(layout.states), len(layout.parameters)
     targets = ", ".join(f"out[k, {i}]" for i in range(n + 2))
     known = "t, u, w, 0.0" if excited == "base_displacement" else "t, u, w"
     arguments = ", ".join(
         [known, *(f"states[k, {i}]" for i in range(n)), *(f"parameters[{i}]" for i in range(p))]
     )
-    history = HistoryLines(tuple(writer.delayed), smooth=True)
-    arguments = ", ".join([arguments, *("0.0, 1.0" for _ in history.signals)])  # as it is now
-    targets = ", ".join([targets, *history.returned])
     values = [f"p{i} = parameters[{i}]" for i in range(p)]
     elapsed = [name for name, _ in layout.parameters].index(ELAPSED) if layout.memories else -1
     follow = [f"out[k, {i}] = (out[k, {i}] - states[k, {i}]) / p{elapsed}" for i in layout.memories]

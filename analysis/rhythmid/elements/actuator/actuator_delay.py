@@ -7,9 +7,7 @@ Without a controller, all that drives the machine comes later by tau_a, so the m
 measurement delay. Only their sum is identifiable then.
 """
 
-from math import inf
-
-from rhythmid.elements.element import Element, Parameter
+from rhythmid.elements.element import LONGEST_DEAD_TIME, Element, Parameter
 
 
 def kernel(f, t, delay, past_f):
@@ -21,7 +19,7 @@ ELEMENT = Element(
     slot="actuator",
     title="Actuator delay",
     equation="f(t) = f_cmd(t − τ_a),  f_cmd = f₀ + u",
-    parameters=(Parameter("delay", "s", "dead time τ_a of the actuator", bounds=(0.0, inf)),),
+    parameters=(Parameter("delay", "s", "dead time τ_a of the actuator", bounds=(0.0, LONGEST_DEAD_TIME)),),
     kernel=kernel,
     history=("f",),
     dead_time="delay",

@@ -4,9 +4,7 @@ The time that a controller's own measurement and its computation take, inside th
 what the computation adds there is part of the input delay. It turns the phase of the loop, and takes k_p tau_f from its damping.
 """
 
-from math import inf
-
-from rhythmid.elements.element import Element, Parameter
+from rhythmid.elements.element import LONGEST_DEAD_TIME, Element, Parameter
 
 
 def kernel(x, v, t, delay, past_x, past_v):
@@ -20,7 +18,10 @@ ELEMENT = Element(
     equation="F = k_p (r − x(t − τ_f)) − k_d v(t − τ_f)",
     parameters=(
         Parameter(
-            "delay", "s", "delay τ_f of the controller's measurement and computation", bounds=(0.0, inf)
+            "delay",
+            "s",
+            "delay τ_f of the controller's measurement and computation",
+            bounds=(0.0, LONGEST_DEAD_TIME),
         ),
     ),
     kernel=kernel,
