@@ -126,8 +126,12 @@ def effect_along(
     change of its signal.
 
     An element's own states take steps of at most `max_step` [s]. Parameters that the element borrows come from `model`. Raises InputError when the model lacks one, or when one of the
-    element's own has no value.
+    element's own has no value, and for an element that acts on the past, which has to be simulated.
     """
+    if element.history:
+        raise InputError(
+            f"element {element.name!r} acts on the past of a signal: it is simulated, not read off a motion"
+        )
     borrowed = {
         name: max_step if source == STEP else model.borrowed(source, default)
         for name, (source, default) in element.borrows.items()
