@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
@@ -180,6 +181,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int)
     given = parser.parse_args()
 
+    threadpool_limits(1)  # the machines are shared out among processes
     for sort in SORTS if given.only is None else (given.only,):
         begin = time.monotonic()
         outcomes: list[Outcome] = []

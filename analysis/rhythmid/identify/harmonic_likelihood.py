@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from threadpoolctl import threadpool_limits
 
 from rhythmid.errors import InputError
 from rhythmid.ltp.htf import ORDER, LinearisedModel, linearised
@@ -222,6 +223,7 @@ def _descend(comparison: _Comparison, start: Array, longest: float, tolerance: f
     return found.x
 
 
+@threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
 def harmonic_likelihood(
     record: Record,
     model: Model,

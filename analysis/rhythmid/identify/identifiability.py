@@ -169,9 +169,8 @@ def delays_of(
     by a clock whose `offset` is not known). Without a statement it is taken as on the robot, unless the fit then finds
     an input delay of zero: that is just what a forcing through the delayed channel looks like, and the split is refused.
     """
-    directions = undetermined(joint.fit)
-    words = tuple(direction.words for direction in directions)
-    return with_inner_delays(_of_paths(joint, forcing, offset, source, words), joint.fit, directions)
+    directions = tuple(direction.words for direction in undetermined(joint.fit))
+    return with_inner_delays(_of_paths(joint, forcing, offset, source, directions), joint.fit)
 
 
 def _of_paths(

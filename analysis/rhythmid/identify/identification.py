@@ -53,9 +53,9 @@ class InnerDelay:
     with other delays that are determined, by their elements' labels."""
 
     delay: Estimate
-    separable: bool
-    reason: str
-    sums: Mapping[str, Estimate]
+    separable: bool = True
+    reason: str = ""
+    sums: Mapping[str, Estimate] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         return self.delay.to_dict() | {

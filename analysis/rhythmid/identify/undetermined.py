@@ -17,18 +17,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Direction:
-    """A change of parameters (`weights` of a unit vector, in units of their size; `change` in their own units) that the records
-    do not notice, in words."""
+    """A change of parameters (unit vector, in units of their size) that the records do not notice, in words."""
 
     names: tuple[str, ...]
     weights: Array
     words: str
-    change: Array
-
-    def steps(self, names: Sequence[str]) -> Array:
-        """By how much each of these parameters changes, (n,); zero for one that takes no part."""
-        known = dict(zip(self.names, self.change))
-        return np.array([known.get(name, 0.0) for name in names])
 
 
 def undetermined(fit: Fit) -> list[Direction]:
@@ -69,7 +62,7 @@ def _direction(names: Sequence[str], vector: Array, size: Array, felt: Array) ->
     else:
         change = ", ".join(f"{name} by {s / step[0]:+.3g}" for name, s in zip(moved, step))
         words = f"these can change together and nothing recorded would change: {change}"
-    return Direction(tuple(moved), vector[large], words, step)
+    return Direction(tuple(moved), vector[large], words)
 
 
 def sum_of(fit: Fit, *names: str) -> Estimate:
@@ -97,8 +90,8 @@ def _projected(fit: Fit, places: NDArray[np.bool_]) -> float:
     return float(np.linalg.norm(column))
 
 
-def sum_beside(fit: Fit, first: str, second: str) -> Estimate:
-    """The sum of two parameters of which neither is determined, in the model with the first of them held."""
-    places = np.array([name in (first, second) for name in fit.names])
-    value = fit.model.value(first) + fit.model.value(second)
-    return Estimate(value, 1.0 / max(_projected(fit, places), 1e-150), "s")
+def sum_beside(fit: Fit, names: Sequence[str]) -> Estimate:
+    """The sum of parameters of which none is determined, in the model with all but one of them held."""
+    places = np.array([name in names for name in fit.names])
+    value = sum(fit.model.value(name) for name in names)
+    return Estimate(float(value), 1.0 / max(_projected(fit, places), 1e-150), "s")
