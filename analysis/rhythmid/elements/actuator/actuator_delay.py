@@ -30,7 +30,7 @@ ELEMENT = Element(
     family="dead time",
     confusable={
         "measurement_delay": "the same where no controller closes the loop",
-        "feedback_delay": "delays reference and forcing, too: know the input delay, or a forcing made on the robot",
+        "feedback_delay": "delays reference and forcing, too: know the input delay, with a forcing the measurement delay",
         "input_delay": "delays the forcing, too, and stands inside a controller's loop",
         "actuator_lag": "rolls off as well: excite high frequencies",
     },

@@ -34,7 +34,7 @@ ELEMENT = Element(
     also_known_as=("loop delay", "controller latency", "sampling and computation delay"),
     family="dead time",
     confusable={
-        "actuator_delay": "leaves reference and forcing alone: know the input delay, or a forcing made on the robot",
+        "actuator_delay": "leaves reference and forcing alone: know the input delay, with a forcing the measurement delay",
         "viscous_damper": "to first order a damping of −k_p τ_f: give the derivative gain, move fast",
         "measurement_delay": "acts inside the loop: the measurement delay is that of the record alone",
     },
