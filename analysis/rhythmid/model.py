@@ -18,6 +18,7 @@ from rhythmid.output import write_text
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
 INERTIA = "inertia.mass"
+CONTROLLER = "position_control"  # what an element that acts on a controller's measurements asks for where there is none
 MASS = Parameter("mass", "kg", "inertia", bounds=(0.0, math.inf))
 
 
@@ -183,6 +184,8 @@ class Model:
 
     def lacking(self, term: Term) -> str | None:
         """Name of an element that `term` needs and the model lacks; None where nothing is lacking."""
+        if term.element.acts == "observation" and not self.setting.controlled:
+            return CONTROLLER
         for source, default in term.element.borrows.values():
             if self.borrowed(source, default) is None:
                 return source.split(".")[0]

@@ -16,7 +16,9 @@ from rhythmid.simulation.simulate import simulate
 CATALOGUE = load_catalogue()
 NOMINAL = ("gravity", "linear_spring", "switched_damper", "input_delay", "measurement_delay")
 # controllers and motors: they change what u is
-CONTROLLERS = [name for name in CATALOGUE if CATALOGUE[name].acts in ("feedback", "transducer")]
+CONTROLLERS = [
+    name for name in CATALOGUE if CATALOGUE[name].acts in ("feedback", "observation", "transducer")
+]
 ADDABLE = [name for name in CATALOGUE if name not in (*NOMINAL, *CONTROLLERS)]
 WITHOUT_STARTS = {
     "periodic_forcing": {"amplitude": 0.5, "frequency": 1.3},

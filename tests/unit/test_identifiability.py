@@ -7,12 +7,13 @@ import pytest
 
 from machines import hopper, record
 from rhythmid.errors import InputError
-from rhythmid.identify.identifiability import Offset, aliases, delays_of, offset_of, undetermined
+from rhythmid.identify.identifiability import Offset, aliases, delays_of, offset_of
 from rhythmid.identify.identification import Delays
 from rhythmid.identify.identify import identify
 from rhythmid.identify.joint import JointFit, joint_likelihood
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare
+from rhythmid.identify.undetermined import undetermined
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 

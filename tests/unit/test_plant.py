@@ -33,6 +33,20 @@ REMEMBERING = plant_model(
     Noise(),
     CATALOGUE,
 )
+LATE_DRIVE = plant_model(
+    PAPER.with_element(CATALOGUE["actuator_delay"], {"delay": 0.0123}),
+    Forcing(),
+    Noise(),
+    CATALOGUE,
+)
+LATE_LOOP = plant_model(
+    PAPER.with_element(CATALOGUE["position_control"], {"proportional": 150.0, "derivative": 4.0})
+    .with_element(CATALOGUE["feedback_delay"], {"delay": 0.0071})
+    .with_element(CATALOGUE["actuator_delay"], {"delay": 0.0004}),
+    Forcing(),
+    Noise(),
+    CATALOGUE,
+)
 MS = 1_000_000
 COUNT = 200
 LATE = np.arange(COUNT, dtype=np.int64) * MS + 40_300_001
@@ -54,8 +68,14 @@ def in_one_go(model: Model, initial=(0.15, 0.0)) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize(
     "model",
-    [HOPPER, NOISY, REMEMBERING],
-    ids=["hopper", "lag, noise and rounding", "play and a limit of rate"],
+    [HOPPER, NOISY, REMEMBERING, LATE_DRIVE, LATE_LOOP],
+    ids=[
+        "hopper",
+        "lag, noise and rounding",
+        "play and a limit of rate",
+        "actuator delay",
+        "two delays in a loop",
+    ],
 )
 @given(cuts=some.lists(some.integers(0, (COUNT - 1) * MS), max_size=30), early=some.integers(0, 5 * MS))
 def test_every_chunking_gives_the_same_bits(model, cuts, early):
@@ -69,6 +89,13 @@ def test_every_chunking_gives_the_same_bits(model, cuts, early):
         parts.append(plant.advance(until))
     for name, expected in in_one_go(model).items():
         np.testing.assert_array_equal(together(parts)[name], expected, err_msg=name)
+
+
+def test_a_settled_plant_with_a_dead_time_goes_on_as_it_has_run():
+    """A drive that is late by tau moves the uncommanded machine as it moved tau earlier."""
+    late = Plant(LATE_DRIVE, MS).advance(1000 * MS).position
+    prompt = Plant(HOPPER, 100_000).advance(1000 * MS).position
+    assert late[13:] == pytest.approx(prompt[7:-123:10][: len(late) - 13], abs=1e-9)
 
 
 def test_the_plant_equals_the_simulator():

@@ -127,6 +127,10 @@ def show(result: dict[str, Any]) -> None:
         console.print(
             f"the same record is given by {1e3 * first:.2f} ms (input) and {1e3 * second:.2f} ms (measurement)"
         )
+    for label, one in delays["inner"].items():
+        for other, total in one["sums"].items():
+            told = rounded(1e3 * total["value"], 1e3 * total["std"])
+            console.print(f"{label} + {other}: {told} ± {1e3 * total['std']:.2g} ms")
     for words in delays["undetermined"]:
         console.print(f"not determined: {words}")
     _show_transfer_functions(result, console)

@@ -11,9 +11,10 @@ from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment
 from rhythmid.identify.bound import expected_fit, planned_record
 from rhythmid.identify.harmonic_likelihood import DELAYS, INPUT_DELAY, MEASUREMENT_DELAY
-from rhythmid.identify.identifiability import SEEN, undetermined
+from rhythmid.identify.identifiability import SEEN
 from rhythmid.identify.identification import Estimate
 from rhythmid.identify.output_error import Fit
+from rhythmid.identify.undetermined import undetermined
 from rhythmid.ltp.limit_cycle import LimitCycle
 from rhythmid.model import Model
 from rhythmid.record.record import Record

@@ -199,7 +199,12 @@ def _places(element: Element) -> tuple[Slot, ...]:
     units = {parameter.unit for parameter in element.parameters}
     if element.delay is not None and units == {"1"}:
         return CLOCKS
-    plain = element.kernel is not None and element.acts == Element.acts and not element.memories
+    plain = (
+        element.kernel is not None
+        and element.acts == Element.acts
+        and not element.memories
+        and not element.history
+    )
     if plain and element.slot in SIGNALS and units == {"s"}:
         return SIGNALS
     return ()

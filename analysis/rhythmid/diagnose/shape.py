@@ -47,7 +47,7 @@ def shape_of(model: Model, added: Sequence[str], known: Trajectories, sizes: Sca
 def _acts_within(known: Trajectories, model: Model, term: Term) -> float:
     """Size of the effect's curvature within the motion's range, over that far beyond; infinite for a straight effect."""
     element = term.element
-    if element.kernel is None or element.own:
+    if element.kernel is None or element.own or element.history:
         return math.inf
     values = {name: value.value for name, value in term.values.items()}
     bent: list[float] = []

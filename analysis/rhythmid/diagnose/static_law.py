@@ -39,7 +39,7 @@ def law_of(
 
     `values` and `sizes` are in SI units (those of the sensor for a sensor element), the curved part in the unit of the
     effect. A quantity is the one if exchanging all others between the instants leaves most of the effect as it was."""
-    if element.kernel is None or element.own:
+    if element.kernel is None or element.own or element.history:
         return None
     rng = np.random.default_rng(0)
     width = {"velocity": SPREAD * sizes.velocity, "effort": SPREAD * sizes.effort, "leg": sizes.force}

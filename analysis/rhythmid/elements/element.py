@@ -5,6 +5,7 @@ A file in `elements/<slot>/` defines one `ELEMENT`. Exactly one of these says wh
 - `kernel`   a pure numeric function of one instant, compiled into the simulator. Its arguments by slot:
                command, actuator   (f, t, <parameters>, <borrowed>, <states>, <memories>) -> new f
                command, `acts="feedback"`    (f, x, v, t, <parameters>, …)               -> force, of a controller
+               command, `acts="observation"` (x, v, t, <parameters>, …)                  -> x, v as controllers see them
                actuator, `acts="transducer"` (f, x, v, t, <parameters>, …)               -> new f, which feels the motion
                force               (x, v, t, f, <parameters>, …)                         -> force on the mass
                force, `acts="transmission"`  (load, x, v, t, f, <parameters>, …)         -> force on the mass
@@ -17,6 +18,7 @@ A file in `elements/<slot>/` defines one `ELEMENT`. Exactly one of these says wh
              A kernel with states or memories returns (result, dstate/dt, …, new memory, …). It may use `math` and nothing
              else. A memory is what an operator (play, a limit of rate) remembers: it takes the kernel's new value
              where an integration step begins and where it ends, and keeps it between. `ELAPSED` is the time since it began.
+             A kernel with a `history` is given last, for each signal named there, what that was a `dead_time` ago.
 - `delay`    (stamps, **parameters) -> seconds; how much later a command acts, or how much older a measurement is
              than its stamp says. Shapes (n,) -> (n,).
 - `sampler`  (rng, **parameters) -> f(stamps, samples) -> samples; what happens to samples one after another
@@ -35,14 +37,16 @@ from rhythmid.elements.first_guess import generic_guesses
 
 Slot = Literal["command", "actuator", "force", "sensor", "timing"]
 STEP = "simulation.step"  # borrowed under this name: the largest integration step [s], which no effect can be faster than
+LONGEST_DEAD_TIME = 1.0  # [s] of an element with a history: what is kept of the past grows with it
 ELAPSED = "simulation.elapsed"  # borrowed under this name: the time [s] since the integration step began
 SLOTS: tuple[Slot, ...] = ("command", "actuator", "force", "sensor", "timing")
-Acts = Literal["body", "leg", "transmission", "modifier", "drive", "feedback", "transducer"]
+Acts = Literal["body", "leg", "transmission", "modifier", "drive", "feedback", "observation", "transducer"]
 Against = Literal["base", "room"]
 DISSIPATIVE = ("friction", "damping")  # families whose forces are no load that a gear carries, but losses
 LEADING: Mapping[tuple[Slot, Acts], tuple[str, ...]] = {  # what a kernel is given before its parameters
     ("command", "leg"): ("f", "t"),
     ("command", "feedback"): ("f", "x", "v", "t"),
+    ("command", "observation"): ("x", "v", "t"),
     ("actuator", "leg"): ("f", "t"),
     ("actuator", "transducer"): ("f", "x", "v", "t"),
     ("force", "leg"): ("x", "v", "t", "f"),
@@ -141,7 +145,9 @@ class Element:
     or the nominal model says the same. `against` says whether a friction or a damper acts between mass and base or between
     mass and room; None where that is no choice. `takes` is the unit of the signal that an actuator is fed with, where that
     is no force. `clock` names the parameter that is the period of a clock of its own, which no descent finds: a fit seeks
-    it on a grid as fine as the ticks of the last second of a record ask for.
+    it on a grid as fine as the ticks of the last second of a record ask for. `history` names signals that a kernel is given, and
+    wants as they were earlier, too, by the time that the parameter `dead_time` says; before a simulation's start they are what
+    command and forcing were, with the machine's states led back along their first rates.
     """
 
     name: str
@@ -156,6 +162,8 @@ class Element:
     acts: Acts = "leg"
     states: tuple[str, ...] = ()
     memories: tuple[str, ...] = ()
+    history: tuple[str, ...] = ()
+    dead_time: str = ""
     # (x, v, f, **parameters) -> `own` at the start; default 0
     initial: Callable[..., tuple[float, ...]] | None = None
     borrows: Mapping[str, tuple[str, float | None]] = field(default_factory=dict)
@@ -194,11 +202,27 @@ class Element:
                 f"element {self.name}: acts={self.acts!r} is for slot {self.slot!r} none of {known}"
             )
 
+        if unknown := [name for name in self.history if name not in self.leading or name == "t"]:
+            raise TypeError(
+                f"element {self.name}: history names {unknown[0]!r}, which its kernel is not given"
+            )
+        lasting = [parameter.bounds for parameter in self.parameters if parameter.name == self.dead_time]
+        if self.history and not (lasting and 0.0 <= lasting[0][0] <= lasting[0][1] <= LONGEST_DEAD_TIME):
+            raise TypeError(
+                f"element {self.name}: a history needs a parameter that is its dead_time, with bounds from 0 to at most "
+                f"{LONGEST_DEAD_TIME:g} s"
+            )
+
+    @property
+    def leading(self) -> tuple[str, ...]:
+        """Signals that its kernel is given first; none without a kernel."""
+        return LEADING[self.slot, self.acts] if self.kernel is not None else ()
+
     @property
     def arguments(self) -> tuple[str, ...]:
         """Names for what its kernel is given, in order."""
         own = (parameter.name for parameter in self.parameters)
-        return (*LEADING[self.slot, self.acts], *own, *self.borrows, *self.own)
+        return (*self.leading, *own, *self.borrows, *self.own, *(f"past_{name}" for name in self.history))
 
     def acting_against(self, side: Against) -> "Element":
         """The same friction or damper between the mass and the moving base, or between the mass and the room."""

@@ -24,6 +24,7 @@ MOTION: Mapping[str, str] = {  # by `acts`: x and v of which frame
     "modifier": "of the mass relative to the base",
     "transducer": "of the mass relative to the base",
     "feedback": "of the mass, as positions are measured",
+    "observation": "of the mass, as positions are measured",
 }
 ACTS: Mapping[str, str] = {
     "leg": "a force between mass and base",
@@ -33,6 +34,7 @@ ACTS: Mapping[str, str] = {
     "drive": "a force made on the robot, which depends on time alone; it goes through the actuator",
     "transducer": "an actuator that feels the motion it makes",
     "feedback": "a controller, whose reference is the command",
+    "observation": "what controllers see of the motion, as the element says",
 }
 PREAMBLE = """# The elements
 
@@ -66,6 +68,8 @@ similar one. What to fill in, besides names, equation, parameters and reference:
 - `kernel`, a plain function in Python and `math`. What it is given, in this order, is said by slot and `acts` in the table
   below; then follow the parameters, what it `borrows` from other elements (their parameters, the mass, the step), and its
   states. It returns its value, and with states their rates after it: `return force, rate`.
+- `history` and `dead_time`: signals of those that the kernel is given which it wants as they were earlier, too, and the parameter
+  that says by how much. They are its last arguments.
 - `acts`: which motion a force sees, and where it is added; left out it is `leg`.
 - `size`: the parameter that says how much of the effect there is, and `absent` (0 unless said) the value at which the model
   behaves as without it. The score test moves this parameter alone.
@@ -124,6 +128,8 @@ def describe(element: Element) -> str:
         facts.append(f"- States of its own: {_names(element.states)}.")
     if element.memories:
         facts.append(f"- Remembers: {_names(element.memories)}.")
+    if element.history:
+        facts.append(f"- Keeps the past of {_names(element.history)} over its `{element.dead_time}`.")
     if element.rotational:
         facts.append("- For rotational machines only.")
     if element.controlled:

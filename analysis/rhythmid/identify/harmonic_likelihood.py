@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from threadpoolctl import threadpool_limits
 
 from rhythmid.errors import InputError
-from rhythmid.ltp.htf import LinearisedModel, linearised
+from rhythmid.ltp.htf import ORDER, LinearisedModel, linearised
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.ltp.spectra import Spectra, spectra
 from rhythmid.model import Model
@@ -32,6 +33,7 @@ CYCLE = 4  # harmonics of the limit cycle that are used
 PARTS = 8  # into which the record is cut to see how much the limit cycle is disturbed
 LINES = 1500  # that a search looks at
 LONGEST = 0.6  # [s] largest delay on either side that a search considers
+TIME = 0.02  # [s] size of a delay that begins at none
 NEAR = 0.05  # unexplained share of the power from which a descent finds the rest of the way
 FACTORS = np.geomspace(0.4, 2.5, 25)  # on each parameter when a search starts far off
 
@@ -97,7 +99,8 @@ class _Comparison:
 
     def linearised(self, values: Array) -> LinearisedModel:
         model = self.model.with_values(dict(zip(self.names, values)))
-        found = linearised(model, self.pumping, self._guess, excited=self.kind)
+        order = ORDER if self.pumping.active else 0  # nothing makes harmonics where nothing pumps
+        found = linearised(model, self.pumping, self._guess, order, self.kind)
         self._guess = found.cycle.states[0]
         return found
 
@@ -203,7 +206,9 @@ def _descend(comparison: _Comparison, start: Array, longest: float, tolerance: f
     bounds = [comparison.model.parameters[name].bounds for name in comparison.names]
     low = np.array([b[0] for b in bounds] + [-0.05, -0.05])
     high = np.array([b[1] for b in bounds] + [longest + 0.1, longest + 0.1])
-    scale = np.array([abs(v) if v else 1.0 for v in start[:-2]] + [0.02, 0.02])
+    units = [comparison.model.parameters[name].unit for name in comparison.names]
+    own = [abs(v) or (TIME if unit == "s" else 1.0) for v, unit in zip(start, units)]
+    scale = np.array([*own, TIME, TIME])
     inside = np.clip(start, low, high)
     found = least_squares(
         comparison.residual,
@@ -218,6 +223,7 @@ def _descend(comparison: _Comparison, start: Array, longest: float, tolerance: f
     return found.x
 
 
+@threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
 def harmonic_likelihood(
     record: Record,
     model: Model,

@@ -7,7 +7,6 @@ response's phase B = τ_u + τ_y, and the sidebands' offset C = τ_u − δ_f. I
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Literal
@@ -21,10 +20,10 @@ from rhythmid.identify.declared import own_model
 from rhythmid.identify.discretisation import discretisation_error
 from rhythmid.identify.harmonic_likelihood import INPUT_DELAY, MEASUREMENT_DELAY, visible_sidebands
 from rhythmid.identify.identification import Delays, Estimate, Observables
+from rhythmid.identify.inner_delays import with_inner_delays
 from rhythmid.identify.joint import JointFit, without_forcing
-from rhythmid.identify.output_error import Fit
 from rhythmid.identify.sensitivity import Problem
-from rhythmid.identify.series import dominant_frequency
+from rhythmid.identify.undetermined import sum_of, undetermined
 from rhythmid.ltp.limit_cycle import limit_cycle
 from rhythmid.ltp.pumping import pumping_of
 from rhythmid.simulation.simulate import physical_times
@@ -62,56 +61,6 @@ def offset_of(bounds: tuple[float, float] | None, std: float | None) -> Offset |
             f"bounds of the clock offset {bounds[0]:g} to {bounds[1]:g} s: the lower comes first"
         )
     return Offset(*bounds)
-
-
-@dataclass(frozen=True)
-class Direction:
-    """A change of parameters (unit vector, in units of their size) that the records do not notice, in words."""
-
-    names: tuple[str, ...]
-    weights: Array
-    words: str
-
-
-def undetermined(fit: Fit) -> list[Direction]:
-    """Directions in parameter space whose standard deviation exceeds the parameters themselves.
-
-    Null space of the Fisher information, each parameter measured by its own size, a delay by the motion's period / 2π.
-    """
-    p = len(fit.names)
-    if p == 0:
-        return []
-    radian = 1.0 / (2 * np.pi * max(dominant_frequency(one) for one in fit.run.series))
-    parameters = fit.model.parameters
-    size = np.array(
-        [radian if parameters[n].unit == "s" else abs(v) or 1.0 for n, v in zip(fit.names, fit.values)]
-    )
-    information = (fit.linearisation.jacobian * size).T @ (fit.linearisation.jacobian * size)
-    for i, name in enumerate(fit.names):
-        prior = parameters[name].prior
-        if prior is not None:
-            information[i, i] += (size[i] / prior.std) ** 2
-    values, vectors = np.linalg.eigh(information)
-    floor = max(1.0, 1e-11 * float(values[-1]))  # below this lies the error of the differences
-    felt = np.linalg.norm(fit.linearisation.jacobian, axis=0)
-    return [_direction(fit.names, vectors[:, i], size, felt) for i in range(p) if values[i] < floor]
-
-
-def _direction(names: Sequence[str], vector: Array, size: Array, felt: Array) -> Direction:
-    """In words, with the parameters that take part: as their sizes go, or as they are `felt`, by their effect a unit, for the
-    value of one that nothing determines may be anything."""
-    share, part = np.abs(vector) / np.abs(vector).max(), np.abs(vector * size * felt)
-    large = np.flatnonzero((share > 0.05) | ((share > 1e-6) & (part > 0.05 * part.max())))
-    moved = [names[int(i)] for i in large]
-    step = (vector * size)[large]
-    if len(moved) == 1:
-        words = f"nothing in the records determines {moved[0]}"
-    elif set(moved) == {INPUT_DELAY, MEASUREMENT_DELAY} and abs(step.sum()) < 0.05 * np.abs(step).max():
-        words = "only the sum of the input delay and the measurement delay shows, not how it divides"
-    else:
-        change = ", ".join(f"{name} by {s / step[0]:+.3g}" for name, s in zip(moved, step))
-        words = f"these can change together and nothing recorded would change: {change}"
-    return Direction(tuple(moved), vector[large], words)
 
 
 def _cycle_slope(joint: JointFit) -> Array | None:
@@ -197,31 +146,6 @@ def aliases(joint: JointFit, cycle: bool = True) -> tuple[tuple[float, float], .
     return tuple((u + j * shift, y - j * shift) for j in steps if j != 0)
 
 
-def _estimate(fit: Fit, *names: str) -> Estimate:
-    """Sum of parameters with its standard deviation; None where it is not determined."""
-    value = sum(fit.model.value(name) for name in names if name in fit.model.parameters)
-    pick = np.array([float(name in names) for name in fit.names])
-    places = pick > 0
-    norm = np.linalg.norm(fit.linearisation.jacobian[:, places].sum(axis=1)) if places.any() else 0.0
-    variance = float(pick @ fit.covariance @ pick)
-    if (
-        places.sum() > 1 and not 0.0 <= variance < 1.0
-    ):  # the sum of two undetermined ones is lost in their rounding
-        variance = 1.0 / max(_projected(fit, places) ** 2, 1e-300) if norm > 0.0 else math.inf
-    std = math.sqrt(variance) if variance >= 0.0 else math.inf
-    return Estimate(float(value), std if math.isfinite(std) and std < 1e6 else None, "s")
-
-
-def _projected(fit: Fit, places: NDArray[np.bool_]) -> float:
-    """Norm of the sensitivity to the first of the parameters `places`, all parameters that are not theirs projected out."""
-    column = fit.linearisation.jacobian[:, np.flatnonzero(places)[0]]
-    others = fit.linearisation.jacobian[:, ~places]
-    if others.shape[1]:
-        others = others / np.maximum(np.linalg.norm(others, axis=0), 1e-150)
-        column = column - others @ np.linalg.lstsq(others, column, rcond=1e-10)[0]
-    return float(np.linalg.norm(column))
-
-
 def stated_by(joint: JointFit) -> Forcing | None:
     """Where the forcing acts, as the recordings themselves say: a run that names its forcing made it on the robot."""
     runs_given = [record.run for record in joint.records]
@@ -245,10 +169,17 @@ def delays_of(
     by a clock whose `offset` is not known). Without a statement it is taken as on the robot, unless the fit then finds
     an input delay of zero: that is just what a forcing through the delayed channel looks like, and the split is refused.
     """
+    directions = tuple(direction.words for direction in undetermined(joint.fit))
+    return with_inner_delays(_of_paths(joint, forcing, offset, source, directions), joint.fit)
+
+
+def _of_paths(
+    joint: JointFit, forcing: Forcing | None, offset: Offset | None, source: str, directions: tuple[str, ...]
+) -> Delays:
+    """The answer about the delays of the command and measurement paths; `directions` are undetermined, in words."""
     fit = joint.fit
-    total = _estimate(fit, INPUT_DELAY, MEASUREMENT_DELAY)
+    total = sum_of(fit, INPUT_DELAY, MEASUREMENT_DELAY)
     nothing = Estimate(None, None, "s")
-    directions = tuple(d.words for d in undetermined(fit))
     if not {INPUT_DELAY, MEASUREMENT_DELAY} & set(fit.names) and joint.pumping is None:
         words = "nothing that is recorded drives the machine, so no delay shows"
         return Delays(nothing, nothing, nothing, False, words, undetermined=directions)
@@ -256,10 +187,10 @@ def delays_of(
         words = "no forcing is known, so nothing tells when the cycle is at which phase: only the sum of the delays shows"
         return Delays(nothing, nothing, total, False, words, undetermined=directions)
     if INPUT_DELAY not in fit.model.parameters or MEASUREMENT_DELAY not in fit.model.parameters:
-        here = _estimate(fit, MEASUREMENT_DELAY)
+        here = sum_of(fit, MEASUREMENT_DELAY)
         words = f"{source} acts on the machine undelayed; there is no command, so its delay does not show"
         return Delays(nothing, here, nothing, False, words, undetermined=directions)
-    first, second = _estimate(fit, INPUT_DELAY), _estimate(fit, MEASUREMENT_DELAY)
+    first, second = sum_of(fit, INPUT_DELAY), sum_of(fit, MEASUREMENT_DELAY)
     seen = observables(joint)
     closure = None if seen is None else seen.z
     told = forcing or stated_by(joint)

@@ -48,6 +48,24 @@ class Observables:
 
 
 @dataclass(frozen=True)
+class InnerDelay:
+    """A dead time inside the machine [s]. Where it is not `separable` it has no value, `reason` says why, and `sums` are those
+    with other delays that are determined, by their elements' labels."""
+
+    delay: Estimate
+    separable: bool = True
+    reason: str = ""
+    sums: Mapping[str, Estimate] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        return self.delay.to_dict() | {
+            "separable": self.separable,
+            "reason": self.reason,
+            "sums": {label: total.to_dict() for label, total in self.sums.items()},
+        }
+
+
+@dataclass(frozen=True)
 class Delays:
     """Input delay τ_u, measurement delay τ_y and their sum [s].
 
@@ -55,7 +73,7 @@ class Delays:
     on. `closure` is (limit-cycle phase + sideband offset − slope of G_0) in its standard deviations, which a right model
     keeps near zero; None where one of the three cannot be had. `aliases` are further pairs that fit as well.
     `intervals` (95 %) are what can be said of delays that cannot be told apart; `undetermined` says in words which
-    changes of parameters the records do not notice.
+    changes of parameters the records do not notice. `inner` are dead times inside the machine, by their elements' labels.
     """
 
     input: Estimate
@@ -68,6 +86,7 @@ class Delays:
     intervals: Mapping[str, tuple[float, float]] | None = None
     observables: Observables | None = None
     undetermined: tuple[str, ...] = ()
+    inner: Mapping[str, InnerDelay] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         return {
@@ -83,6 +102,7 @@ class Delays:
             else {n: list(pair) for n, pair in self.intervals.items()},
             "observables": None if self.observables is None else self.observables.to_dict(),
             "undetermined": list(self.undetermined),
+            "inner": {label: one.to_dict() for label, one in self.inner.items()},
         }
 
 

@@ -17,6 +17,7 @@ from rhythmid.identify.discretisation import with_discretisation_error
 from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.identifiability import Forcing, Offset, delays_of
 from rhythmid.identify.identification import Delays, Estimate, Identification, Shown
+from rhythmid.identify.inner_delays import dead_times
 from rhythmid.identify.joint import POOR, JointFit, best_fit
 from rhythmid.identify.large_shifts import large_shifts
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
@@ -274,6 +275,14 @@ def _by_likelihood(
         "measurement_jitter": jitter.to_dict(),
     }
     delays = delays_of(joint, forcing, offset, SOURCES.get(seen.source, "the forcing"))
+    refused = {
+        name
+        for name, label in dead_times(fit.model).items()
+        if label in delays.inner and not delays.inner[label].separable
+    }
+    parameters = {
+        name: replace(e, value=None, std=None) if name in refused else e for name, e in parameters.items()
+    }
     cautions = seen.judged(fit.model, parameters, delays, joint, fit.nrmse())
     if _open(delays, records[0].output.period):
         notes += (

@@ -114,7 +114,7 @@ class PeriodMap:
     """x(0) -> x(T) of the forced, uncommanded model, and what lies between."""
 
     def __init__(self, model: Model, pumping: Pumping, excited: InputKind, max_step: float) -> None:
-        self.compiled = compile_model(model, excited=excited)
+        self.compiled = compile_model(model, excited=excited, rational=True)
         self.parameters = self.compiled.layout.vector(model)
         self.still = tuple(np.ascontiguousarray(part) for part in pieces(None))
         self.forcing = tuple(np.ascontiguousarray(part) for part in pieces(pumping.signal()))

@@ -6,10 +6,14 @@
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rhythmid.model import Model, Term
 from rhythmid.simulation.generated_source import InputKind, Layout, OutputKind, generate, generate_rates
-from rhythmid.simulation.machine_code import load_run
+from rhythmid.simulation.machine_code import Module, load_run
 
 
 @dataclass(frozen=True)
@@ -19,11 +23,28 @@ class Compiled:
     `run(times, ku, cu, kw, cw, kd, cd, parameters, start, max_step, out)` integrates from times[0], where the state is
     `start`, and fills a row of `out` for each time; it returns how many rows are finite. Knots and cubic pieces belong
     to the command (ku, cu), the forcing (kw, cw) and, where compiled with `disturbed`, to a further force on the mass
-    (kd, cd). The global interpreter lock is released meanwhile.
+    (kd, cd). `resume` takes one more argument, what is known of the past, none of it in `NO_HISTORY`, and returns with the rows what
+    the next run needs of it to go on where this one ends. The global interpreter lock is released meanwhile.
     """
 
     layout: Layout
     run: Callable[..., int]
+    resume: Callable[..., tuple[int, NDArray[np.float64]]]
+
+
+NO_HISTORY = np.empty((0, 0))
+
+
+def _of(module: Module, layout: Layout) -> Compiled:
+    run: Callable[..., Any] = load_run(module)
+    if not layout.history:
+        return Compiled(layout, run, lambda *given: (run(*given[:-1]), NO_HISTORY))
+
+    def resume(*given: Any) -> tuple[int, NDArray[np.float64]]:
+        *before, past = given
+        return run(*before, past if past.size else np.empty((0, layout.history)))
+
+    return Compiled(layout, lambda *given: resume(*given, NO_HISTORY)[0], resume)
 
 
 def _key(terms: tuple[Term, ...]) -> Hashable:
@@ -31,7 +52,8 @@ def _key(terms: tuple[Term, ...]) -> Hashable:
     return tuple(
         (
             term.label, term.element.name, term.element.slot, term.element.acts, term.element.family,
-            term.element.states, term.element.memories, tuple(term.element.borrows.items()),
+            term.element.states, term.element.memories, term.element.history, term.element.dead_time,
+            tuple(term.element.borrows.items()),
             tuple(parameter.name for parameter in term.element.parameters),
             getattr(term.element.kernel, "__code__", None),
         )
@@ -41,10 +63,16 @@ def _key(terms: tuple[Term, ...]) -> Hashable:
 
 @lru_cache(maxsize=512)
 def _structure(
-    key: Hashable, terms: "_Terms", disturbed: bool, excited: InputKind, smooth: bool, measured: OutputKind
+    key: Hashable,
+    terms: "_Terms",
+    disturbed: bool,
+    excited: InputKind,
+    smooth: bool,
+    measured: OutputKind,
+    rational: bool,
 ) -> Compiled:
-    module, layout = generate(terms.terms, disturbed, excited, smooth, measured)
-    return Compiled(layout, load_run(module))
+    module, layout = generate(terms.terms, disturbed, excited, smooth, measured, rational)
+    return _of(module, layout)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,27 +94,29 @@ def compile_model(
     excited: InputKind = "force",
     smooth: bool = False,
     measured: OutputKind = "position",
+    rational: bool = False,
 ) -> Compiled:
     """The compiled structure of a model; parameter values play no part.
 
-    With `disturbed` the structure takes a further, arbitrary force on the mass as a signal; `excited`, `smooth` and
-    `measured` as in `generate`.
+    With `disturbed` the structure takes a further, arbitrary force on the mass as a signal; `excited`, `smooth`,
+    `measured` and `rational` as in `generate`.
     """
     terms = tuple(term for term in model.terms if term.element.kernel is not None)
-    return _structure(_key(terms), _Terms(terms), disturbed, excited, smooth, measured)
+    return _structure(_key(terms), _Terms(terms), disturbed, excited, smooth, measured, rational)
 
 
 @lru_cache(maxsize=256)
 def _rates(key: Hashable, terms: "_Terms", excited: InputKind) -> Compiled:
     module, layout = generate_rates(terms.terms, excited)
-    return Compiled(layout, load_run(module))
+    return _of(module, layout)
 
 
 def compile_rates(model: Model, excited: InputKind = "force") -> Compiled:
     """The model's right-hand side at given points, for its linearisation.
 
     `run(times (n,), command (n,), forcing (n,), states (n, q), parameters, out (n, q + 2))` fills rows of state rates,
-    sensor output and total actuator force. Signals in the command path are taken as they are, without its delays. A
+    sensor output and total actuator force. Signals in the command path are taken as they are, without its delays;
+    dead times of elements are states (`rational`). A
     memory's rate is its change over a step of the length that the parameter `ELAPSED` says.
     """
     terms = tuple(term for term in model.terms if term.element.kernel is not None)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rhythmid.elements.element import DISSIPATIVE, ELAPSED, LEADING, STEP, Element
 from rhythmid.errors import InputError
 from rhythmid.model import Model
-from rhythmid.simulation.generated_source import kernel_module
+from rhythmid.simulation.kernel_source import kernel_module
 from rhythmid.simulation.machine_code import Module, load_run
 
 Array = NDArray[np.float64]
@@ -126,8 +126,12 @@ def effect_along(
     change of its signal.
 
     An element's own states take steps of at most `max_step` [s]. Parameters that the element borrows come from `model`. Raises InputError when the model lacks one, or when one of the
-    element's own has no value.
+    element's own has no value, and for an element that acts on the past, which has to be simulated.
     """
+    if element.history:
+        raise InputError(
+            f"element {element.name!r} acts on the past of a signal: it is simulated, not read off a motion"
+        )
     borrowed = {
         name: max_step if source == STEP else model.borrowed(source, default)
         for name, (source, default) in element.borrows.items()

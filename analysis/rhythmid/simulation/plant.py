@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.model import Model
-from rhythmid.simulation.compiled import compile_model
+from rhythmid.simulation.compiled import NO_HISTORY, compile_model
+from rhythmid.simulation.history import BEGIN
 from rhythmid.simulation.signal import FAR
 from rhythmid.simulation.simulate import MAX_STEP, physical_times, samplers, start_states
 
@@ -48,6 +49,11 @@ def settled_state(model: Model, periods: int = 120, tolerance: float = 1e-12) ->
 
     Without forcing the machine comes to rest. Starts from rest at the first spring's rest length.
     """
+    return settled(model, periods, tolerance)[0]
+
+
+def settled(model: Model, periods: int = 120, tolerance: float = 1e-12) -> tuple[Array, Array]:
+    """The `settled_state`, and what elements with a dead time need of the past there."""
     compiled = compile_model(model)
     period = next(
         (1.0 / t.values["frequency"].value for t in model.terms
@@ -55,18 +61,23 @@ def settled_state(model: Model, periods: int = 120, tolerance: float = 1e-12) ->
     )  # fmt: skip
     state = start_states(model, compiled, model.borrowed("linear_spring.rest_length", 0.0) or 0.0, 0.0)
     parameters = compiled.layout.vector(model)
-    knots, zero = np.array([-FAR, FAR]), np.zeros((4, 1))
+    knots, zero, past = np.array([-FAR, FAR]), np.zeros((4, 1)), NO_HISTORY
     for count in range(periods, 0, -1):
         times = np.array([-count * period, -(count - 1) * period])
         out = np.empty((2, len(state) + 2))
-        if compiled.run(times, knots, zero, knots, zero, knots, zero, parameters, state, MAX_STEP, out) < 2:
+        done, past = compiled.resume(
+            times, knots, zero, knots, zero, knots, zero, parameters, state, MAX_STEP, out, past
+        )
+        if done < 2:
             raise InputError(
                 "the model diverges under its forcing; check its parameters or give an initial state"
             )
         before, state = state, np.ascontiguousarray(out[-1, : len(state)])
         if np.allclose(before, state, rtol=tolerance, atol=tolerance):
+            if past.size:
+                past[:, BEGIN] -= times[1]
             break
-    return state
+    return state, past
 
 
 class Plant:
@@ -88,8 +99,9 @@ class Plant:
         self._parameters = self._compiled.layout.vector(model)
         self._samplers = samplers(model, seed)
         self._late = [t for t in model.terms if t.element.slot == "command" and t.element.delay is not None]
+        self._past = NO_HISTORY
         if initial is None:
-            self._state = settled_state(model)
+            self._state, self._past = settled(model)
         else:
             start = np.asarray(initial, dtype=float)
             self._state = start_states(model, self._compiled, *start) if start.shape == (2,) else start
@@ -143,7 +155,7 @@ class Plant:
         no_knots, zero = np.array([-FAR, FAR]), np.zeros((4, 1))
         n = len(self._state)
         out = np.empty((len(times), n + 2))
-        done = self._compiled.run(
+        done, past = self._compiled.resume(
             times,
             knots,
             coefficients,
@@ -155,6 +167,7 @@ class Plant:
             self._state,
             MAX_STEP,
             out,
+            self._past,
         )
         if done < len(times) or not np.isfinite(out[-1]).all():
             raise InputError(
@@ -163,7 +176,7 @@ class Plant:
         rows = out if first else out[1:]
         self._next = int(last) + 1
         self._time = float(times[-1])
-        self._state = np.ascontiguousarray(out[-1, :n])
+        self._state, self._past = np.ascontiguousarray(out[-1, :n]), past
         past = bisect_right(self._knots, self._time)
         if past:
             self._held = self._efforts[past - 1]

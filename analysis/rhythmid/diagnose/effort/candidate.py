@@ -52,6 +52,8 @@ def starts_of(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
     for element, values in candidates(catalogue.within(sizes), model.setting, sizes).tried:
         if element.slot not in SEEN or element.kernel is None or element.acts == "feedback":
             continue
+        if element.history:
+            continue
         if driven and (element.slot == "actuator" or element.acts == "drive"):
             continue
         found.append(Start("effects", element.name, element, values))
@@ -70,6 +72,10 @@ def not_tried(catalogue: Catalogue, model: Model, sizes: Scales) -> dict[str, st
     for element in catalogue.values():
         if element.candidate and element.slot not in SEEN:
             reasons[element.name] = f"it acts in the {element.slot} path, which the effort does not show"
+        elif element.candidate and element.history:
+            reasons[element.name] = (
+                "it acts on the past, which a balance of effort at one instant does not know"
+            )
     return reasons
 
 

@@ -155,9 +155,13 @@ def change_of_output(
     """
     fit, run = known.fit, known.disturbed
     changes: list[Array] = []
-    if element.delay is not None:
+    if element.delay is not None or element.history:
         model = fit.model.with_element(element, values, fixed=True)
-        outputs = fit.run.outputs(model, fit.starts)
+        outputs = (
+            _with_history(fit, model).outputs(model, fit.starts)
+            if element.history
+            else fit.run.outputs(model, fit.starts)
+        )
         if outputs is None:
             return None
         return [new - one.of_block(old) for new, one, old in zip(outputs, run.series, known.outputs)]
@@ -194,6 +198,12 @@ def change_of_output(
             return None
         changes.append(one.of_block(rows[:, run.states] - known.outputs[index]) / share)
     return changes
+
+
+def _with_history(fit: Fit, model: Model) -> FreeRun:
+    """The fit's run for the model with one more element, which keeps a history: what that does is simulated, for it changes what
+    a controller does ever after."""
+    return prepare_run(model, fit.run.series, fit.run.max_step)
 
 
 def _change_of_reference(known: Trajectories, index: int, change: Array) -> Array | None:

@@ -1,0 +1,42 @@
+"""Feedback delay: a controller works on the position and the speed of tau_f ago, x(t - tau_f) and v(t - tau_f).
+
+The time that a controller's own measurement and its computation take, inside the loop. Its reference is not delayed by it:
+what the computation adds there is part of the input delay. It turns the phase of the loop, and takes k_p tau_f from its damping.
+"""
+
+from rhythmid.elements.element import LONGEST_DEAD_TIME, Element, Parameter
+
+
+def kernel(x, v, t, delay, past_x, past_v):
+    return past_x, past_v
+
+
+ELEMENT = Element(
+    name="feedback_delay",
+    slot="command",
+    title="Feedback delay",
+    equation="F = k_p (r − x(t − τ_f)) − k_d v(t − τ_f)",
+    parameters=(
+        Parameter(
+            "delay",
+            "s",
+            "delay τ_f of the controller's measurement and computation",
+            bounds=(0.0, LONGEST_DEAD_TIME),
+        ),
+    ),
+    kernel=kernel,
+    acts="observation",
+    history=("x", "v"),
+    dead_time="delay",
+    size="delay",
+    controlled=True,
+    starts=lambda s: [{"delay": w / s.natural_frequency} for w in (0.01, 0.05)],
+    also_known_as=("loop delay", "controller latency", "sampling and computation delay"),
+    family="dead time",
+    confusable={
+        "actuator_delay": "leaves reference and forcing alone: know the input delay, with a forcing the measurement delay",
+        "viscous_damper": "to first order a damping of −k_p τ_f: give the derivative gain, move fast",
+        "measurement_delay": "acts inside the loop: the measurement delay is that of the record alone",
+    },
+    reference="K. J. Åström, B. Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, section 2.3",
+)

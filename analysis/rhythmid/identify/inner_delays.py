@@ -1,0 +1,99 @@
+"""Dead times inside the machine: which of them the records tell, and which sums of delays where they do not.
+
+Without a controller all that drives the machine comes later by a dead time of its actuator, and so does the motion: nothing
+recorded tells it from a measurement delay. Inside a controller's loop it moves the loop's own poles, which shows; then forcing,
+reference and loop show three sums of the four delays τ_u, τ_a, τ_f and τ_y. What is not determined is told by the sensitivities,
+whatever the machine.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.identify.harmonic_likelihood import DELAYS
+from rhythmid.identify.identification import Delays, Estimate, InnerDelay
+from rhythmid.identify.output_error import Fit
+from rhythmid.identify.undetermined import sum_beside, sum_of
+from rhythmid.model import Model
+
+Array = NDArray[np.float64]
+OPPOSITE = 0.05  # of a direction's largest step, within which steps cancel
+# of the delays' largest sensitivity, below which what is left of a direction is an error of integration and of differences
+UNNOTICED = 5e-3
+UNKNOWN = Estimate(None, None, "s")
+
+
+def dead_times(model: Model) -> dict[str, str]:
+    """Parameters that are dead times inside the machine, with the labels of their elements."""
+    return {f"{t.label}.{t.element.dead_time}": t.label for t in model.terms if t.element.history}
+
+
+def with_inner_delays(found: Delays, fit: Fit) -> Delays:
+    """The answer about the delays with those inside the machine; without a value what only a sum is known of."""
+    inside = {name: label for name, label in dead_times(fit.model).items() if name in fit.names}
+    if not inside:
+        return found
+    among = (*inside, *(name for name in DELAYS if name in fit.names))
+    directions = unnoticed(fit, among)
+    inner: dict[str, InnerDelay] = {}
+    for name, label in inside.items():
+        moved = any(abs(one[among.index(name)]) > OPPOSITE for one in directions)
+        inner[label] = _refused(fit, name, among, directions) if moved else InnerDelay(sum_of(fit, name))
+    mixed = [one for one in directions if np.any(np.abs(one[: len(inside)]) > OPPOSITE)]
+    lost = [
+        which
+        for which, name in zip(("input", "measurement"), DELAYS)
+        if name in among and any(abs(one[among.index(name)]) > OPPOSITE for one in mixed)
+    ]
+    if not lost:
+        return replace(found, inner=inner)
+    words = "; ".join(dict.fromkeys(one.reason for one in inner.values() if not one.separable))
+    kept = {
+        which: UNKNOWN if which in lost else sum_of(fit, name)
+        for which, name in zip(("input", "measurement"), DELAYS)
+        if name in among
+    }
+    return replace(
+        found, **kept, sum=UNKNOWN, separable=False, assumption=words, intervals=None, aliases=(), inner=inner
+    )
+
+
+def unnoticed(fit: Fit, among: Sequence[str]) -> Array:
+    """Directions (d, n) in the space of these delays, largest step 1, that change nothing that other parameters do not make up for."""
+    places = np.array([name in among for name in fit.names])
+    order = [fit.names.index(name) for name in among]
+    columns, others = fit.linearisation.jacobian[:, order], fit.linearisation.jacobian[:, ~places]
+    others = others / np.maximum(np.linalg.norm(others, axis=0), 1e-150)
+    left = columns - others @ np.linalg.lstsq(others, columns, rcond=1e-10)[0] if others.shape[1] else columns
+    _, felt, directions = np.linalg.svd(left, full_matrices=False)
+    lost = directions[felt < UNNOTICED * np.linalg.norm(columns, axis=0).max()]
+    return lost / np.maximum(np.abs(lost).max(axis=1, keepdims=True), 1e-150)
+
+
+def _refused(fit: Fit, name: str, among: Sequence[str], directions: Array) -> InnerDelay:
+    """A dead time without a value, with the sums that are the same however far one goes in an undetermined direction."""
+    place = among.index(name)
+    groups = [(place, at) for at in range(len(among)) if at != place]
+    same = [one for one in groups if _cancels(directions[:, one])] or [
+        one for one in (tuple(range(len(among))),) if _cancels(directions)
+    ]
+    label = name.split(".")[0]
+    sums = {
+        " + ".join(among[at].split(".")[0] for at in one if at != place): sum_beside(
+            fit, [among[at] for at in one]
+        )
+        for one in same
+    }
+    reason = (
+        f"only the sum of {label} with {' and with '.join(sums)} shows, not how it divides"
+        if sums
+        else f"nothing in the records determines {label}, nor its sum with other delays"
+    )
+    return InnerDelay(UNKNOWN, False, reason, sums)
+
+
+def _cancels(steps: Array) -> bool:
+    """Whether the steps (d, n) of each direction add up to nothing."""
+    return bool(np.all(np.abs(steps.sum(axis=1)) <= OPPOSITE))

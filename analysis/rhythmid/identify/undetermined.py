@@ -1,0 +1,97 @@
+"""Directions in parameter space that records do not determine, and sums of parameters that they do."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.identify.harmonic_likelihood import INPUT_DELAY, MEASUREMENT_DELAY
+from rhythmid.identify.identification import Estimate
+from rhythmid.identify.output_error import Fit
+from rhythmid.identify.series import dominant_frequency
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A change of parameters (unit vector, in units of their size) that the records do not notice, in words."""
+
+    names: tuple[str, ...]
+    weights: Array
+    words: str
+
+
+def undetermined(fit: Fit) -> list[Direction]:
+    """Directions in parameter space whose standard deviation exceeds the parameters themselves.
+
+    Null space of the Fisher information, each parameter measured by its own size, a delay by the motion's period / 2π.
+    """
+    p = len(fit.names)
+    if p == 0:
+        return []
+    radian = 1.0 / (2 * np.pi * max(dominant_frequency(one) for one in fit.run.series))
+    parameters = fit.model.parameters
+    size = np.array(
+        [radian if parameters[n].unit == "s" else abs(v) or 1.0 for n, v in zip(fit.names, fit.values)]
+    )
+    information = (fit.linearisation.jacobian * size).T @ (fit.linearisation.jacobian * size)
+    for i, name in enumerate(fit.names):
+        prior = parameters[name].prior
+        if prior is not None:
+            information[i, i] += (size[i] / prior.std) ** 2
+    values, vectors = np.linalg.eigh(information)
+    floor = max(1.0, 1e-11 * float(values[-1]))  # below this lies the error of the differences
+    felt = np.linalg.norm(fit.linearisation.jacobian, axis=0)
+    return [_direction(fit.names, vectors[:, i], size, felt) for i in range(p) if values[i] < floor]
+
+
+def _direction(names: Sequence[str], vector: Array, size: Array, felt: Array) -> Direction:
+    """In words, with the parameters that take part: as their sizes go, or as they are `felt`, by their effect a unit, for the
+    value of one that nothing determines may be anything."""
+    share, part = np.abs(vector) / np.abs(vector).max(), np.abs(vector * size * felt)
+    large = np.flatnonzero((share > 0.05) | ((share > 1e-6) & (part > 0.05 * part.max())))
+    moved = [names[int(i)] for i in large]
+    step = (vector * size)[large]
+    if len(moved) == 1:
+        words = f"nothing in the records determines {moved[0]}"
+    elif set(moved) == {INPUT_DELAY, MEASUREMENT_DELAY} and abs(step.sum()) < 0.05 * np.abs(step).max():
+        words = "only the sum of the input delay and the measurement delay shows, not how it divides"
+    else:
+        change = ", ".join(f"{name} by {s / step[0]:+.3g}" for name, s in zip(moved, step))
+        words = f"these can change together and nothing recorded would change: {change}"
+    return Direction(tuple(moved), vector[large], words)
+
+
+def sum_of(fit: Fit, *names: str) -> Estimate:
+    """Sum of parameters with its standard deviation; None where it is not determined."""
+    value = sum(fit.model.value(name) for name in names if name in fit.model.parameters)
+    pick = np.array([float(name in names) for name in fit.names])
+    places = pick > 0
+    norm = np.linalg.norm(fit.linearisation.jacobian[:, places].sum(axis=1)) if places.any() else 0.0
+    variance = float(pick @ fit.covariance @ pick)
+    if (
+        places.sum() > 1 and not 0.0 < variance < 1.0
+    ):  # the sum of two undetermined ones is lost in their rounding
+        variance = 1.0 / max(_projected(fit, places) ** 2, 1e-300) if norm > 0.0 else math.inf
+    std = math.sqrt(variance) if variance >= 0.0 else math.inf
+    return Estimate(float(value), std if math.isfinite(std) and std < 1e6 else None, "s")
+
+
+def _projected(fit: Fit, places: NDArray[np.bool_]) -> float:
+    """Norm of the sensitivity to the first of the parameters `places`, all parameters that are not theirs projected out."""
+    column = fit.linearisation.jacobian[:, np.flatnonzero(places)[0]]
+    others = fit.linearisation.jacobian[:, ~places]
+    if others.shape[1]:
+        others = others / np.maximum(np.linalg.norm(others, axis=0), 1e-150)
+        column = column - others @ np.linalg.lstsq(others, column, rcond=1e-10)[0]
+    return float(np.linalg.norm(column))
+
+
+def sum_beside(fit: Fit, names: Sequence[str]) -> Estimate:
+    """The sum of parameters of which none is determined, in the model with all but one of them held."""
+    places = np.array([name in names for name in fit.names])
+    value = sum(fit.model.value(name) for name in names)
+    return Estimate(float(value), 1.0 / max(_projected(fit, places), 1e-150), "s")

@@ -1,0 +1,199 @@
+"""The lines of a generated integration loop that keep the past of signals for elements with a dead time, and look it up.
+
+A model without such elements gets none of them. `history` holds the functions that they call.
+"""
+
+from dataclasses import dataclass
+
+from rhythmid.simulation.history import SIGNALS
+
+PADE = 4  # order of the rational approximation of a dead time
+SHORTEST = 4.0  # integration steps that the states of this approximation need
+
+
+@dataclass(frozen=True)
+class DelayedSignal:
+    """A signal that an element wants as it was some time ago: the name `delay` of the variable that holds the time in the
+    generated code, and whether the signal `jumps` where the command does."""
+
+    delay: str
+    jumps: bool
+
+
+def rational_past(signal: str, delay: str, step: str, first: int) -> tuple[str, list[str]]:
+    """A signal a dead time ago by Padé's approximation [4/4], as an expression, and lines with the rates of its four states.
+
+    With x = s τ, Q(x) = 1 + x/2 + 3x²/28 + x³/84 + x⁴/1680 and Q(x) w = z, what comes out is Q(−x) w = z − w′ − w‴/42, its
+    error below 4e-8 |x|⁹ (G. H. Golub, C. F. Van Loan, Matrix Computations, 4th ed., 2013, section 9.3.1). A dead time shorter than
+    some steps is a share of one that long, which agrees to first order in frequency. `first` is the place of the first state.
+    """
+    w = [f"s{first + k}" for k in range(PADE)]
+    lasting = f"max({delay}, {SHORTEST} * {step})"
+    lines = [f"d{first + k} = {w[k + 1]} / {lasting}" for k in range(PADE - 1)]
+    lines.append(
+        f"d{first + 3} = (1680.0 * ({signal} - {w[0]}) - 840.0 * {w[1]} - 180.0 * {w[2]} - 20.0 * {w[3]}) / {lasting}"
+    )
+    return f"{signal} - {delay} / {lasting} * ({w[1]} + {w[3]} / 42.0)", lines
+
+
+@dataclass(frozen=True)
+class HistoryLines:
+    """What the loop has to do for these signals. `smooth` as in `generate`: where it is True nothing jumps."""
+
+    signals: tuple[DelayedSignal, ...]
+    smooth: bool
+
+    @property
+    def _delays(self) -> tuple[DelayedSignal, ...]:
+        """The signals, one for each delay."""
+        return tuple({one.delay: one for one in self.signals}.values())
+
+    @property
+    def width(self) -> int:
+        """Columns of the history."""
+        return SIGNALS + 3 * len(self.signals)
+
+    @property
+    def given(self) -> list[str]:
+        """Names of what the right-hand side is given more."""
+        return [name for m in range(len(self.signals)) for name in (f"old{m}", f"share{m}")]
+
+    @property
+    def returned(self) -> list[str]:
+        """Names of what it returns more."""
+        return [f"now{m}" for m in range(len(self.signals))]
+
+    @property
+    def present(self) -> list[str]:
+        """Take every signal as it is."""
+        return [f"old{m} = 0.0; share{m} = 1.0" for m in range(len(self.signals))]
+
+    def _row(self, one: DelayedSignal) -> str:
+        return f"row_{one.delay}"
+
+    @property
+    def oldest(self) -> str:
+        """The oldest row that is still needed: for a slope, the one before that which a delay reaches back to."""
+        return f"max(min({', '.join([*(self._row(one) for one in self._delays), 'last'])}) - 1, 0)"
+
+    def look_up(self, time: str, within: bool = False) -> list[str]:
+        """Find what the signals were at a time; `within` a step that it ends, jumps there are still to come."""
+        found = "row_until" if within else "row_at"
+        rows = [
+            f"{self._row(one)} = {found}(past, {self._row(one)}, last, {one.delay}, {time})"
+            for one in self._delays
+        ]
+        values = [
+            f"old{m}, share{m} = earlier(past, {self._row(one)}, last, {SIGNALS + 3 * m}, {time} - {one.delay}, {time})"
+            for m, one in enumerate(self.signals)
+        ]
+        return [*rows, *values]
+
+    @property
+    def begun(self) -> list[str]:
+        """Begin a row where a stretch of steps, or a sample, begins."""
+        return [f"began(past, last, t, {'False' if self.smooth else 'ku[i] == t'})"] if self.signals else []
+
+    @property
+    def stops(self) -> list[str]:
+        """End the stretch where a jump comes through a delay."""
+        jumping = [] if self.smooth else [one for one in self._delays if one.jumps]
+        return [
+            line
+            for one in jumping
+            for line in (
+                f"{self._row(one)} = row_at(past, {self._row(one)}, last, {one.delay}, t)",
+                f"until = jump_until(past, {self._row(one)}, last, {one.delay}, until)",
+            )
+        ]
+
+    def keep(self, stage: int) -> list[str]:
+        """Keep the signals of a stage: begin, the mean of the two estimates of the middle, end."""
+        lines = ["past[last, 1] = h"] if self.signals and stage == 1 else []
+        for m in range(len(self.signals)):
+            place = SIGNALS + 3 * m
+            lines += {
+                1: [
+                    f"past[last, {place}] = now{m}",
+                    "if last > 0 and past[last, 2] == 0.0:",
+                    f"    past[last - 1, {place + 2}] = now{m}",
+                ],
+                2: [f"past[last, {place + 1}] = 0.5 * now{m}"],
+                3: [f"past[last, {place + 1}] += 0.5 * now{m}"],
+                4: [f"past[last, {place + 2}] = now{m}"],
+            }[stage]
+        return lines
+
+    @property
+    def next_row(self) -> list[str]:
+        """Go on to the next row, with room for it; rows that no delay reaches back to are dropped there."""
+        if not self.signals:
+            return []
+        return [
+            "if last + 1 == past.shape[0]:",
+            f"    oldest = {self.oldest}",
+            "    past = with_room(past, oldest, last)",
+            "    last -= oldest",
+            *(f"    {self._row(one)} -= oldest" for one in self._delays),
+            "last += 1",
+            "began(past, last, t, False)",
+        ]
+
+    def before_the_start(
+        self, states: int, memories: list[int], find: list[str], inputs: dict[str, list[str]], call: str
+    ) -> list[str]:
+        """The past of a run that is given none: command and forcing are known, the states are led back along their rates.
+
+        `call` evaluates the right-hand side at the states `z0`, `z1`, … and the time `at`.
+        """
+        if not self.signals:
+            return []
+        columns = range(0, 3 * len(self.signals), 3)
+        until = "times[0]" if self.smooth else "min(times[0], ku[i + 1])"
+
+        def evaluated(at: str, column: int) -> list[str]:
+            return [
+                *inputs[at],
+                f"at = {at}",
+                *(
+                    f"z{i} = s{i}" if i in memories else f"z{i} = s{i} + (at - times[0]) * e{i}"
+                    for i in range(states)
+                ),
+                call,
+                *(f"past[last, {SIGNALS + c + column}] = now{c // 3}" for c in columns),
+            ]
+
+        return [
+            *(f"{self._row(one)} = 0" for one in self._delays),
+            *(f"{one.delay} = max({one.delay}, 0.0)" for one in self._delays),
+            "last = past.shape[0] - 1",
+            "if last < 0:",
+            f"    past = with_room(np.zeros((1, {self.width})), 0, 0)",
+            "    last = 0",
+            *(f"    {line}" for line in [*find, *inputs["t"], "at = t", *self.present]),
+            *(f"    z{i} = s{i}" for i in range(states)),
+            f"    {call}",
+            *(f"    e{i} = a1_{i}" for i in range(states)),
+            "    i = 0",
+            "    j = 0",
+            "    l = 0",
+            f"    t = times[0] - max({', '.join(['0.0', *(one.delay for one in self._delays)])})",
+            "    while t < times[0]:",
+            *(f"        {line}" for line in [*find, *self.begun]),
+            f"        until = {until}",
+            "        substeps = max(1, int(math.ceil((until - t) / max_step * (1.0 - 1e-9))))",
+            "        begin = t",
+            "        h = (until - begin) / substeps",
+            "        half = 0.5 * h",
+            "        for substep in range(substeps):",
+            "            past[last, 1] = h",
+            *(
+                f"            {line}"
+                for column, at in enumerate(("t", "t + half", "t + h"))
+                for line in evaluated(at, column)
+            ),
+            "            t = begin + (substep + 1) * h",
+            *(f"            {line}" for line in self.next_row),
+            "        t = until",
+            "    t = times[0]",
+        ]
