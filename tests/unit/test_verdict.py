@@ -6,6 +6,7 @@ import pytest
 from contests import BLOCKS, SIZE, contest, decided, ends, predicted, supposed, verdict
 
 from rhythmid.diagnose.rejections import RULES
+from rhythmid.diagnose.verdict import significance
 
 NOMINAL = supposed("", predicted(1.0))
 NAMED = ("missing_physics", ("friction",))
@@ -256,6 +257,13 @@ def test_what_a_free_map_explains_by_chance_or_of_no_practical_size_is_nothing()
     assert verdict(contest(NOMINAL, maps={"velocity": chance})) == NOTHING
     tiny = supposed("", predicted(1e-8 + (0.001 * SIZE) ** 2, 0.0))
     assert verdict(contest(tiny, maps={"velocity": predicted(1e-8, 1e4)})) == NOTHING
+
+
+def test_more_rivals_and_fewer_blocks_ask_for_more_of_what_is_left():
+    one = predicted(0.1)
+    few = replace(one, log_density=one.log_density[:6])
+    assert significance(one, 1) < significance(one, 30) < significance(few, 30)
+    assert significance(one, 0) == significance(one, 1)
 
 
 @pytest.mark.parametrize(("detectable", "expected"), [(0.001, "consistent"), (0.8, "undecided")])
