@@ -39,8 +39,9 @@ def case(catalogue):
 
 
 def test_every_candidate_of_the_catalogue_can_be_concealed_in_some_machine(catalogue):
-    # a spring can only be missing from a machine that nobody would take for one without
-    expected = {name for name, e in catalogue.items() if e.candidate} - {"linear_spring"}
+    # a spring can only be missing from a machine that nobody would take for one without; dead times inside the machine are
+    # concealed by benchmarks/inner_delays.py
+    expected = {name for name, e in catalogue.items() if e.candidate and not e.dead_time} - {"linear_spring"}
     concealable = {name for design in DESIGNS.values() for name in design.effects}
     assert expected <= concealable
     assert concealable <= set(SIZES) | {LACKED}

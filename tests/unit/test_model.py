@@ -168,6 +168,7 @@ def test_every_model_survives_being_written_and_read(data):
         for element in CATALOGUE.values()
         if all(default is not None or name == STEP for name, default in element.borrows.values())
         and element.acts != "observation"
+        and not element.takes  # a motor changes the units of what commands it
     ]
     chosen = data.draw(some.lists(some.sampled_from(independent), max_size=4, unique_by=lambda e: e.name))
     chosen.sort(key=lambda element: ("command", "actuator", "force", "sensor", "timing").index(element.slot))
