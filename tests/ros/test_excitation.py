@@ -79,7 +79,7 @@ def test_it_plays_the_experiments_samples_on_a_grid_without_gaps(graph, excite):
 def test_it_does_not_start_before_there_is_a_measurement(graph):
     graph.add(ExcitationNode, max_effort=1.0, excitation=json.dumps(CONSTANT))
     heard = graph.listen("excitation")
-    graph.until(lambda: graph.nodes[0]._output.get_subscription_count() == 1, "a subscriber")
+    graph.until(lambda: graph.nodes[0]._output.publisher.get_subscription_count() == 1, "a subscriber")
     answer = graph.call("excitation/start")
     assert not answer.success and answer.message == "no measurement on joint_states yet"
     graph.spin(0.1)
