@@ -3,12 +3,12 @@
 from pathlib import Path
 
 from rhythmid.diagnose.search.forward import Search
-from rhythmid.diagnose.search.refit import Trial
+from rhythmid.diagnose.search.trial import Trial
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.excitation.sequence import build
 from rhythmid.experiment import Delay, Experiment, Forcing, Noise, TimeMode, perform
 from rhythmid.identify.output_error import Fit
-from rhythmid.identify.start_cost import start_cost
+from rhythmid.identify.start_cost import felt_starts, start_cost
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 
@@ -69,7 +69,9 @@ def records(machine: Model, protocol=SHORT, seed: int = 0, **options) -> list[Re
 
 def search_of(fit: Fit, *labels: str) -> Search:
     """A search that ended in this fit, whose model has these elements more."""
-    cost = start_cost(fit.model, fit.run, fit.noise, fit.starts, fit.residuals, fit.differences[1])
+    cost = start_cost(
+        felt_starts(fit.model, fit.run, fit.noise, fit.starts, fit.residuals, fit.differences[1])
+    )
     trial = Trial(
         labels, fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), True, fit.noise, fit.differences, cost
     )  # fmt: skip

@@ -11,9 +11,9 @@ from rhythmid.diagnose import alternatives as module
 from rhythmid.diagnose.alternatives import LONGEST, alternatives, fixed_values
 from rhythmid.diagnose.baseline import INPUT_DELAY
 from rhythmid.diagnose.hypothesis import Kind
-from rhythmid.diagnose.search.refit import Proposal, Trial
 from rhythmid.diagnose.search.round import Round
 from rhythmid.diagnose.search.score_tests import changes_of, guesses, score, sizes_along, trajectories
+from rhythmid.diagnose.search.trial import Proposal, Trial
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate
@@ -138,6 +138,17 @@ def test_kin_begin_where_the_family_has_ended(monkeypatch, plain):
     kept = proposed(monkeypatch, plain, chosen, CATALOGUE, "actuator_lag", rounds=rounds_of(plain))
     kin = next(one for one in kept if one.added == ("sensor_lag",))
     assert any(guess.get("sensor_lag.time_constant") == LAG["time_constant"] for guess in kin.guesses)
+
+
+def test_no_two_alternatives_have_the_same_effects(monkeypatch, plain):
+    model = plain.model.with_element(CATALOGUE["actuator_lag"], LAG)
+    model = model.with_element(CATALOGUE["sensor_lag"], LAG)
+    chosen = replace(plain, model=model)
+    kept = proposed(
+        monkeypatch, plain, chosen, CATALOGUE, "actuator_lag", "sensor_lag", rounds=rounds_of(plain)
+    )
+    keys = [tuple(sorted(one.added)) for one in kept]
+    assert len(set(keys)) == len(keys) > 2
 
 
 def test_places_for_which_the_catalogue_has_something_have_been_searched(monkeypatch, plain):

@@ -5,9 +5,9 @@ import pytest
 
 from machines import CATALOGUE, hopper
 from rhythmid.diagnose.search import backward as module
-from rhythmid.diagnose.search.refit import Trial
 from rhythmid.diagnose.search.round import Round
 from rhythmid.diagnose.search.score_tests import Score
+from rhythmid.diagnose.search.trial import Trial
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series
 

@@ -7,7 +7,7 @@ import numpy as np
 from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.diagnose.fine_steps import finely_stepped
 from rhythmid.diagnose.search.forward import Search
-from rhythmid.diagnose.search.refit import Trial
+from rhythmid.diagnose.search.trial import Trial
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare

@@ -7,7 +7,7 @@ import pytest
 
 from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.diagnose.search.order import in_best_order, other_orders
-from rhythmid.diagnose.search.refit import Trial
+from rhythmid.diagnose.search.trial import Trial
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare

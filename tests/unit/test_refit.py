@@ -8,7 +8,8 @@ import pytest
 
 from machines import CATALOGUE, hopper
 from rhythmid.diagnose.search import refit
-from rhythmid.diagnose.search.refit import Proposal, Trial, propose, run_trials
+from rhythmid.diagnose.search.refit import run_trials
+from rhythmid.diagnose.search.trial import Proposal, Trial, propose
 from rhythmid.identify.descent import Descent
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series

@@ -12,7 +12,7 @@ from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.series import Series, prepare
-from rhythmid.identify.start_cost import start_cost, start_freedom
+from rhythmid.identify.start_cost import felt_starts, start_cost, start_freedom
 from rhythmid.model import INERTIA, Model
 
 NOISE = NoiseModel(np.empty(0), 0.5e-4)  # of averages of four samples
@@ -25,11 +25,15 @@ def started(model: Model, series: list[Series]) -> Fit:
 
 
 def cost_of(fit: Fit) -> float:
-    return start_cost(fit.model, fit.run, fit.noise, fit.starts, fit.residuals, fit.differences[1])
+    return start_cost(
+        felt_starts(fit.model, fit.run, fit.noise, fit.starts, fit.residuals, fit.differences[1])
+    )
 
 
 def freedom_of(fit: Fit) -> float:
-    return start_freedom(fit.model, fit.run, fit.noise, fit.starts, fit.residuals, fit.differences[1])
+    return start_freedom(
+        felt_starts(fit.model, fit.run, fit.noise, fit.starts, fit.residuals, fit.differences[1])
+    )
 
 
 def test_a_model_without_states_of_elements_pays_nothing():

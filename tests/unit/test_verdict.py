@@ -5,6 +5,8 @@ from dataclasses import replace
 import pytest
 from contests import BLOCKS, SIZE, contest, decided, ends, predicted, supposed, verdict
 
+from rhythmid.diagnose.answer.result import FitQuality, MissingEffect
+from rhythmid.diagnose.answer.wording import summary_of
 from rhythmid.diagnose.rejections import RULES
 from rhythmid.diagnose.verdict import significance
 
@@ -154,6 +156,23 @@ def test_the_simpler_of_two_laws_that_predict_alike_is_chosen():
     assert decided(contest(NOMINAL, wide, simple))[0].chosen is simple
     clear = friction(0.02, free=9)
     assert decided(contest(NOMINAL, clear, simple))[0].chosen is clear
+
+
+@pytest.mark.parametrize(("left", "expected"), [(1e-6, ("friction", "cubic")), (0.004, ("friction",))])
+def test_a_small_effect_beside_a_large_one_is_stated_where_nothing_of_its_size_is_left(left, expected):
+    both = supposed("friction cubic", predicted(0.005, 900.0))
+    made = contest(
+        NOMINAL,
+        friction(0.02, score=500.0),
+        both,
+        maps={"position": predicted(0.005 - left, 1100.0 if left > 1e-3 else 900.0)},
+    )
+    _, decision = decided(made)
+    assert (decision.verdict, decision.named) == ("missing_physics", expected)
+    assert set(decision.beside) == {"friction", "cubic"} - set(expected)
+    named = [MissingEffect(name, "force", "", 1.0, 1.0, {}) for name in decision.named]
+    said = summary_of(decision, named, FitQuality(0.1, 0.1), FitQuality(0.01, 0.01), "motion")
+    assert ("With it and cubic, which is too uncertain to be named, the error" in said) == (len(named) == 1)
 
 
 def test_a_second_name_that_is_open_does_not_take_the_first_one_with_it():

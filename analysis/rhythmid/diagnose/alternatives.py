@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.baseline import INPUT_DELAY
 from rhythmid.diagnose.free_map import FREE_MAPS, first_guess
 from rhythmid.diagnose.hypothesis import Kind
-from rhythmid.diagnose.search.refit import Proposal, Trial, propose, run_trials
+from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.round import Round
 from rhythmid.diagnose.search.score_tests import Score, Trajectories
+from rhythmid.diagnose.search.trial import Proposal, Trial, propose
 from rhythmid.diagnose.static_law import laws_of
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales, Slot
@@ -71,15 +72,15 @@ def alternatives(
         "free_map": list(_one_law(chosen, known, sizes)),
         "effects": [*kin, *_reduced(chosen, weighed)],
     }
+    proposals = {tuple(sorted(one.added)): one for group in made.values() for one in group}
     kinds: dict[tuple[str, ...], Kind] = {
-        proposal.added: kind for kind, group in made.items() for proposal in group
+        tuple(sorted(one.added)): kind for kind, group in made.items() for one in group
     }
     if not kinds:
         return []
     states = compile_model(chosen.model).layout.states
-    every = [proposal for group in made.values() for proposal in group]
-    trials, _ = run_trials(every, series, chosen.starts, states, noise, step)
-    return [(trial, kinds[trial.added]) for trial in trials]
+    trials, _ = run_trials(list(proposals.values()), series, chosen.starts, states, noise, step)
+    return [(trial, kinds[tuple(sorted(trial.added))]) for trial in trials]
 
 
 def _reduced(chosen: Trial, weighed: Sequence[Trial]) -> Iterator[Proposal]:
@@ -117,16 +118,19 @@ def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Tri
         made = propose(base.model, scores[0].element, [one.start for one in scores[:2]], base.added)
         own = made.added[-1]
         ends = [
-            {
-                key.replace(f"{label}.", f"{own}."): value.value
-                for key, value in trial.model.parameters.items()
-            }
+            {_renamed(key, label, own): value.value for key, value in trial.model.parameters.items()}
             for label, trial in places.items()
             if trial.element(label).family == family
         ]
         known = set(made.model.parameters)
         nearer = tuple({key: value for key, value in end.items() if key in known} for end in ends)
         yield replace(made, guesses=(*made.guesses, *nearer))
+
+
+def _renamed(parameter: str, label: str, own: str) -> str:
+    """A parameter's name with another label in the place of an effect's."""
+    term, _, name = parameter.rpartition(".")
+    return f"{own}.{name}" if term == label else parameter
 
 
 def _base(chosen: Trial, rest: tuple[str, ...]) -> Trial:

@@ -19,12 +19,13 @@ from rhythmid.diagnose.evidence import (
     prediction,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, names_of, richer_of
-from rhythmid.diagnose.search.refit import Trial, fine_enough, whole_fit
+from rhythmid.diagnose.search.refit import fine_enough, whole_fit
+from rhythmid.diagnose.search.trial import Trial
 from rhythmid.errors import InputError
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.series import Series, record_of
-from rhythmid.identify.start_cost import start_freedom
+from rhythmid.identify.start_cost import felt_starts, start_freedom
 from rhythmid.identify.student import autocorrelation_time
 from rhythmid.parallel import fork_map
 
@@ -177,7 +178,9 @@ def contend(
         fit = whole_fit(case[0], series, rows.noise, step)
         found = cross_validate(linearised(fit, rows), rows.blocks)
         state_steps = fit.linearisation.state_steps
-        free = start_freedom(fit.model, fit.run, rows.noise, fit.starts, fit.residuals, state_steps)
+        free = start_freedom(
+            felt_starts(fit.model, fit.run, rows.noise, fit.starts, fit.residuals, state_steps)
+        )
         if free > 0.0:  # spread over what the fit saw
             found = replace(found, penalty=free / max(rows.fitted, 1))
         return found, measured_errors(found.error, rows)

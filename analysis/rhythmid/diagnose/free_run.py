@@ -26,8 +26,9 @@ from rhythmid.diagnose.intervals import profiled
 from rhythmid.diagnose.location import Dependence, dependences
 from rhythmid.diagnose.scoring import Scoring
 from rhythmid.diagnose.search.forward import Search, search
-from rhythmid.diagnose.search.refit import Trial, whole_fit
+from rhythmid.diagnose.search.refit import whole_fit
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories, under
+from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.shape import shape_of
 from rhythmid.diagnose.verdict import Decision, decide

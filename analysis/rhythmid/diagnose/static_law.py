@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.diagnose.search.refit import Trial
+from rhythmid.diagnose.search.trial import Trial
 from rhythmid.elements.element import Element, Scales
 from rhythmid.model import Model
 from rhythmid.simulation.effect import Path, effect_along

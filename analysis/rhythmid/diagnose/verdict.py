@@ -41,6 +41,7 @@ class Decision:
     equivalent : groups of names that the evidence does not separate, the chosen one first.
     unexplained : what is left.
     explained : share of what anything explains that the names explain.
+    beside : names of effects that the chosen model has, too, too uncertain for the answer to stand by them.
     """
 
     verdict: Verdict
@@ -53,6 +54,7 @@ class Decision:
     equivalent: tuple[tuple[str, ...], ...]
     unexplained: Unexplained
     explained: float
+    beside: tuple[str, ...] = ()
 
 
 def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
@@ -147,7 +149,8 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     groups = _groups(contest, selection)
 
     def answer(verdict: Verdict, reason: str, named: tuple[str, ...] = labels) -> Decision:
-        return Decision(verdict, reason, named, shares, each, joint, weights, groups, left, explained)
+        beside = tuple(names[label] for label in labels if label not in named)
+        return Decision(verdict, reason, named, shares, each, joint, weights, groups, left, explained, beside)
 
     if not chosen.elements:
         explainable = left.share * (contest.nominal.prediction.mean_square - contest.floor)

@@ -5,7 +5,8 @@ by that alone, about one of chi2 a start, whatever its physics; over hundreds of
 is worth. A fair criterion takes the average over the starts' usual range, not the best of it.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,65 +19,67 @@ from rhythmid.model import Model
 Array = NDArray[np.float64]
 
 
-def start_cost(
-    model: Model,
-    run: FreeRun,
-    noise: NoiseModel,
-    starts: Sequence[Array],
-    residuals: Sequence[Array],
-    state_steps: Array,
-) -> float:
-    """Minus twice the logarithm of what remains of the likelihood, averaged over the starts of the elements' states.
+@dataclass(frozen=True)
+class FeltStart:
+    """How the h states of elements of one series start.
 
-    In Laplace's approximation (D. J. C. MacKay, Neural Computation 4 (1992) 415) d'd + ln det(I + H'H) for each series: d (h,) the
-    departures of its starts from the states' usual mean in units of their usual scatter, H (n, h) the sensitivities of
-    the whitened output to them, less what position and velocity at the start can do. `state_steps` (2 + h,) are the differences by
-    which sensitivities are taken. Zero without such states.
+    Parameters
+    ----------
+    departure : (h,) of the start from the states' usual mean, in units of their usual scatter.
+    sensitivity : (n, h) of the whitened output to it, less what position and velocity at the start can do.
     """
-    total = 0.0
-    for departure, felt in _felt(model, run, noise, starts, residuals, state_steps):
-        total += float(np.sum(departure**2))
-        total += float(np.linalg.slogdet(np.eye(felt.shape[1]) + felt.T @ felt)[1])
-    return total
+
+    departure: Array
+    sensitivity: Array
 
 
-def start_freedom(
+def felt_starts(
     model: Model,
     run: FreeRun,
     noise: NoiseModel,
     starts: Sequence[Array],
     residuals: Sequence[Array],
     state_steps: Array,
-) -> float:
-    """Effective number of parameters that the starts of the elements' states are: tr H'H (I + H'H)^-1 of all series.
+) -> list[FeltStart]:
+    """The starts of each series; none where elements have no states.
 
-    Arguments as of `start_cost`. By as much does a log density that was reached with the starts fitted exceed, on average, what
-    is left on other data (D. J. Spiegelhalter et al., J. R. Stat. Soc. B 64 (2002) 583).
+    `state_steps` (2 + h,) are the differences by which sensitivities are taken.
     """
-    total = 0.0
-    for _, felt in _felt(model, run, noise, starts, residuals, state_steps):
-        square = felt.T @ felt
-        total += float(np.trace(np.linalg.solve(np.eye(len(square)) + square, square)))
-    return total
-
-
-def _felt(
-    model: Model,
-    run: FreeRun,
-    noise: NoiseModel,
-    starts: Sequence[Array],
-    residuals: Sequence[Array],
-    state_steps: Array,
-) -> Iterator[tuple[Array, Array]]:
-    """Of each series the departures (h,) of its starts, and what a usual departure does to the whitened output (n, h)."""
     if run.states == 2:
-        return
+        return []
     problem = Problem(run, (), noise, None)
     problem.learn_hidden(model, starts)
     _, states, _, _ = problem.linearise(model, starts, residuals, np.empty(0), state_steps)
-    hidden = run.states - 2
+    hidden, found = run.states - 2, []
     for error, _, sensitivity in states:
         white, scatters = sensitivity[:-hidden], np.diag(sensitivity[-hidden:, 2:])
         basis = span(white[:, :2])
         felt = white[:, 2:] / scatters
-        yield error[-hidden:], felt - basis @ (basis.T @ felt)
+        found.append(FeltStart(error[-hidden:], felt - basis @ (basis.T @ felt)))
+    return found
+
+
+def start_cost(starts: Sequence[FeltStart]) -> float:
+    """Minus twice the logarithm of what remains of the likelihood, averaged over the starts of the elements' states.
+
+    In Laplace's approximation (D. J. C. MacKay, Neural Computation 4 (1992) 415) d'd + ln det(I + H'H) for each series, with its
+    departure d and sensitivity H. Zero without such states.
+    """
+    total = 0.0
+    for one in starts:
+        square = one.sensitivity.T @ one.sensitivity
+        total += float(np.sum(one.departure**2) + np.linalg.slogdet(np.eye(len(square)) + square)[1])
+    return total
+
+
+def start_freedom(starts: Sequence[FeltStart]) -> float:
+    """Effective number of parameters that the starts of the elements' states are: tr H'H (I + H'H)^-1 of all series.
+
+    By as much does a log density that was reached with the starts fitted exceed, on average, what is left on other data
+    (D. J. Spiegelhalter et al., J. R. Stat. Soc. B 64 (2002) 583).
+    """
+    total = 0.0
+    for one in starts:
+        square = one.sensitivity.T @ one.sensitivity
+        total += float(np.trace(np.linalg.solve(np.eye(len(square)) + square, square)))
+    return total

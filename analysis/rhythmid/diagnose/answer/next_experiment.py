@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
 from rhythmid.diagnose.search.forward import Search
-from rhythmid.diagnose.search.refit import Trial, fine_enough
+from rhythmid.diagnose.search.refit import fine_enough
+from rhythmid.diagnose.search.trial import Trial
 from rhythmid.excitation.excitation import Excitation
 from rhythmid.excitation.sequence import build
 from rhythmid.identify.descent import first_guess

@@ -77,8 +77,11 @@ def summary_of(
             said += f" These records do not separate {'; '.join(groups)}."
         before, after = plain.heldout_nrmse, augmented.heldout_nrmse
         if before is not None and after is not None:
+            beside = " and ".join(decision.beside).replace("_", " ")
+            if beside:
+                beside = f" and {beside}, which is too uncertain to be named"
             said += (
-                f" With {'it' if len(missing) == 1 else 'them'}, the error on held-out data falls from {100 * before:.2f} % to "
+                f" With {'it' if len(missing) == 1 else 'them'}{beside}, the error on held-out data falls from {100 * before:.2f} % to "
                 f"{100 * after:.2f} % of the {whole}."
             )
         left = decision.unexplained

@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Sequence
 
-from rhythmid.diagnose.search.refit import Proposal, Trial, propose, run_trials, under_noise
+from rhythmid.diagnose.search.refit import run_trials, under_noise
 from rhythmid.diagnose.search.round import Round, distinct
+from rhythmid.diagnose.search.trial import Proposal, Trial, propose
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
 from rhythmid.identify.noise import NoiseModel

@@ -18,16 +18,7 @@ from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import PRACTICAL
 from rhythmid.diagnose.search.backward import defend
 from rhythmid.diagnose.search.order import in_best_order
-from rhythmid.diagnose.search.refit import (
-    Proposal,
-    Trial,
-    fine_enough,
-    near_under_noise,
-    propose,
-    run_trials,
-    under_noise,
-    whole_fit,
-)
+from rhythmid.diagnose.search.refit import fine_enough, near_under_noise, run_trials, under_noise, whole_fit
 from rhythmid.diagnose.search.round import Round, distinct, not_tried, one_round
 from rhythmid.diagnose.search.score_tests import (
     changes_of,
@@ -38,6 +29,7 @@ from rhythmid.diagnose.search.score_tests import (
     trajectories,
     under,
 )
+from rhythmid.diagnose.search.trial import Proposal, Trial, propose
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import accurate
@@ -46,7 +38,7 @@ from rhythmid.identify.output_error import Fit, minimise, noise_of
 from rhythmid.identify.sample_clock.clock import has_clock
 from rhythmid.identify.sample_clock.tick_likelihood import ticks_sought
 from rhythmid.identify.series import Series
-from rhythmid.identify.start_cost import start_cost
+from rhythmid.identify.start_cost import felt_starts, start_cost
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
 from rhythmid.progress import Tell
@@ -167,7 +159,9 @@ def search(
         noise,
         nominal.differences,
         start_cost(
-            nominal.model, nominal.run, noise, nominal.starts, nominal.residuals, nominal.differences[1]
+            felt_starts(
+                nominal.model, nominal.run, noise, nominal.starts, nominal.residuals, nominal.differences[1]
+            )
         ),
     )
     trials: dict[tuple[str, ...], Trial] = {(): base}

@@ -7,7 +7,8 @@ stands behind them at first, for its score needs no place.
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from rhythmid.diagnose.search.refit import Proposal, Trial, run_trials
+from rhythmid.diagnose.search.refit import run_trials
+from rhythmid.diagnose.search.trial import Proposal, Trial
 from rhythmid.elements.element import Element
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series

@@ -7,12 +7,12 @@ that is missing from the others must not be taken for coloured noise.
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.elements.element import ELAPSED, STEP, Element
+from rhythmid.diagnose.search.trial import FAINTER, Outcome, Proposal, Trial, outcome_of, trial_of
+from rhythmid.elements.element import ELAPSED, STEP
 from rhythmid.errors import InputError
 from rhythmid.identify.descent import Descent, descend
 from rhythmid.identify.free_run import FreeRun, prepare_run, start_of
@@ -21,7 +21,6 @@ from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.identify.sample_clock.clock import has_clock
 from rhythmid.identify.sample_clock.tick_scan import scanned
 from rhythmid.identify.series import Series, scales
-from rhythmid.identify.start_cost import start_cost
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
 
@@ -29,118 +28,11 @@ Array = NDArray[np.float64]
 SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
 STEEP = 0.8  # of chi2, below which as many iterations as in a sketch have to bring a descent that goes on
 PROMISING = 0.3  # share of the spread of chi2 within which a model is carried to convergence
-EXPLAINED = (
-    0.5  # share of the ceiling that the best of a round leaves, above which every minimum is gone through
-)
+# share of its ceiling, above which the best of a round has found so little that all minima of all trials are gone through
+LITTLE = 0.5
 HOPS = 12  # at most, from one minimum to the next
 WAYS = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minima, that one hop goes
-FAINTER = (0.1, 0.01)  # shares of a guess that led nowhere, tried in its place
 TOLERANCE = 0.05  # of chi2, at which a trial has converged: far below what an element has to earn
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A candidate model, fitted: its structure, what was added to the nominal model, and how well it does."""
-
-    added: tuple[str, ...]
-    model: Model
-    starts: tuple[Array, ...]
-    chi2: float
-    samples: int
-    free: int
-    converged: bool
-    noise: NoiseModel  # under which chi2 was reached
-    differences: tuple[Array, Array] | None = None  # steps by which its sensitivities were taken
-    start_cost: float = 0.0  # of the starts of its elements' own states
-
-    def bic(self) -> float:
-        """Bayesian information criterion (G. Schwarz, Ann. Stat. 6 (1978) 461), with what free starts cost."""
-        return self.chi2 + self.free * math.log(max(self.samples, 2)) + self.start_cost
-
-    def element(self, label: str) -> Element:
-        """The element that the model has under a label; KeyError if there is none."""
-        term = self.model.term(label)
-        if term is None:
-            raise KeyError(label)
-        return term.element
-
-
-@dataclass(frozen=True)
-class _Outcome:
-    """What a worker sends back of a fit: plain numbers. `values` are of all parameters, for guesses differ in fixed ones, too."""
-
-    values: dict[str, float]
-    free: int
-    starts: tuple[Array, ...]
-    chi2: float
-    samples: int
-    converged: bool
-    differences: tuple[Array, Array]
-    start_cost: float
-
-
-def _outcome(end: Descent, run: FreeRun, noise: NoiseModel) -> _Outcome:
-    values = {name: value.value for name, value in end.model.parameters.items()}
-    cost = start_cost(end.model, run, noise, end.starts, end.residuals, end.differences[1])
-    return _Outcome(
-        values, len(end.model.free), end.starts, end.chi2, end.samples, end.converged, end.differences, cost
-    )
-
-
-def _trial(added: tuple[str, ...], model: Model, done: _Outcome, noise: NoiseModel) -> Trial:
-    fitted = model.with_values(done.values)
-    return Trial(
-        added,
-        fitted,
-        done.starts,
-        done.chi2,
-        done.samples,
-        done.free,
-        done.converged,
-        noise,
-        done.differences,
-        done.start_cost,
-    )
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """A structure to try: the model with the elements in it, and several first guesses (values by parameter name).
-
-    `ceiling` is the chi2 of a model that it contains, as far as that is known; `faint` are guesses close to that one.
-    """
-
-    added: tuple[str, ...]
-    model: Model
-    guesses: tuple[dict[str, float], ...]
-    ceiling: float = math.inf
-    faint: tuple[dict[str, float], ...] = ()
-
-
-def propose(
-    base: Model,
-    element: Element,
-    guesses: Sequence[dict[str, float]],
-    added: tuple[str, ...],
-    ceiling: float = math.inf,
-) -> Proposal:
-    """The base model, whose chi2 is `ceiling`, with one more element; `guesses` are values of the element's parameters."""
-    extended = base.with_element(element, guesses[0])
-    label = extended.terms[-1].label
-
-    def named(guess: dict[str, float]) -> dict[str, float]:
-        return {f"{label}.{name}": value for name, value in guess.items()}
-
-    faint = [fainter(element, guesses[0], share) for share in FAINTER] if element.size else []
-    return Proposal((*added, label), extended, tuple(map(named, guesses)), ceiling, tuple(map(named, faint)))
-
-
-def fainter(element: Element, guess: dict[str, float], share: float) -> dict[str, float]:
-    """Values of an element's parameters with its effect reduced to a share."""
-    value = guess[element.size]
-    if math.isinf(element.absent):
-        return guess | {element.size: value / share}
-    return guess | {element.size: element.absent + share * (value - element.absent)}
 
 
 def fine_enough(model: Model, step: float) -> float:
@@ -158,7 +50,7 @@ def _fit_proposal(
     noise: NoiseModel,
     max_step: float,
     enough: float,
-) -> _Outcome:
+) -> Outcome:
     """A few iterations from each guess, more from the best, starting in `starts` (whose states are `known` by name); no
     further guess is tried once chi2 falls below `enough`.
 
@@ -196,7 +88,7 @@ def _fit_proposal(
         back = best.model.with_values({name: proposal.guesses[0][name] for name in flat})
         again = descend(back, run, names, noise, best.starts, BRIEF, None, TOLERANCE)
         best = min(best, again, key=lambda end: end.chi2)
-    return _outcome(best, run, noise)
+    return outcome_of(best, run, noise)
 
 
 def _carried_on(end: Descent, run: FreeRun, names: tuple[str, ...], noise: NoiseModel) -> Descent:
@@ -219,14 +111,14 @@ def _hops(trial: Trial, series: Sequence[Series]) -> dict[str, float]:
     return {f"{newest.label}.{name}": distance for name, distance in apart.items()}
 
 
-def _in_deepest(trial: Trial, series: Sequence[Series], max_step: float) -> _Outcome:
+def _in_deepest(trial: Trial, series: Sequence[Series], max_step: float) -> Outcome:
     """Where a trial ends in the deepest of the minima that its newest effect has, as far as hops from one to the next lead there."""
     run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
     names = tuple(trial.model.free)
     best = descend(trial.model, run, names, trial.noise, trial.starts, 1, None, TOLERANCE, trial.differences)
     for name, distance in _hops(trial, series).items():
         best = _hopped(best, run, names, trial.noise, name, distance)
-    return _outcome(best, run, trial.noise)
+    return outcome_of(best, run, trial.noise)
 
 
 def _hopped(
@@ -287,7 +179,7 @@ def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
             lead.model, run, free, trial.noise, lead.starts, THOROUGH, None, TOLERANCE, lead.differences
         )
         if end.chi2 < best.chi2:
-            best = _trial(trial.added, trial.model, _outcome(end, run, trial.noise), trial.noise)
+            best = trial_of(trial.added, trial.model, outcome_of(end, run, trial.noise), trial.noise)
     return best
 
 
@@ -315,7 +207,7 @@ def run_trials(
     """
     goals = list(enough) if enough is not None else [-math.inf] * len(proposals)
 
-    def one(case: tuple[Proposal, float]) -> _Outcome:
+    def one(case: tuple[Proposal, float]) -> Outcome:
         return _fit_proposal(case[0], series, starts, known, noise, max_step, case[1])
 
     trials: list[Trial] = []
@@ -324,7 +216,7 @@ def run_trials(
         if isinstance(result, Exception):
             excluded.append((proposals[index].added, str(result)))
         else:
-            trials.append(_trial(proposals[index].added, proposals[index].model, result, noise))
+            trials.append(trial_of(proposals[index].added, proposals[index].model, result, noise))
     if not trials:
         return [], excluded
     # many minima are gone through only where that can matter: few descents are as dear
@@ -335,12 +227,12 @@ def run_trials(
         for i, t in enumerate(trials)
         if _hops(t, series)
         and t.chi2 < ceilings[t.added]
-        and (lowest > EXPLAINED * ceilings[t.added] or _promising(t, trials))
+        and (lowest > LITTLE * ceilings[t.added] or _promising(t, trials))
     ]
     for place, result in fork_map(lambda i: _in_deepest(trials[i], series, max_step), hopping):
         if not isinstance(result, Exception):
             before = trials[hopping[place]]
-            trials[hopping[place]] = _trial(before.added, before.model, result, noise)
+            trials[hopping[place]] = trial_of(before.added, before.model, result, noise)
     open_ones = [t for t in trials if not t.converged and _promising(t, trials)]
     finished = under_noise(open_ones, series, noise, max_step, THOROUGH)
     done = {t.added for t in finished}
@@ -373,14 +265,14 @@ def whole_fit(
 
 def _again(
     trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int
-) -> _Outcome:
+) -> Outcome:
     """Where a trial's descent under a noise model ends; without `iterations`, the trial as it is."""
     run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
     names = tuple(trial.model.free)
     end = descend(
         trial.model, run, names, noise, trial.starts, iterations, None, TOLERANCE, trial.differences
     )
-    return _outcome(end, run, noise)
+    return outcome_of(end, run, noise)
 
 
 def under_noise(
@@ -394,11 +286,11 @@ def under_noise(
     done = [trial for trial in trials if trial.noise is noise and trial.converged]
     others = [trial for trial in trials if not (trial.noise is noise and trial.converged)]
 
-    def one(trial: Trial) -> _Outcome:
+    def one(trial: Trial) -> Outcome:
         return _again(trial, series, noise, max_step, iterations)
 
     again = [
-        _trial(others[index].added, others[index].model, result, noise)
+        trial_of(others[index].added, others[index].model, result, noise)
         for index, result in fork_map(one, others)
         if not isinstance(result, Exception)
     ]

@@ -1,0 +1,125 @@
+"""Trials: candidate models, what is proposed to be fitted and what a fit has reached."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.elements.element import Element
+from rhythmid.identify.descent import Descent
+from rhythmid.identify.free_run import FreeRun
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.start_cost import felt_starts, start_cost
+from rhythmid.model import Model
+
+Array = NDArray[np.float64]
+FAINTER = (0.1, 0.01)  # shares of a guess that led nowhere, tried in its place
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate model, fitted: its structure, what was added to the nominal model, and how well it does."""
+
+    added: tuple[str, ...]
+    model: Model
+    starts: tuple[Array, ...]
+    chi2: float
+    samples: int
+    free: int
+    converged: bool
+    noise: NoiseModel  # under which chi2 was reached
+    differences: tuple[Array, Array] | None = None  # steps by which its sensitivities were taken
+    start_cost: float = 0.0  # of the starts of its elements' own states
+
+    def bic(self) -> float:
+        """Bayesian information criterion (G. Schwarz, Ann. Stat. 6 (1978) 461), with what free starts cost."""
+        return self.chi2 + self.free * math.log(max(self.samples, 2)) + self.start_cost
+
+    def element(self, label: str) -> Element:
+        """The element that the model has under a label; KeyError if there is none."""
+        term = self.model.term(label)
+        if term is None:
+            raise KeyError(label)
+        return term.element
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a worker sends back of a fit: plain numbers. `values` are of all parameters, for guesses differ in fixed ones, too."""
+
+    values: dict[str, float]
+    free: int
+    starts: tuple[Array, ...]
+    chi2: float
+    samples: int
+    converged: bool
+    differences: tuple[Array, Array]
+    start_cost: float
+
+
+def outcome_of(end: Descent, run: FreeRun, noise: NoiseModel) -> Outcome:
+    """What a descent of a structure over a run has reached, under a noise model."""
+    values = {name: value.value for name, value in end.model.parameters.items()}
+    cost = start_cost(felt_starts(end.model, run, noise, end.starts, end.residuals, end.differences[1]))
+    return Outcome(
+        values, len(end.model.free), end.starts, end.chi2, end.samples, end.converged, end.differences, cost
+    )
+
+
+def trial_of(added: tuple[str, ...], model: Model, done: Outcome, noise: NoiseModel) -> Trial:
+    """The trial of a structure that ended in this outcome."""
+    fitted = model.with_values(done.values)
+    return Trial(
+        added,
+        fitted,
+        done.starts,
+        done.chi2,
+        done.samples,
+        done.free,
+        done.converged,
+        noise,
+        done.differences,
+        done.start_cost,
+    )
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A structure to try: the model with the elements in it, and several first guesses (values by parameter name).
+
+    `ceiling` is the chi2 of a model that it contains, as far as that is known; `faint` are guesses close to that one.
+    """
+
+    added: tuple[str, ...]
+    model: Model
+    guesses: tuple[dict[str, float], ...]
+    ceiling: float = math.inf
+    faint: tuple[dict[str, float], ...] = ()
+
+
+def propose(
+    base: Model,
+    element: Element,
+    guesses: Sequence[dict[str, float]],
+    added: tuple[str, ...],
+    ceiling: float = math.inf,
+) -> Proposal:
+    """The base model, whose chi2 is `ceiling`, with one more element; `guesses` are values of the element's parameters."""
+    extended = base.with_element(element, guesses[0])
+    label = extended.terms[-1].label
+
+    def named(guess: dict[str, float]) -> dict[str, float]:
+        return {f"{label}.{name}": value for name, value in guess.items()}
+
+    faint = [fainter(element, guesses[0], share) for share in FAINTER] if element.size else []
+    return Proposal((*added, label), extended, tuple(map(named, guesses)), ceiling, tuple(map(named, faint)))
+
+
+def fainter(element: Element, guess: dict[str, float], share: float) -> dict[str, float]:
+    """Values of an element's parameters with its effect reduced to a share."""
+    value = guess[element.size]
+    if math.isinf(element.absent):
+        return guess | {element.size: value / share}
+    return guess | {element.size: element.absent + share * (value - element.absent)}
