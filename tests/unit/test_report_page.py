@@ -287,9 +287,13 @@ def test_the_verdict_comes_first(verdict: str, heading: str) -> None:
     assert html.index("<h1>") < html.index("<nav") < html.index("<section")
 
 
-def test_only_names_that_the_answer_stands_by_come_with_their_probability_in_the_head() -> None:
-    assert "probability of this name" in render(diagnosis_page(findings(result())))
-    assert "probability of this name" not in render(diagnosis_page(findings(result("unknown_physics"))))
+def test_only_names_that_the_answer_stands_by_come_with_their_probability() -> None:
+    named, nearest = (
+        render(diagnosis_page(findings(result(v)))) for v in ("missing_physics", "unknown_physics")
+    )
+    for words in ("probability of this name", "the probability of the name is", ">probability<"):
+        assert words in named and words not in nearest
+    assert "weight of evidence" in nearest
 
 
 def test_hypotheses_stand_with_how_much_worse_they_predict_and_how_sure_that_is() -> None:

@@ -167,12 +167,10 @@ def _what(found: Findings) -> Section:
         blocks.append(Heading(found.title(effect["element"])))
         blocks.append(Equation(effect["equation"]))
         known = found.words.get(effect["element"])
-        blocks.append(
-            Paragraph(
-                f"It explains {percent(effect['share'])} of the mismatch; the probability of the name is "
-                f"{probability(effect['probability'])}."
-            )
-        )
+        said = f"It explains {percent(effect['share'])} of the mismatch"
+        if result["verdict"] == "missing_physics":  # else the verdict does not stand by the name
+            said += f"; the probability of the name is {probability(effect['probability'])}"
+        blocks.append(Paragraph(f"{said}."))
         blocks.append(parameters_table(effect["parameters"], known.parameters if known else None))
         if known is not None:
             names = f"Also known as {_joined(known.also_known_as)}. " if known.also_known_as else ""

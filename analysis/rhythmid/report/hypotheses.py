@@ -27,16 +27,18 @@ def hypotheses_section(found: Findings) -> Section:
     blocks: list[Block] = [
         Paragraph(
             "Each hypothesis is a model that was fitted to the records. It is scored by how well it predicts stretches of them that its "
-            "fit did not see; models that differ by less than about two standard errors predict equally well."
+            "fit did not see; a simpler model is kept while the odds against it are below 40 to 1."
         )
     ]
-    columns = ("hypothesis", "it says", "predicts worse by", "probability", "held-out error", "verdict")
+    stands = found.result["verdict"] in ("missing_physics", "consistent")
+    weight = "probability" if stands else "weight of evidence"
+    columns = ("hypothesis", "it says", "predicts worse by", weight, "held-out error", "verdict")
     weighed = most_weighed([(row["elements"], row["probability"]) for row in rows])
     table = [_row(found, row, chosen, against, weighed) for row in rows]
     marked = [index for index, row in enumerate(rows) if sorted(row["elements"]) == chosen]
     caption = (
         "Predicts worse by: difference of the logarithm of the predictive density to the best hypothesis, ± one standard error over "
-        "stretches of the records. The probabilities divide the evidence among hypotheses with no more effects than the chosen one."
+        f"stretches of the records. The {'probabilities' if stands else 'weights'} divide the evidence among hypotheses with no more effects than the chosen one."
     )
     first = tuple(index for index in marked if index < HYPOTHESES_SHOWN)
     blocks.append(Table(caption, columns, tuple(table[:HYPOTHESES_SHOWN]), first))
@@ -89,7 +91,9 @@ def _row(
     said = "not believed, see below" if tuple(sorted(elements)) in against else NONE
     if sorted(elements) == chosen:
         said = "chosen"
-    chance = probability(row["probability"]) if len(elements) <= weighed else NONE
+    stands = found.result["verdict"] in ("missing_physics", "consistent")
+    weight = probability(row["probability"]) if stands else f"{row['probability']:.2f}"
+    chance = weight if len(elements) <= weighed else NONE
     kind = KINDS.get(row["kind"], pretty_name(row["kind"]))
     return name, kind, behind, chance, percent(row["heldout_nrmse"]), said
 
