@@ -39,11 +39,16 @@ class Delay:
 
     def release(self, stamp_ns: NDArray[np.int64]) -> NDArray[np.int64]:
         """Stamps [ns] on release: stamp + delay, in order (nothing overtakes). Shapes (n,) -> (n,)."""
-        times, delays = self.table()
-        late = np.rint(np.interp(stamp_ns * 1e-9, times, delays) * 1e9).astype(np.int64)
-        released = stamp_ns + late
+        released = stamp_ns + profile_delay(stamp_ns, *self.table())
         order = np.arange(len(released), dtype=np.int64)
         return np.maximum.accumulate(released - order) + order
+
+
+def profile_delay(
+    since_ns: NDArray[np.int64] | int, times: NDArray[np.float64], delays: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Delay [ns] of what is stamped `since_ns` [ns] after the start, by a profile's corner times and delays [s]."""
+    return np.rint(np.interp(np.multiply(since_ns, 1e-9), times, delays) * 1e9).astype(np.int64)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ from rhythmid.model import Model
 from rhythmid.simulation.compiled import Compiled, compile_model
 from rhythmid.simulation.generated_source import InputKind, OutputKind
 from rhythmid.simulation.signal import impulse_preserving, pieces
-from rhythmid.simulation.simulate import physical_times, start_states
+from rhythmid.simulation.simulate import start_states
+from rhythmid.simulation.transport import command_delay, physical_times
 
 Array = NDArray[np.float64]
 DIVERGED = 1e100  # of any unit; squares of what is larger would overflow
@@ -64,7 +65,7 @@ class FreeRun:
         one, given = self.series[index], self.inputs[index]
         model = own_model(model, one)
         times = np.ascontiguousarray(physical_times(model, one.centres))
-        late = _delay_of(model, given.command[0][1:-1])
+        late = command_delay(model, given.command[0][1:-1])
         varies = late is not None and len(late) > 0 and np.ptp(late) > 0.0
         compiled, (knots, coefficients) = self.compiled, given.smooth or given.command
         if given.smooth is not None and varies:
@@ -95,25 +96,6 @@ class FreeRun:
         if pool is None:
             return [self.outputs(*case) for case in cases]
         return list(pool.map(lambda case: self.outputs(*case), cases))
-
-
-def _delay_of(model: Model, stamps: Array) -> Array | None:
-    """Delays (n,) [s] that the command path adds to these stamps, one element after another; None where it adds none.
-
-    A command cannot overtake an earlier one.
-    """
-    now, shift, found, varies = stamps, 0.0, False, False
-    for term in model.terms:
-        if term.element.slot == "command" and term.element.delay is not None:
-            late = term.element.delay(now, **{n: v.value for n, v in term.values.items()})
-            found = True
-            if len(late) and np.ptp(late) > 0.0:
-                now, varies = np.maximum.accumulate(now + late), True
-            elif len(late):
-                now, shift = now + late[0], shift + float(late[0])
-    if not found:
-        return None
-    return now - stamps if varies else np.full(len(stamps), shift)
 
 
 def _stand_in(one: Series) -> Pieces | None:
@@ -183,7 +165,7 @@ def start_of(model: Model, run: FreeRun, index: int, position: float, velocity: 
     one = run.series[index]
     model = own_model(model, one)
     begin = physical_times(model, one.centres[:1])
-    late = _delay_of(model, begin)
+    late = command_delay(model, begin)
     command = _value(one.command, begin[0] - (0.0 if late is None else late[0]))
     return start_states(model, run.compiled, position, velocity, command, _value(one.forcing, begin[0]))
 

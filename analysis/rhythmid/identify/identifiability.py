@@ -26,7 +26,7 @@ from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.undetermined import sum_of, undetermined
 from rhythmid.ltp.limit_cycle import limit_cycle
 from rhythmid.ltp.pumping import pumping_of
-from rhythmid.simulation.simulate import physical_times
+from rhythmid.simulation.transport import physical_times
 from rhythmid.statistics import NORMAL_95
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.simulation.generated_source import InputKind, OutputKind
-from rhythmid.simulation.signal import continuous, fast_length, spline
+from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, spline
 
 REACH = 2  # blocks on either side from which `of_block` takes differences
 REST_LENGTH = "linear_spring.rest_length"
@@ -290,7 +290,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         total = np.zeros(len(one.time))
         for signal in (one.command, one.forcing):
             if signal is not None:
-                inside = (one.time >= signal.x[0]) & (one.time <= min(signal.x[-1], 1e200))
+                inside = (one.time >= signal.x[0]) & (one.time <= min(signal.x[-1], FOR_EVER))
                 total[inside] += signal(one.time[inside])
         if one.kind == "reference":
             reference = max(reference, float(np.std(total)))

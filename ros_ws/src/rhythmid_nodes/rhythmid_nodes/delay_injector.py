@@ -11,13 +11,12 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter as RosParameter
 from std_msgs.msg import String
 
 from rhythmid.errors import InputError
-from rhythmid.experiment import Delay
+from rhythmid.experiment import Delay, profile_delay
 
 from .clock import Clock, Worker, sleep_in_slices
 from .joint_state import restamped, stamp_of
@@ -126,7 +125,7 @@ class DelayInjector(GraphNode):
         if self._profile is None:
             return self._delay_ns
         since = 0 if self._start_ns is None else stamp_ns - self._start_ns
-        return int(np.rint(np.interp(since * 1e-9, *self._profile) * 1e9))
+        return int(profile_delay(since, *self._profile))
 
     def _on_lockstep(self, data: bytes, _received_ns: int) -> None:
         stamp_ns = stamp_of(data)
