@@ -1,7 +1,6 @@
 """A YAML document that remembers where each value stands, so that a complaint can name file and line."""
 
-import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -33,6 +32,14 @@ class Node:
             return [node.plain for node in self.value]
         return self.value
 
+    def at(self, key: str | int) -> "Node":
+        """What stands at a key or an index, the node itself where nothing does."""
+        if isinstance(self.value, dict) and key in self.value:
+            return self.value[key]
+        if isinstance(self.value, list) and isinstance(key, int) and key < len(self.value):
+            return self.value[key]
+        return self
+
     def mapping(self, known: Iterable[str] | None = None) -> "dict[str, Node]":
         """The value as a mapping; with `known`, any other key is refused."""
         if not isinstance(self.value, dict):
@@ -41,10 +48,7 @@ class Node:
             known = list(known)
             for key, node in self.value.items():
                 if key not in known:
-                    near = get_close_matches(str(key), known, 1)
-                    node.fail(
-                        f"unknown key; {f'did you mean {near[0]!r}?' if near else 'known: ' + ', '.join(known)}"
-                    )
+                    node.fail(unknown_key(str(key), known))
         return self.value
 
     def items(self) -> "list[Node]":
@@ -55,40 +59,21 @@ class Node:
             self.fail("a list (- item) is expected here")
         return self.value
 
-    def number(self, low: float = -math.inf, high: float = math.inf, finite: bool = True) -> float:
-        """The value as a number within [low, high]; `finite=False` allows infinity, for the ends of a range."""
-        if not isinstance(self.value, (int, float, str)) or isinstance(self.value, bool):
-            self.fail(f"a number is expected, not {self.plain!r}")
-        try:
-            value = float(self.value)  # YAML 1.1 reads 1e-3 as text
-        except (ValueError, OverflowError):
-            self.fail(f"a number is expected, not {self.value!r}")
-        if math.isnan(value):
-            self.fail("is not a number (NaN)")
-        if finite and math.isinf(value):
-            self.fail("must be finite")
-        if not low <= value <= high:
-            self.fail(f"{value:g} is outside [{low:g}, {high:g}]")
-        return value
 
-    def whole(self, low: int, high: int) -> int:
-        """The value as a whole number within [low, high]."""
-        value = self.number(low, high)
-        if value != int(value):
-            self.fail(f"a whole number is expected, not {value:g}")
-        return int(value)
+def unknown_key(key: str, known: Sequence[str]) -> str:
+    """What to say of a key that is not among those known."""
+    near = get_close_matches(key, known, 1)
+    return f"unknown key; {f'did you mean {near[0]!r}?' if near else 'known: ' + ', '.join(known)}"
 
-    def text(self) -> str:
-        """The value as text."""
-        if not isinstance(self.value, str):
-            self.fail(f"text is expected, not {self.plain!r}")
-        return self.value
 
-    def choice(self, choices: Iterable[str]) -> str:
-        """The value as one of `choices`."""
-        if self.value not in (choices := list(choices)):
-            self.fail(f"{self.plain!r} is none of {', '.join(choices)}")
-        return self.value
+def as_node(plain: Any, name: str, path: str = "") -> Node:
+    """A value that was no document, such as a parameter in JSON, as if one held it; `name` stands for its place."""
+    if isinstance(plain, Mapping):
+        held = {str(k): as_node(v, name, f"{path}.{k}" if path else str(k)) for k, v in plain.items()}
+        return Node(held, name, path)
+    if isinstance(plain, (list, tuple)):
+        return Node([as_node(item, name, f"{path}[{i}]") for i, item in enumerate(plain)], name, path)
+    return Node(plain, name, path)
 
 
 def _node(
