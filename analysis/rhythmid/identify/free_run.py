@@ -14,7 +14,7 @@ from rhythmid.identify.declared import own_model
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import Compiled, compile_model
-from rhythmid.simulation.generated_source import InputKind, OutputKind
+from rhythmid.simulation.generated_source import InputKind, OutputKind, Variant
 from rhythmid.simulation.signal import impulse_preserving, pieces
 from rhythmid.simulation.simulate import start_states
 from rhythmid.simulation.transport import command_delay, physical_times
@@ -150,9 +150,10 @@ def prepare_run(
     smooth = not _sees_steps(model) and all(i.smooth is not None or len(i.command[0]) <= 2 for i in inputs)
     if not smooth:
         inputs = tuple(replace(i, smooth=None) for i in inputs)
+    variant = Variant(excited, measured, smooth, disturbed)
     return FreeRun(
-        compile_model(model, disturbed, excited, smooth, measured),
-        lambda: compile_model(model, disturbed, excited, measured=measured),
+        compile_model(model, variant),
+        lambda: compile_model(model, replace(variant, smooth=False)),
         tuple(series),
         inputs,
         max_step or min([*(one.period * one.block for one in series), *([] if smooth else _ticks(series))]),

@@ -45,16 +45,12 @@ def forcing_at(model: Model, times: Array) -> Array:
     return total
 
 
-def settled_state(model: Model, periods: int = 120, tolerance: float = 1e-12) -> Array:
-    """State vector at t = 0 after the forced, uncommanded model has run long enough to be on its limit cycle.
+def settled(model: Model, periods: int = 120, tolerance: float = 1e-12) -> tuple[Array, Array]:
+    """State vector at t = 0 after the forced, uncommanded model has run long enough to be on its limit cycle, and what elements
+    with a dead time need of the past there.
 
     Without forcing the machine comes to rest. Starts from rest at the first spring's rest length.
     """
-    return settled(model, periods, tolerance)[0]
-
-
-def settled(model: Model, periods: int = 120, tolerance: float = 1e-12) -> tuple[Array, Array]:
-    """The `settled_state`, and what elements with a dead time need of the past there."""
     compiled = compile_model(model)
     period = next(
         (1.0 / t.values["frequency"].value for t in model.terms

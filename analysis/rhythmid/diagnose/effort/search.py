@@ -63,7 +63,7 @@ class EffortSearch:
     nominal : the nominal model, its free values fitted.
     hypotheses : all that were fitted, the nominal among them, best prediction first.
     predictions : of each of them.
-    reference, beyond : the nominal model, and the chosen one, with a free map beside them; and what they predict.
+    reference, beyond : the nominal model, and the chosen one, with a free map beside them; and what the first predicts.
     chosen : the hypothesis with which the search ended.
     condition : of the nominal model's scaled columns.
     not_tried : why candidates of the catalogue took no part, by name.
@@ -79,7 +79,6 @@ class EffortSearch:
     reference: Linearised
     reference_prediction: Prediction
     beyond: Linearised
-    beyond_prediction: Prediction
     condition: float
     not_tried: Mapping[str, str]
     candidates: int
@@ -134,7 +133,7 @@ def search_effort(
     order = sorted(range(len(search.found)), key=lambda index: -made[index].score)
     return EffortSearch(
         balance, search.blocks, nominal, tuple(search.found[i] for i in order), tuple(made[i] for i in order), chosen,
-        reference, made[-2], beyond, made[-1], condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)), len(search.tried),
+        reference, made[-2], beyond, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)), len(search.tried),
     )  # fmt: skip
 
 

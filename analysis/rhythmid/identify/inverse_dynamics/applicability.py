@@ -2,7 +2,7 @@
 identifiability, not of how the motion looks."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -102,20 +102,3 @@ def restores(balance: Balance, model: Model) -> bool:
         if term.element.slot == "force" and term.element.acts in ("leg", "body"):
             total += effect_along(term.element, {n: v.value for n, v in term.values.items()}, model, path)
     return bool(total[0] - total[-1] > 1e-9 * max(float(np.abs(total).max()), 1e-300))
-
-
-def moved_with_bandwidth(
-    records: Sequence[Record], model: Model, balance: Balance, by: float = 1.5
-) -> dict[str, float]:
-    """By how many standard deviations each parameter moves when the cut-off of the effort is `by` times lower.
-
-    Noise of the motion, effects that are not modelled and rows that are too few show as estimates that depend on the filter.
-    """
-
-    lower = Balance.of(records, model, replace(balance.bandwidth, effort=balance.bandwidth.effort / by))
-    first, second = fit_effort(balance, model), fit_effort(lower, model)
-    found = {}
-    for name in first.names:
-        spread = float(np.hypot(first.std_of(name), second.std_of(name)))
-        found[name] = abs(first.model.value(name) - second.model.value(name)) / max(spread, 1e-300)
-    return found
