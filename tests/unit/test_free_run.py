@@ -1,4 +1,4 @@
-"""Free runs over records: delays of the command path in order, stand-ins for held commands, where elements start."""
+"""Free runs over records: delays of the command path in order, surrogates for held commands, where elements start."""
 
 import numpy as np
 import pytest
@@ -62,7 +62,7 @@ def test_play_and_rate_limits_see_every_step_of_a_held_command(name, values):
     ("name", "values"),
     [("actuator_saturation", {"limit": 2.0}), ("coulomb_friction", {"force": 0.1, "transition": 0.01})],
 )
-def test_what_remembers_no_extreme_is_driven_by_the_smooth_stand_in(name, values):
+def test_what_remembers_no_extreme_is_driven_by_the_smooth_surrogate(name, values):
     run = prepare_run(machine(**{name: values}), [series(5)])
     assert run.inputs[0].smooth is not None
 

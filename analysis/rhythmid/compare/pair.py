@@ -24,7 +24,7 @@ class Pair:
     """Two motions (n,) on one even grid with step `step` [s], in the recording's time.
 
     `cycle` is the part of the simulated motion that repeats with the forcing, its mean included; None without forcing or
-    command, when ways in and out cannot be told apart. `command`, `effort` (forcing plus command), `phase` in [0, 1) where known;
+    command, when channel corrections cannot be told apart. `command`, `effort` (forcing plus command), `phase` in [0, 1) where known;
     `used` marks what counts; `noise` is the standard deviation of white noise in the difference; `frequency` [Hz] of the dominant
     motion; `bandwidth` [Hz] beyond which nothing moves; `pumping` [Hz] of the forcing; `oscillator` turns small forces into motion.
     """

@@ -29,7 +29,7 @@ Pieces = tuple[Array, Array]
 class Inputs:
     """A series' command and forcing as the compiled loop takes them; the command's knots are before any delay.
 
-    `smooth` is the command's impulse-preserving stand-in, where there is one.
+    `smooth` is the command's impulse-preserving surrogate, where there is one.
     """
 
     command: Pieces
@@ -42,7 +42,7 @@ class FreeRun:
     """A structure and the series that it is run over.
 
     `stopping` is the structure whose steps end at the command's knots, `compiled` the one that is used while every
-    command has a smooth stand-in and a constant delay.
+    command has a smooth surrogate and a constant delay.
     """
 
     compiled: Compiled
@@ -98,8 +98,8 @@ class FreeRun:
         return list(pool.map(lambda case: self.outputs(*case), cases))
 
 
-def _stand_in(one: Series) -> Pieces | None:
-    """Smooth stand-in for a held command that changes about as often as the measurement is sampled, or more often."""
+def _surrogate(one: Series) -> Pieces | None:
+    """Smooth surrogate for a held command that changes about as often as the measurement is sampled, or more often."""
     command = one.command
     if command is None or command.c.shape[0] > 1 or len(command.x) <= 16 or one.block == 1:
         return None
@@ -109,7 +109,7 @@ def _stand_in(one: Series) -> Pieces | None:
 
 
 def _sees_steps(model: Model) -> bool:
-    """Whether an element of the command's path takes a held command otherwise than its smooth stand-in: one with memory
+    """Whether an element of the command's path takes a held command otherwise than its smooth surrogate: one with memory
     of extremes, or with a limit of rate."""
     path = [term.element for term in model.terms if term.element.slot in ("command", "actuator")]
     return any(
@@ -124,7 +124,7 @@ def _ticks(series: Sequence[Series]) -> list[float]:
 
 
 def _inputs(one: Series) -> Inputs:
-    return Inputs(_contiguous(pieces(one.command)), _stand_in(one), _contiguous(pieces(one.forcing)))
+    return Inputs(_contiguous(pieces(one.command)), _surrogate(one), _contiguous(pieces(one.forcing)))
 
 
 def prepare_run(

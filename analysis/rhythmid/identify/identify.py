@@ -30,7 +30,7 @@ from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, s
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
 from rhythmid.record.gaps import cut_at_gaps
-from rhythmid.record.outlier import without_stray
+from rhythmid.record.outlier import without_outliers
 from rhythmid.record.record import Record
 from rhythmid.simulation.signal import continuous, spline
 from rhythmid.simulation.simulate import simulate
@@ -123,7 +123,7 @@ def identify(
     given = (records,) if isinstance(records, Record) else tuple(records)
     if not given:
         raise InputError("nothing to identify from: give at least one record")
-    tidy = [without_stray(record) for record in given]
+    tidy = [without_outliers(record) for record in given]
     cut = [note for record, _ in tidy for note in cut_at_gaps(record).notes]
     found = _identified(tuple(record for record, _ in tidy), model, harmonics, method, forcing, offset, htf)
     return replace(found, notes=(*(note for _, said in tidy for note in said), *cut, *found.notes))

@@ -33,6 +33,7 @@ class Compiled:
 
 
 NO_HISTORY = np.empty((0, 0))
+USUAL = Variant()  # driven by a force, its position measured
 
 
 def _of(module: Module, layout: Layout) -> Compiled:
@@ -79,7 +80,7 @@ class _Terms:
         return isinstance(other, _Terms)
 
 
-def compile_model(model: Model, variant: Variant = Variant()) -> Compiled:
+def compile_model(model: Model, variant: Variant = USUAL) -> Compiled:
     """The compiled structure of a model; parameter values play no part."""
     terms = tuple(term for term in model.terms if term.element.kernel is not None)
     return _structure(_key(terms), _Terms(terms), variant)

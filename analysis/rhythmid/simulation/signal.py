@@ -102,7 +102,7 @@ def continuous(time: Array, value: Array, hold: Hold) -> PPoly:
 
 
 def impulse_preserving(held: PPoly) -> PPoly:
-    """Smooth stand-in for a zero-order-held command that is sampled far above the machine's dynamics.
+    """Smooth surrogate for a zero-order-held command that is sampled far above the machine's dynamics.
 
     The derivative of a cubic spline through the command's integral at its knots: it has the same impulse, so a mass cannot
     tell the two apart, and an integrator need not stop at every knot. The integral is bent at every knot; what the bends

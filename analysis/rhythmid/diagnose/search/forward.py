@@ -1,7 +1,7 @@
 """Forward search for missing elements, then pruning: the model that explains the records with the fewest effects.
 
 Each round scores the whole catalogue (cheap), refits the most promising elements with everything free (dear), and keeps
-the best if it is worth its parameters. Afterwards every element must defend its place: against being left out, against
+the best if it is worth its parameters. Afterwards backward elimination tries every element: against being left out, against
 a simpler member of its family, and, where there are several, against the other candidates.
 """
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.baseline import FOLLOWS
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import PRACTICAL
-from rhythmid.diagnose.search.backward import defend
+from rhythmid.diagnose.search.backward import eliminate
 from rhythmid.diagnose.search.order import in_best_order
 from rhythmid.diagnose.search.refit import fine_enough, near_under_noise, run_trials, under_noise, whole_fit
 from rhythmid.diagnose.search.round import Round, distinct, not_tried, one_round
@@ -45,7 +45,7 @@ from rhythmid.progress import Tell
 
 Array = NDArray[np.float64]
 
-# difference of the information criterion below which two models are told apart by nothing but hope
+# difference of the information criterion below which two models are indistinguishable
 WORTH = 10.0
 SHARE = 5e-4  # of what is explained already, below which a further effect is an imperfection of the others
 LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
@@ -236,10 +236,10 @@ def search(
         rounds.append(now)
     if best.added and not budget.spent:
         margin = max(WORTH, SHARE * gained)
-        defended, more = defend(best, series, catalogue, trials, noise, step, rounds, margin, MOST, tell)
+        reduced, more = eliminate(best, series, catalogue, trials, noise, step, rounds, margin, MOST, tell)
         trials |= more
-        if defended is not best:
-            best = in_best_order(defended, series, noise, step)
+        if reduced is not best:
+            best = in_best_order(reduced, series, noise, step)
             trials[tuple(sorted(best.added))] = best
             noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
     ranked = _contenders(trials, best)
@@ -265,7 +265,7 @@ def _most_likely(
 ) -> Trial:
     """The one of several close models whose remainder predicts itself best: each under the noise that it leaves.
 
-    The first noise model is coloured by the effect that is missing and can put an imitation ahead by a little.
+    The first noise model is coloured by the effect that is missing and can put a surrogate ahead by a little.
     """
     if len(near) == 1:
         return near[0]

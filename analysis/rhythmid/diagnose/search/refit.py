@@ -31,7 +31,7 @@ PROMISING = 0.3  # share of the spread of chi2 within which a model is carried t
 # share of its ceiling, above which the best of a round has found so little that all minima of all trials are gone through
 LITTLE = 0.5
 HOPS = 12  # at most, from one minimum to the next
-WAYS = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minima, that one hop goes
+HOP_DISTANCES = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minima, that one hop goes
 TOLERANCE = 0.05  # of chi2, at which a trial has converged: far below what an element has to earn
 
 
@@ -128,7 +128,7 @@ def _hopped(
     low, high = best.model.parameters[name].bounds
     for _ in range(HOPS):
         before = best
-        for value in (before.model.value(name) + way * distance for way in WAYS):
+        for value in (before.model.value(name) + hop * distance for hop in HOP_DISTANCES):
             if not low < value < high:
                 continue
             moved = before.model.with_values({name: value})

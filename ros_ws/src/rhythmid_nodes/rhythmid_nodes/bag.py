@@ -70,7 +70,7 @@ class LiveBag(Worker):
         return len(self._queue)
 
     def add_topic(self, topic: str, type_name: str, publishers: Sequence[TopicEndpointInfo]) -> None:
-        """Announce a topic before its first message. Raises InputError if its type's definition is not to be had."""
+        """Announce a topic before its first message. Raises InputError if its type's definition is not known."""
         learn(self._typestore, type_name)
         self._topics.append((topic, type_name, publishers))
 
