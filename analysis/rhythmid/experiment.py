@@ -25,7 +25,7 @@ from rhythmid.settings import KEYS, Delay, Forcing, Noise, Recording, Safety, Ti
 from rhythmid.validation import ByShape, InKeys, Number, Plain, Whole, validated
 
 LONGEST_DELAY = 10.0  # [s]; a longer one is given in another unit
-LONGEST = 50_000_000  # samples of an offline run: 14 hours at 1 kHz, a few gigabytes
+LONGEST_RUN = 50_000_000  # samples of an offline run: 14 hours at 1 kHz, a few gigabytes
 
 
 @dataclass(frozen=True)
@@ -226,9 +226,9 @@ def perform(experiment: Experiment) -> dict[str, Messages]:
         Plant,  # the compiler behind it is slow to load, and most nodes need no plant
     )
 
-    if experiment.count > LONGEST:
+    if experiment.count > LONGEST_RUN:
         raise InputError(
-            f"{experiment.count} samples are too many to simulate at once; the limit is {LONGEST}"
+            f"{experiment.count} samples are too many to simulate at once; the limit is {LONGEST_RUN}"
         )
     period = experiment.time.period_ns
     stamps = np.arange(experiment.count, dtype=np.int64) * period

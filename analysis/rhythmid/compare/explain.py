@@ -19,12 +19,12 @@ from rhythmid.compare.pair import Pair
 
 Array = NDArray[np.float64]
 FOLDS, DEALT = 5, 20  # folds of a cross-validation, stretches in each
-LEAST = 0.02  # share of what is left that an explanation has to take away to be one
-FAINT = 0.004  # share of the whole difference that it has to take away where the oscillator limits what can be explained
-SLIGHT = 0.001  # the same among channel corrections, which are applied exactly
-ROUGH = 0.05  # the same where limit cycle and response had to be shifted each for itself
+LEAST_SHARE = 0.02  # share of what is left that an explanation has to take away to be one
+LEAST_OF_WHOLE = 0.004  # share of the whole difference that it has to take away where the oscillator limits what can be explained
+LEAST_OF_WHOLE_CHANNEL = 0.001  # the same among channel corrections, which are applied exactly
+LEAST_OF_WHOLE_ROUGH = 0.05  # the same where limit cycle and response had to be shifted each for itself
 SIMPLER = 0.03  # share by which a simpler explanation may fall behind
-MOST = 4  # explanations
+MOST_EXPLANATIONS = 4  # explanations
 EQUIVALENT = {
     "command_lag": "input_delay", "input_delay": "command_lag", "sensor_lag": "measurement_delay", "measurement_delay": "sensor_lag",
 }  # fmt: skip
@@ -223,7 +223,7 @@ def explain(
         found.append(Explanation("another start", None, 1.0 - known.square / whole))
         rough = True
     floor = max(1.05 * len(known.residual) * pair.noise**2, 1e-12 * float(np.sum(pair.recording**2)))
-    for _ in range(MOST):
+    for _ in range(MOST_EXPLANATIONS):
         if known.square <= floor:
             break
         if known.force is not None and pair.effort is None:
@@ -231,8 +231,14 @@ def explain(
         trials = known.corrections(blind) + (known.forces() if known.force is None else [])
         chosen = known.simplest(trials)
         gain = known.square - chosen.square
-        faint = ROUGH if rough else SLIGHT if known.force is None and chosen.values is not None else FAINT
-        if gain < LEAST * known.square or gain < faint * whole:
+        faint = (
+            LEAST_OF_WHOLE_ROUGH
+            if rough
+            else LEAST_OF_WHOLE_CHANNEL
+            if known.force is None and chosen.values is not None
+            else LEAST_OF_WHOLE
+        )
+        if gain < LEAST_SHARE * known.square or gain < faint * whole:
             break
         found.append(known.told(chosen))
         known.take(chosen)
@@ -250,7 +256,10 @@ def _pruned(known: Difference, found: list[Explanation], whole: float) -> list[E
         if one.name not in known.values or not rest:
             continue
         square, values = known.fitted(rest)
-        if square - known.square < (SLIGHT if known.force is None else FAINT) * whole:
+        if (
+            square - known.square
+            < (LEAST_OF_WHOLE_CHANNEL if known.force is None else LEAST_OF_WHOLE) * whole
+        ):
             known.take(Trial(square, 0, one, values=values))
             found = [other for other in found if other is not one]
     return found

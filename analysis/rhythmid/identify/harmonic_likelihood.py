@@ -23,16 +23,15 @@ from rhythmid.ltp.spectra import Spectra, spectra
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.simulation.generated_source import InputKind
+from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-INPUT_DELAY = "input_delay.delay"
-MEASUREMENT_DELAY = "measurement_delay.delay"
 DELAYS = (INPUT_DELAY, MEASUREMENT_DELAY)
 CYCLE = 4  # harmonics of the limit cycle that are used
 PARTS = 8  # into which the record is cut to see how much the limit cycle is disturbed
 LINES = 1500  # that a search looks at
-LONGEST = 0.5  # [s] largest delay on either side that is looked for
+LONGEST_DELAY = 0.5  # [s] largest delay on either side that is looked for
 SIDEBANDS = 3  # on either side that are compared
 TIME = 0.02  # [s] size of a delay that begins at none
 NEAR = 0.05  # unexplained share of the power from which a descent finds the rest of the way
@@ -144,8 +143,8 @@ class _Comparison:
         measured = self.spectra.output[self.bins]
         omega = 2 * np.pi * self.spectra.resolution * self.bins
         step = min(0.01, 0.25 / (self.spectra.band[1] + 1e-9) / 2)
-        one = np.arange(0.0, LONGEST + 0.5 * step, step)
-        total = np.arange(0.0, 2.0 * LONGEST + 0.5 * step, step)
+        one = np.arange(0.0, LONGEST_DELAY + 0.5 * step, step)
+        total = np.arange(0.0, 2.0 * LONGEST_DELAY + 0.5 * step, step)
         turned = np.exp(1j * self.pumping.omega * np.multiply.outer(one, self.m)) @ parts
         cross = ((turned * measured.conj()) @ np.exp(-1j * np.multiply.outer(omega, total))).real
         left = (
@@ -153,7 +152,7 @@ class _Comparison:
         )
         left = left / float(np.sum(np.abs(measured) ** 2))
         later = total[None, :] - one[:, None]
-        possible = (later > -step) & (later < LONGEST + step)
+        possible = (later > -step) & (later < LONGEST_DELAY + step)
         if self.cycle:
             period = self.pumping.period
             shown = np.angle(self.spectra.cycle[1] / model.cycle.harmonics(1)[1])
@@ -204,7 +203,7 @@ def _scan(comparison: _Comparison, start: Array) -> tuple[Array, Array, float]:
 def _descend(comparison: _Comparison, start: Array, tolerance: float = 1e-8) -> Array:
     bounds = [comparison.model.parameters[name].bounds for name in comparison.names]
     low = np.array([b[0] for b in bounds] + [-0.05, -0.05])
-    high = np.array([b[1] for b in bounds] + [LONGEST + 0.1, LONGEST + 0.1])
+    high = np.array([b[1] for b in bounds] + [LONGEST_DELAY + 0.1, LONGEST_DELAY + 0.1])
     units = [comparison.model.parameters[name].unit for name in comparison.names]
     own = [abs(v) or (TIME if unit == "s" else 1.0) for v, unit in zip(start, units)]
     scale = np.array([*own, TIME, TIME])

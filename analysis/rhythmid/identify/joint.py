@@ -18,7 +18,7 @@ from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.harmonic_likelihood import (
     DELAYS,
     INPUT_DELAY,
-    LONGEST,
+    LONGEST_DELAY,
     MEASUREMENT_DELAY,
     harmonic_likelihood,
 )
@@ -32,7 +32,7 @@ from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
 STUCK = 0.5  # unexplained share (rms) of the response to the command, beyond which a fit is no answer
-POOR = 0.2  # the same of the whole motion: what leaves more than a fifth of it is not identified
+POOR_MOTION = 0.2  # the same of the whole motion: what leaves more than a fifth of it is not identified
 CYCLE_HARMONICS = 24  # that are projected out where the limit cycle is not to be used
 STEP, FINE_STEP = (
     0.2,
@@ -52,7 +52,7 @@ class Search:
 
     @property
     def arrived(self) -> bool:
-        return self.motion < POOR and (self.response < STUCK or self.over_noise < 2.0)
+        return self.motion < POOR_MOTION and (self.response < STUCK or self.over_noise < 2.0)
 
     def __str__(self) -> str:
         return (
@@ -215,7 +215,7 @@ def _search_in_time(model: Model, series: Sequence[Series]) -> Fit:
         raise failure
     reached = best
     for name in (n for n in DELAYS if n in best.names):
-        for delay in np.linspace(0.0, LONGEST, 9)[1:]:
+        for delay in np.linspace(0.0, LONGEST_DELAY, 9)[1:]:
             try:
                 trial = minimise(
                     reached.model.with_values({name: delay}), reached.run, reached.names, reached.noise,

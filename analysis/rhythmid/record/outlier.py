@@ -11,11 +11,11 @@ from rhythmid.record.quality import clipped_samples, resolution
 from rhythmid.record.record import Record
 
 WIDEST = 3  # samples in a row that may be outliers
-FAR = 12.0  # times the usual unevenness, from which a sample is suspected
+FAR_OFF = 12.0  # times the usual unevenness, from which a sample is suspected
 # of its distance, that the slopes before and after may differ from the line past an outlier
 PASSING = 0.25
 NEAR = 101  # samples over which the usual unevenness is taken
-MOST = 0.02  # share of a signal beyond which such samples are no exception and belong to it
+LARGEST_SHARE = 0.02  # share of a signal beyond which such samples are no exception and belong to it
 USUAL = 1.4826  # standard deviations in a median absolute deviation
 LEAP = 1.5  # times the steps before and after, that the step out of repeats is at least: the motion went on meanwhile
 OFTEN = 0.3  # share of repeats, from which a sensor may be read more often than it measures
@@ -36,7 +36,7 @@ def outlying_samples(value: Array) -> Mask:
         return found
     uneven = np.abs(value[1:-1] - 0.5 * (value[:-2] + value[2:]))
     usual = USUAL * np.maximum(median_filter(uneven, NEAR), np.median(uneven))
-    limit = FAR * np.maximum(np.concatenate([usual[:1], usual, usual[-1:]]), resolution(value))
+    limit = FAR_OFF * np.maximum(np.concatenate([usual[:1], usual, usual[-1:]]), resolution(value))
     for width in range(1, WIDEST + 1):
         first = np.arange(2, len(value) - width - 1)  # between two good samples on either side
         last = first + width
@@ -49,7 +49,7 @@ def outlying_samples(value: Array) -> Mask:
         lone = (least > limit[first]) & (bent < PASSING * least)
         for k in range(width):
             found[first[lone] + k] = True
-    return found if found.mean() <= MOST else np.zeros(len(value), dtype=bool)
+    return found if found.mean() <= LARGEST_SHARE else np.zeros(len(value), dtype=bool)
 
 
 def repeated_samples(value: Array) -> Mask:
@@ -70,7 +70,7 @@ def repeated_samples(value: Array) -> Mask:
     fresh = (len(step) - lengths.sum()) / len(runs)  # values in a row that are new
     even = share > OFTEN and fresh < FRESH and np.mean(np.abs(lengths - np.median(lengths)) <= 1) > EVEN
     for begin, end in runs:
-        if end < len(step) and (even or (share <= MOST and _leaps(step, int(begin), int(end)))):
+        if end < len(step) and (even or (share <= LARGEST_SHARE and _leaps(step, int(begin), int(end)))):
             found[begin + 1 : end + 1] = True
     return found & ~clipped_samples(value)
 

@@ -14,6 +14,7 @@ from rhythmid.model import Model, Term
 from rhythmid.simulation.signal import FOR_EVER
 
 Array = NDArray[np.float64]
+INPUT_DELAY, MEASUREMENT_DELAY = "input_delay.delay", "measurement_delay.delay"  # parameters of a model
 MEASUREMENT = ("sensor", "timing")  # slots that a measurement passes
 
 

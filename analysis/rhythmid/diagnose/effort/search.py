@@ -45,7 +45,7 @@ from rhythmid.model import Model, Prior
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 
-MOST = 4  # effects that are looked for: a fifth was never real on recordings that were tried
+MOST_EFFECTS = 4  # effects that are looked for: a fifth was never real on recordings that were tried
 REFINED = 10  # additions that are fitted in earnest in each round: the right one was among the first five of a score test always
 SWALLOWED = (
     0.5  # of the effort that an actuator's effect has to leave: one that takes more explains no motion
@@ -99,7 +99,7 @@ def search_effort(
     model: Model,
     catalogue: Catalogue,
     balance: Balance | None = None,
-    most: int = MOST,
+    most: int = MOST_EFFECTS,
     tell: Tell = lambda _: None,
     budget: Budget | None = None,
 ) -> EffortSearch:

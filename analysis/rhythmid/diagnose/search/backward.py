@@ -13,7 +13,7 @@ from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.simulation.compiled import compile_model
 
-RIVALS = 2  # elements that scored best at first, tried again in the place of each of several effects
+RIVALS_TRIED = 2  # elements that scored best at first, tried again in the place of each of several effects
 
 
 def eliminate(
@@ -85,7 +85,7 @@ def _swaps(
         family = {e.name for e in catalogue.values() if element.name in e.special_case_of and e.candidate}
         names = set(family)
         if len(best.added) > 1:
-            names |= {score.element.name for score, _ in distinct(rounds[0].scores, RIVALS)}
+            names |= {score.element.name for score, _ in distinct(rounds[0].scores, RIVALS_TRIED)}
         rest = _rest(best, label)
         slim = best.model.without(label)
         for name in sorted(names - {best.element(other).name for other in best.added}):

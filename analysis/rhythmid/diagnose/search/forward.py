@@ -58,12 +58,12 @@ NEAR = 60.0
 # leaves; and how many of them get it
 PLAIN, SECOND = 100.0, 2
 UNDERSTATED = 0.1  # share of what a refit gains that a score shows at least, where an effect is far from its first guess
-MOST = 3  # effects at once
-RIVALS = 4  # models of each number of effects that are compared at the end
+MOST_EFFECTS = 3  # effects at once
+RIVALS_COMPARED = 4  # models of each number of effects that are compared at the end
 OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
 # of the noise: integration error of an element with corners beyond which all steps are made finer
-ROUGH = 0.1
+POOR_FIT = 0.1
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ def search(
     while (
         now.p_value < LEVEL
         and _could_pay(now, best, max(WORTH, SHARE * gained), current)
-        and len(best.added) < MOST
+        and len(best.added) < MOST_EFFECTS
     ):
         if budget.spent:
             untried = [score.element.name for score, _ in distinct(now.scores, REFITTED)]
@@ -202,7 +202,7 @@ def search(
         for group in (near, *hopeful):
             top = _most_likely(group, series, here.noise, step, floor)
             fit = whole_fit(top, series, here.noise, step, pool=pool)
-            finer = accurate(fit.run, fit.model, fit.starts, ROUGH * fit.noise.variance**0.5, 2)
+            finer = accurate(fit.run, fit.model, fit.starts, POOR_FIT * fit.noise.variance**0.5, 2)
             if finer.max_step < 0.45 * fine_enough(top.model, step):
                 step = finer.max_step
                 fit = whole_fit(replace(top, converged=False), series, here.noise, step, pool=pool)
@@ -229,14 +229,16 @@ def search(
         trials[tuple(sorted(best.added))] = best
         tell(f"{best.added[-1]} explains it better by {gain:.0f}; looking for more")
         current = whole_fit(best, series, noise, step, pool=pool)
-        if len(best.added) >= MOST:
+        if len(best.added) >= MOST_EFFECTS:
             break
         now, current = one_round(current, best.added, catalogue, pool)
         here = under_noise([best], series, current.noise, step, 0)[0]
         rounds.append(now)
     if best.added and not budget.spent:
         margin = max(WORTH, SHARE * gained)
-        reduced, more = eliminate(best, series, catalogue, trials, noise, step, rounds, margin, MOST, tell)
+        reduced, more = eliminate(
+            best, series, catalogue, trials, noise, step, rounds, margin, MOST_EFFECTS, tell
+        )
         trials |= more
         if reduced is not best:
             best = in_best_order(reduced, series, noise, step)
@@ -296,7 +298,7 @@ def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial) -> list[Trial
     ranked = sorted(trials.values(), key=lambda t: t.bic())
     kept = {tuple(sorted(t.added)): t for t in [trials[()], best]}
     for count in {len(t.added) for t in ranked if t.added}:
-        same = [t for t in ranked if len(t.added) == count][:RIVALS]
+        same = [t for t in ranked if len(t.added) == count][:RIVALS_COMPARED]
         kept = {tuple(sorted(t.added)): t for t in same} | kept
     parts = {key: t for key, t in trials.items() if set(key) < set(best.added)}
     return list((parts | kept).values())
