@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import EQUIVALENT, MISMATCH, PRACTICAL_EFFORT, REST
 from rhythmid.diagnose.effort.candidate import (
-    DELAY,
+    INPUT_DELAY,
     Screened,
     Start,
     extended,
@@ -277,7 +277,7 @@ class _Search:
 
     def _aligned(self, elements: Sequence[str]) -> Alignment:
         usual = Alignment.of(self.balance)
-        if DELAY not in elements:
+        if INPUT_DELAY not in elements:
             return usual
         most = late_start(self.balance, self.nominal.fit)[0]
         return most

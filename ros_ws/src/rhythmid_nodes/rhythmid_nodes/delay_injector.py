@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter as RosParameter
 from std_msgs.msg import String
 
 from rhythmid.errors import InputError
-from rhythmid.experiment import Delay, profile_delay
+from rhythmid.settings import Delay, profile_delay
 
 from .clock import Clock, Worker, sleep_in_slices
 from .joint_state import restamped, stamp_of
