@@ -24,7 +24,7 @@ def test_effects_are_exchanged_only_where_they_may_be_named(
 ):
     tried: list[tuple[str, ...]] = []
 
-    def run_trials(proposals, *_):
+    def run_trials(proposals, *_, **__):
         tried.extend(p.added for p in proposals)
         return [], []
 

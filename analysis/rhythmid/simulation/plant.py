@@ -122,7 +122,7 @@ class Plant:
         if not np.isfinite(effort).all():
             raise InputError(f"a command is not a finite number (at {int(stamp_ns[0])} ns)")
         self._newest = int(stamp_ns[-1])
-        self._knots.extend(self._path.times(stamp_ns * 1e-9).tolist())
+        self._knots.extend(self._path.times(np.asarray(stamp_ns * 1e-9, dtype=float)).tolist())
         self._efforts.extend(np.asarray(effort, dtype=float).tolist())
 
     def advance(self, until_ns: int) -> Samples:
