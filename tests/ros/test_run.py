@@ -235,6 +235,19 @@ def test_a_nodes_death_ends_the_run_with_a_valid_bag(no_shared_memory, started, 
     assert not any(Path(f"/proc/{pid}").exists() for pid in children.values())
 
 
+def test_a_node_that_lives_and_does_not_work_ends_the_run(no_shared_memory, started, tmp_path):
+    path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"}, duration=60.0)
+    run = started(path)
+    run.wait_for_samples(tmp_path / "experiment_bag")
+    children = run.children()
+    os.kill(children["recorder"], signal.SIGSTOP)
+    code, said = run.end()
+    assert code == 1 and "nothing was heard from recorder for 5 s" in said
+    rows, _ = content(tmp_path / "experiment_bag")
+    assert rows["excitation"]
+    assert not any(Path(f"/proc/{pid}").exists() for pid in children.values())
+
+
 def test_the_nodes_end_when_the_supervisor_is_killed(no_shared_memory, started, tmp_path):
     run = started(experiment_file(tmp_path, time={"mode": "realtime", "layout": "composed"}, duration=60.0))
     run.wait_for_samples(tmp_path / "experiment_bag")
