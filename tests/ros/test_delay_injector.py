@@ -12,6 +12,7 @@ from std_msgs.msg import String
 from rhythmid.errors import InputError
 from rhythmid.experiment import Delay
 from rhythmid_nodes.delay_injector import DelayInjector
+from rhythmid_nodes.joint_state import JointStateWriter
 from rhythmid_nodes.qos import latched, stream
 
 MS = 1_000_000
@@ -163,11 +164,11 @@ def test_bursts_that_overflow_the_queues_do_not_stop_it_and_what_is_lost_is_told
     """The sender keeps the last 1000 messages only: of a larger burst the middleware loses some."""
     process = graph.spawn("delay_injector", "delay_injector", REMAP)
     heard, told = graph.listen("there"), graph.listen("/diagnostics", DiagnosticArray, latched())
-    send, sent = graph.talk("here"), 0
+    send, sent, write = graph.talk("here"), 0, JointStateWriter("leg", "effort").write
     while sent < 40_000 and (sent < 10_000 or sent == len(heard)):
         before = len(heard)
         for _ in range(2000):
-            send(graph.joint_state(time.time_ns(), effort=float(sent)))
+            send(write(time.time_ns(), float(sent)))
             sent += 1
         graph.until(lambda: len(heard) > before, "a message of the burst")
         graph.spin(0.3)

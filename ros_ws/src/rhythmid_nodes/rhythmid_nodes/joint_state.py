@@ -115,6 +115,8 @@ class JointStateWriter:
         message = JointState(name=[joint], **{field: [0.0] for field in fields})
         self._buffer = bytearray(serialize_message(message))
         _, arrays = _layout(bytes(self._buffer))
+        # serialize_message hands out the size that it reserved, some bytes more than the message has; a strict reader refuses them
+        del self._buffer[arrays[-1][0] + 8 * arrays[-1][1] :]
         self._offsets = [arrays[_FIELDS.index(field)][0] for field in fields]
 
     def write(self, stamp_ns: int, *values: float) -> bytes:
