@@ -19,10 +19,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.utilities import try_shutdown
+from read_back import require_readable_by_others
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from read_back import require_readable_by_others
 from rhythmid_bringup.environment import own_domain, run_environment
 from rhythmid_bringup.processes import Supervised, end
 from rhythmid_nodes.node import GraphNode

@@ -170,7 +170,7 @@ def test_bursts_that_overflow_the_queues_do_not_stop_it_and_what_is_lost_is_told
         for _ in range(2000):
             send(write(time.time_ns(), float(sent)))
             sent += 1
-        graph.until(lambda: len(heard) > before, "a message of the burst")
+        graph.until(lambda before=before: len(heard) > before, "a message of the burst")
         graph.spin(0.3)
     send(graph.joint_state(time.time_ns(), effort=float(sent)))
     graph.until(lambda: heard[-1].effort[0] == sent, "the last message")

@@ -46,6 +46,10 @@ class Supervised:
         self._reader.start()
 
     @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
     def returncode(self) -> int | None:
         """Exit code, minus the signal's number if killed; None while it runs."""
         return self._process.poll()

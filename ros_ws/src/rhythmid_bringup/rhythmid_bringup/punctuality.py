@@ -15,9 +15,7 @@ _STAGES = {
     "measurement_delay": ("relayed", "late", "delay_error"),
 }
 _LOSSES = [
-    (node, key)
-    for node in ("command_delay", "measurement_delay", "recorder")
-    for key in ("dropped", "lost")
+    (node, key) for node in ("command_delay", "measurement_delay", "recorder") for key in ("dropped", "lost")
 ]
 
 
