@@ -61,7 +61,7 @@ class Bursts(Node):
 
 
 def main() -> None:
-    bursts, messages = (int(word) for word in [*sys.argv[1:], "200", "2000"][:2])
+    bursts, messages = (int(given) for given in (*sys.argv[1:], *("200", "2000")[len(sys.argv) - 1 :]))
     with own_domain() as domain, tempfile.TemporaryDirectory() as folder:
         os.environ.update(run_environment(os.environ, domain, Path(folder)))
         injector = subprocess.Popen(INJECTOR)

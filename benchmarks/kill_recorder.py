@@ -1,6 +1,6 @@
 """The recorder killed (SIGKILL) at random moments: what can be read afterwards, and how much is lost.
 
-python benchmarks/kill_recorder.py [TIMES]
+python benchmarks/kill_recorder.py [TIMES [SEED]]
 
 A sender publishes numbered messages at 1 kHz all the time; what the recovered bag holds must be a run of these numbers
 without a gap and with the very bytes that were sent.
@@ -118,8 +118,8 @@ def loss_of(bag: Path, sent: list[tuple[float, bytes]], killed_at: float, out: P
 
 
 def main() -> None:
-    times = int(sys.argv[1]) if len(sys.argv) > 1 else 200
-    draw = random.Random(0)
+    times, seed = (int(given) for given in (*sys.argv[1:], *("200", "0")[len(sys.argv) - 1 :]))
+    draw = random.Random(seed)
     os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = (
         "UDPv4"  # a killed process would leave its shared memory behind
     )

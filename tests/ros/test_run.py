@@ -132,6 +132,21 @@ def test_lockstep_equals_the_run_without_ros(rhythmid, tmp_path, offline, layout
     assert "0.0403" not in concealed and "0.0507" not in concealed and "stiffness" not in concealed
 
 
+def test_equal_lockstep_runs_give_equal_bytes(rhythmid, tmp_path):
+    """Whatever the layout and the window: what the middleware interleaves otherwise stands in the bag in one order."""
+    found = []
+    for layout, window in (("composed", 100), ("processes", 13)):
+        path = experiment_file(
+            tmp_path, time={"layout": layout, "window": window}, excitation={"sweep": 1.0}
+        )  # fmt: skip
+        done = rhythmid("run", path, "--out", tmp_path / layout / "bag")
+        assert done.returncode == 0, done.stderr
+        found.append({file.name: file.read_bytes() for file in (tmp_path / layout / "bag").iterdir()})
+    assert set(found[0]) == set(found[1])
+    for name, data in found[0].items():
+        assert data == found[1][name], name
+
+
 def test_lockstep_follows_a_delay_profile_as_the_run_without_ros_does(rhythmid, tmp_path):
     (tmp_path / "profile.csv").write_text("0,0.04\n1.5,0.06\n1.51,0.0\n3,0.2\n")
     path = experiment_file(tmp_path, delays={"input": {"profile": "profile.csv"}}, time={"window": 1})

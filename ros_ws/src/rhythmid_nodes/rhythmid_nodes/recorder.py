@@ -29,6 +29,7 @@ from .track import Track
 
 _LOOK_PERIOD = 0.2  # seconds between two looks for topics whose names match
 _STATE = "run"  # what the excitation says when it begins and when it ends; it bears no stamp
+_TEXT = "std_msgs/msg/String"
 PARAMETERS = (
     RATE,
     TIME_MODE,
@@ -189,6 +190,8 @@ class Recorder(GraphNode):
 
     def _receive(self, topic: str, track: Track, data: bytes, received_ns: int) -> None:
         track.received += 1
+        if track.type_name == _TEXT:
+            data = unpadded_text(data)
         stamp_ns = stamp_of(data) if track.has_header else 0
         if self._paused:
             self._skipped += 1
@@ -234,6 +237,11 @@ class Recorder(GraphNode):
     def _split(self) -> tuple[bool, str]:
         self._bag.split()
         return True, ""
+
+
+def unpadded_text(data: bytes) -> bytes:
+    """A serialised std_msgs/String without the bytes by which some transports fill it up to a multiple of four."""
+    return data[: 8 + int.from_bytes(data[4:8], "little" if data[1] else "big")]
 
 
 def _answering(
