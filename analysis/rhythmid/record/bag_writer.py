@@ -33,6 +33,7 @@ from rhythmid.record.metadata import VERSION, FileContent, bag_information, meta
 from rhythmid.record.sqlite_writer import SqliteWriter
 
 Storage = Literal["mcap", "sqlite3"]
+_FILES = {StoragePlugin.MCAP: McapWriter, StoragePlugin.SQLITE3: SqliteWriter}
 STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
 FOREVER = QosTime(9223372036, 854775807)  # how rosbag2 writes an infinite duration
 
@@ -42,8 +43,6 @@ class BagWriter(Writer):
 
     `numbered` names the files as rosbag2's recorder does (`bag_0.mcap`, …); without it there is one, `bag.mcap`.
     """
-
-    STORAGE_PLUGINS = {StoragePlugin.MCAP: McapWriter, StoragePlugin.SQLITE3: SqliteWriter}
 
     def __init__(self, path: Path | str, storage: Storage, numbered: bool = False) -> None:
         super().__init__(path, version=VERSION, storage_plugin=STORAGES[storage])
@@ -65,7 +64,7 @@ class BagWriter(Writer):
 
     def _open_file(self) -> None:
         name = f"{self.path.name}_{len(self.files)}" if self._numbered else self.path.name
-        self.storage = self.STORAGE_PLUGINS[self.storage_plugin](self.path, self.compression_mode, name)
+        self.storage = _FILES[self.storage_plugin](self.path, self.compression_mode, name)
         self.files.append(FileContent(self.storage.path.name))
 
     def split(self) -> None:

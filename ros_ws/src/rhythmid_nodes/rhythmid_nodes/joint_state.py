@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from rclpy.serialization import deserialize_message
@@ -117,7 +117,7 @@ class JointStateWriter:
     def __init__(self, joint: str, *fields: str) -> None:
         # rclpy's serialize_message hands out all the bytes that it reserved, more than the message has, and leaves in its
         # padding what the memory held: strict readers refuse the first, and equal messages differ by the second
-        columns = {field: np.zeros(1) for field in fields}
+        columns: dict[str, Any] = {field: np.zeros(1) for field in fields}
         self._buffer = bytearray(Messages(np.zeros(1, dtype=np.int64), **columns).serialised(joint).tobytes())
         _, arrays = _layout(bytes(self._buffer))
         self._offsets = [arrays[_FIELDS.index(field)][0] for field in fields]
