@@ -55,7 +55,7 @@ class Sender(Node):
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._send)
 
-    def start(self, patience: float = 30.0) -> None:
+    def start(self, patience: float = 120.0) -> None:
         """Wait for the recorder, and begin."""
         until = time.monotonic() + patience
         while self._publisher.get_subscription_count() == 0:
