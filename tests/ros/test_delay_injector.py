@@ -164,7 +164,9 @@ def test_bursts_that_overflow_the_queues_do_not_stop_it_and_what_is_lost_is_told
     """The sender keeps the last 1000 messages only: of a larger burst the middleware loses some."""
     process = graph.spawn("delay_injector", "delay_injector", REMAP)
     heard, told = graph.listen("there"), graph.listen("/diagnostics", DiagnosticArray, latched())
-    send, sent, write = graph.talk("here"), 0, JointStateWriter("leg", "effort").write
+    send, sent, write = graph.talk("here"), 1, JointStateWriter("leg", "effort").write
+    send(write(time.time_ns(), 0.0))
+    graph.until(lambda: heard, "the first message, from which losses are counted")
     while sent < 40_000 and (sent < 10_000 or sent == len(heard)):
         before = len(heard)
         for _ in range(2000):
