@@ -2,7 +2,7 @@
 
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -31,13 +31,16 @@ class Bag:
     files : storage files in the order of recording.
     topics : all topics by name, with or without messages.
     truncated : whether the recording breaks off (its recorder was killed or is still running).
-    notes : what a user should know about the state of the files, one line each.
+    notes : what a user should know about the state of the files, one line each; empty for a whole recording.
+    stated : messages by topic, as metadata.yaml or the end of the files count them; empty where they do not.
 
-    Raises InputError when there is no such recording.
+    With `verify` the checksums of the files are compared, too. Raises InputError when there is no such recording.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, verify: bool = False) -> None:
         self.path = Path(path)
+        self.stated: dict[str, int] = {}
+        self._verify = verify
         self.topics: dict[str, Topic] = {}
         self.truncated = False
         self.notes: list[str] = []
@@ -71,6 +74,10 @@ class Bag:
         try:
             listed = yaml.safe_load(metadata.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
             files = [self.path / Path(name).name for name in listed["relative_file_paths"]]
+            self.stated = {
+                str(topic["topic_metadata"]["name"]): int(topic["message_count"])
+                for topic in listed["topics_with_message_count"]
+            }
         except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError):
             self.notes.append("metadata.yaml is damaged: all storage files of the directory were read")
             return present
@@ -102,6 +109,19 @@ class Bag:
             raise InputError(f"{file}: is damaged: {error}") from None
         self.topics.update(reader.topics)
         self.notes += [f"{file.name}: {note}" for note in reader.damage]
+        if self._verify:
+            self.notes += [f"{file.name}: {note}" for note in reader.wrong_checksums()]
+            if not (self.path / "metadata.yaml").is_file():
+                for name, count in reader.counted().items():
+                    self.stated[name] = self.stated.get(name, 0) + count
         if reader.truncated:
             self.truncated = True
             self.notes.append(f"{file.name}: breaks off; what precedes the break was read")
+
+    def lost(self, counts: Mapping[str, int]) -> dict[str, int]:
+        """Messages by topic that are missing from `counts`, as far as the bag states how many there were."""
+        return {
+            name: missing
+            for name, stated in self.stated.items()
+            if (missing := stated - counts.get(name, 0)) > 0
+        }

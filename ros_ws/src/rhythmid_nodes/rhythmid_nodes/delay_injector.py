@@ -84,6 +84,7 @@ class DelayInjector(GraphNode):
         applied = self._applied_ns / self._relayed * 1e-6 if self._relayed else 0.0
         figures = {
             "relayed": str(self._relayed),
+            "lost": str(self._input.lost),
             "delay_ms": f"{self._delay_ns * 1e-6:.6f}" if self._profile is None else "profile",
             "applied_delay_mean_ms": f"{applied:.6f}",
         }
