@@ -7,7 +7,6 @@ Seconds throughout. A delay that could not be told apart is null; its sum never 
 matters: a state measured now is `measurement` old, and a command given now acts `input` later.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,17 +32,16 @@ class Latency:
     @classmethod
     def load(cls, path: str | Path) -> "Latency":
         """The latency file at `path`. Raises InputError when it is not one."""
-        content = read(path).value
-        if not isinstance(content, Mapping):
-            raise InputError(f"{path}: not a latency file; `rhythmid identify --save` writes one")
-        plain = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        plain = read(path).plain
         try:
             delays, model = plain["delays"], plain["model"]
             return cls(
                 delays["input"]["value"], delays["measurement"]["value"], float(delays["sum"]["value"]),
                 delays["sum"]["std"], Model.from_text(yaml.safe_dump(model), str(path)),
             )  # fmt: skip
-        except (KeyError, TypeError):
+        except InputError:
+            raise
+        except (KeyError, TypeError, ValueError):
             raise InputError(f"{path}: not a latency file; `rhythmid identify --save` writes one") from None
 
 

@@ -10,6 +10,11 @@ from rhythmid.errors import InputError
 from rhythmid.record.block import Topic
 from rhythmid.record.field import TypeFields
 
+TIME_PARTS = (("sec", "int32"), ("nanosec", "uint32"))
+LENGTH_WORD = 4  # bytes in front of a string or list
+LEAST_TEXT = LENGTH_WORD + 1  # with the closing zero
+LARGEST_FIXED = 1 << 28  # bytes of a fixed array; a message that large is not sent
+MOST_FIXED_PARTS = 10_000  # strings or messages in a fixed array: each becomes lines of code of its own
 _SEPARATOR = "=" * 80 + "\n"
 
 
@@ -27,14 +32,46 @@ def type_fields(topic: Topic) -> TypeFields:
             f"{topic.name}: its messages are encoded as {topic.encoding!r}; only 'cdr' can be read"
         )
     own = _own_types(topic)
-    if topic.type in own and _parts(own) <= own.keys():
-        return own
-    types = {**standard_types().fielddefs, **own}
+    types = own
+    if topic.type not in own or not _parts(own) <= own.keys():
+        types = {**standard_types().fielddefs, **own}
     if topic.type not in types or not _parts(own) <= types.keys():
         raise InputError(
             f"{topic.name}: the bag does not define its type {topic.type!r}, which is not a standard type"
         )
+    try:
+        _check_size(types, topic.type)
+    except InputError as error:
+        raise InputError(f"{topic.name}: its type {topic.type!r} cannot be read: {error}") from None
     return types
+
+
+def _check_size(types: TypeFields, name: str, above: tuple[str, ...] = ()) -> int:
+    """Least size [bytes] of a message, padding left out.
+
+    Raises InputError for types that no message could have: those that hold themselves, fixed arrays larger than any message, and
+    lists of parts without size, of which a few bytes would claim billions.
+    """
+    if name in above:
+        raise InputError(f"{name} holds itself")
+    return sum(_least(types, kind, (*above, name)) for _, kind in types[name][1])
+
+
+def _least(types: TypeFields, kind: Any, above: tuple[str, ...]) -> int:
+    if kind[0] == Nodetype.NAME:
+        return _check_size(types, kind[1], above)
+    if kind[0] == Nodetype.BASE:
+        return LEAST_TEXT if "string" in kind[1][0] else 1
+    element, count = kind[1]
+    each = _least(types, element, above)
+    if each == 0:
+        raise InputError(f"a list in {above[-1]} has parts without size")
+    if kind[0] == Nodetype.SEQUENCE:
+        return LENGTH_WORD
+    single = element[0] == Nodetype.BASE and "string" not in element[1][0]
+    if count * each > LARGEST_FIXED or not (single or count <= MOST_FIXED_PARTS):
+        raise InputError(f"a fixed array in {above[-1]} has {count} parts")
+    return count * each
 
 
 def _own_types(topic: Topic) -> dict[str, Any]:
@@ -48,7 +85,7 @@ def _own_types(topic: Topic) -> dict[str, Any]:
                 topic.definition
             ]
             return {name: fields for text in texts for name, fields in get_types_from_idl(text).items()}
-    except (TypesysError, KeyError, IndexError, ValueError):
+    except (TypesysError, LookupError, ValueError, RecursionError):
         pass
     return {}
 
@@ -69,14 +106,23 @@ def _parts(types: TypeFields) -> set[str]:
 def typestore(topic: Topic) -> Any:
     """A rosbags Typestore that deserialises the topic's messages."""
     store = get_typestore(Stores.EMPTY)
-    store.register(dict(type_fields(topic)))
+    try:
+        store.register(dict(type_fields(topic)))
+    except (TypesysError, SyntaxError) as error:
+        raise InputError(f"{topic.name}: its type {topic.type!r} cannot be read: {error}") from None
     return store
 
 
 def stamp_path(topic: Topic) -> str | None:
     """Path of the time stamp in the topic's messages: of its header, else its own; None if there is none."""
     types = type_fields(topic)
+    time = (Nodetype.NAME, "builtin_interfaces/msg/Time")
     fields = dict(types[topic.type][1])
+    path = "stamp"
     if fields.get("header") == (Nodetype.NAME, "std_msgs/msg/Header"):
-        return "header.stamp"
-    return "stamp" if fields.get("stamp") == (Nodetype.NAME, "builtin_interfaces/msg/Time") else None
+        path, fields = "header.stamp", dict(types["std_msgs/msg/Header"][1])
+    if fields.get("stamp") != time:
+        return None
+    kinds = dict(types["builtin_interfaces/msg/Time"][1])
+    whole = all(kinds.get(part) == (Nodetype.BASE, (base, 0)) for part, base in TIME_PARTS)
+    return path if whole else None  # a bag may define its own types, under the names of standard ones

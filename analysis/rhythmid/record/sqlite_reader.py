@@ -15,7 +15,9 @@ import numpy as np
 from rhythmid.errors import InputError
 from rhythmid.record.block import Block, Topic, Wanted, by_topic
 
-_ROWS = 50_000  # rows fetched at once
+_ROWS = 50_000  # rows fetched at once,
+_BYTES = 64 << 20  # and bytes, behind which no further one is fetched
+_LARGEST_ROW = 256 << 20  # bytes; sqlite's own limit is larger, and a database may compute its rows
 
 
 class SqliteReader:
@@ -70,6 +72,8 @@ class SqliteReader:
 
     def _read(self, path: Path, mode: str, wanted: Wanted) -> Iterator[Block]:
         with closing(sqlite3.connect(f"{path.absolute().as_uri()}?{mode}", uri=True)) as database:
+            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST_ROW)
+            database.execute("PRAGMA trusted_schema = OFF")  # no function with side effects, should its schema call one
             numbered = _topics(database)
             self.topics = {topic.name: topic for topic in numbered.values()}
             chosen = {number: topic for number, topic in numbered.items() if wanted(topic)}
@@ -90,11 +94,15 @@ class SqliteReader:
     def _fetch(self, rows: sqlite3.Cursor) -> list[tuple[int, int, bytes]]:
         """The next rows; where the file is cut off or damaged, those that precede the break."""
         batch: list[tuple[int, int, bytes]] = []
+        fetched = 0
         if self.damage:
             return batch
         try:
             for row in islice(rows, _ROWS):
                 batch.append(row)
+                fetched += len(row[2]) if isinstance(row[2], bytes) else 0
+                if fetched > _BYTES:
+                    break
         except sqlite3.DatabaseError as error:
             if not self._fetched and not batch:
                 raise
@@ -120,7 +128,10 @@ def _topics(database: sqlite3.Connection) -> dict[int, Topic]:
     definitions: dict[str, tuple[str, str]] = {}
     if "message_definitions" in tables:
         query = "SELECT topic_type, encoded_message_definition, encoding FROM message_definitions"
-        definitions = {name: (definition, form) for name, definition, form in database.execute(query)}
+        rows = list(database.execute(query))
+        if any({*map(type, row)} != {str} for row in rows):
+            raise sqlite3.DatabaseError("its table 'message_definitions' holds no texts")
+        definitions = {name: (definition, form) for name, definition, form in rows}
     stored = {column[1] for column in database.execute("PRAGMA table_info(topics)")}
     qos = "offered_qos_profiles" if "offered_qos_profiles" in stored else "''"
     query = f"SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id"
