@@ -11,8 +11,10 @@ failed.
 
 import argparse
 import json
+import math
 import mmap
 import os
+import random
 import resource
 import shutil
 import struct
@@ -22,7 +24,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -31,10 +33,12 @@ from fuzz_targets import TARGETS, Target
 
 from rhythmid.errors import InputError
 
-TIME_LIMIT = 10.0  # s for one input, of which none is larger than some kB; a loaded machine is slow
+TIME_LIMIT = 5.0  # s of the processor for one input, of which none is larger than some kB
+PATIENCE = 60.0  # s by the clock: the machine may be busy with other things
 MEMORY_LIMIT = 512  # MiB that one input may take
 ADDRESS_SPACE = 8 << 30  # bytes, beyond which the process gets no memory: this machine has to survive its findings
-BATCH = 2000  # inputs that one process reads
+WARM_UP = 6  # valid inputs that are read before
+BATCH = 1000  # inputs that one process reads
 LONGEST_LINE = 1500  # characters of a refusal that still is one clear line
 KEPT = 20  # failures of one kind that are listed by number
 FORBIDDEN = ("os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "pickle.find_class", "socket.connect")
@@ -139,23 +143,29 @@ def _reset_peak() -> None:
         file.write("5")
 
 
-def _batch(target: Target, seed: int, first: int, last: int, place: mmap.mmap, scratch: Path) -> Tally:
-    """Read the inputs first … last - 1 in this process; `place` tells the watcher which one it is at, and since when."""
+def _batch(
+    target: Target, seed: int, first: int, last: int, until: float, place: mmap.mmap, scratch: Path
+) -> Tally:
+    """Read the inputs first … last - 1 in this process, or as many as the time allows; `place` tells the watcher which one it is at, and since when."""
     tally, watch = Tally(), Watch()
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE, ADDRESS_SPACE))
     warnings.simplefilter("error", RuntimeWarning)
     for number in range(first, last):
+        if time.monotonic() > until:
+            break
         data = target.hostile(seed, number)
         folder = scratch / str(number)
         folder.mkdir(parents=True)
         tempfile.tempdir = str(folder)
         _reset_peak()
-        before, begun = _peak(), time.monotonic()
-        place[:16] = struct.pack("<qd", number, begun)
+        place[:16] = struct.pack("<qd", number, time.monotonic())
+        before, begun = _peak(), time.process_time()
         outcome, kind = attempt(target, data, folder, number, watch)
-        spent, memory = time.monotonic() - begun, _peak() - before
+        spent, memory = time.process_time() - begun, _peak() - before
         if outcome != "failed" and memory > MEMORY_LIMIT:
             outcome, kind = "failed", f"takes more than {MEMORY_LIMIT} MiB"
+        if outcome != "failed" and spent > TIME_LIMIT:
+            outcome, kind = "failed", f"takes more than {TIME_LIMIT:g} s"
         tally.inputs += 1
         tally.refused += outcome == "refused"
         tally.accepted += outcome == "accepted"
@@ -167,7 +177,9 @@ def _batch(target: Target, seed: int, first: int, last: int, place: mmap.mmap, s
     return tally
 
 
-def watched(target: Target, seed: int, first: int, last: int, scratch: Path) -> tuple[Tally, int]:
+def watched(
+    target: Target, seed: int, first: int, last: int, until: float, scratch: Path
+) -> tuple[Tally, int]:
     """The batch in a process of its own: its tally, and the number of the input to go on with."""
     place = mmap.mmap(-1, 16)
     place[:16] = struct.pack("<qd", first, time.monotonic())
@@ -175,7 +187,7 @@ def watched(target: Target, seed: int, first: int, last: int, scratch: Path) -> 
     child = os.fork()
     if child == 0:
         try:
-            result.write_text(json.dumps(asdict(_batch(target, seed, first, last, place, scratch))))
+            result.write_text(json.dumps(asdict(_batch(target, seed, first, last, until, place, scratch))))
         except BaseException:
             traceback.print_exc()
         os._exit(0)
@@ -185,17 +197,18 @@ def watched(target: Target, seed: int, first: int, last: int, scratch: Path) -> 
         if ended:
             break
         number, begun = struct.unpack("<qd", place[:16])
-        if time.monotonic() - begun > TIME_LIMIT and not reason:
-            reason = f"no answer within {TIME_LIMIT:g} s"
+        if time.monotonic() - begun > PATIENCE and not reason:
+            reason = f"no answer within {PATIENCE:g} s"
             os.kill(child, 9)
         time.sleep(0.05)
     number = struct.unpack("<qd", place[:16])[0]
     if result.exists():
         tally = Tally(**json.loads(result.read_text()))
         result.unlink()
-        return tally, last
+        return tally, first + tally.inputs
+    shutil.rmtree(scratch / str(number), ignore_errors=True)
     # what came before the fatal input is read again: outcomes are the same, and nothing is counted twice
-    tally = watched(target, seed, first, number, scratch)[0] if number > first else Tally()
+    tally = watched(target, seed, first, number, math.inf, scratch)[0] if number > first else Tally()
     tally.inputs += 1
     tally.fail(reason or f"died of signal {os.WTERMSIG(status)}", number)
     return tally, number + 1
@@ -203,9 +216,14 @@ def watched(target: Target, seed: int, first: int, last: int, scratch: Path) -> 
 
 def campaign(target: Target, seed: int, first: int, count: int, until: float, scratch: Path) -> Tally:
     """At most `count` inputs from number `first` on, until the clock reads `until`."""
+    for spare in range(WARM_UP):  # what is loaded and compiled once is no input's time or memory
+        (folder := scratch / f"warm{spare}").mkdir(exist_ok=True)
+        with suppress(Exception):
+            target.use(random.Random(spare).choice(target.valid()), folder, spare)
+        shutil.rmtree(folder)
     total, number = Tally(), first
     while number < first + count and time.monotonic() < until:
-        tally, number = watched(target, seed, number, min(number + BATCH, first + count), scratch)
+        tally, number = watched(target, seed, number, min(number + BATCH, first + count), until, scratch)
         total.add(tally)
     return total
 

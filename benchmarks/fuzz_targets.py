@@ -6,7 +6,6 @@ A target's `use` returns when the input is accepted and raises InputError when i
 import gzip
 import io
 import random
-import shutil
 import sqlite3
 import struct
 import zipfile
@@ -23,6 +22,7 @@ from mcap.writer import Writer as McapWriter
 from mutation import Mutation, spoil_bytes, spoil_text
 from scipy.io import savemat
 
+from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.experiment import Experiment
 from rhythmid.identify.latency import Latency
 from rhythmid.model import Model
@@ -52,9 +52,6 @@ OWN_DEFINITION = (
     + "=" * 80 + "\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
     + "=" * 80 + "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
 )  # fmt: skip
-ROOT = Path(__file__).parents[1]
-MODEL = ROOT / "analysis/rhythmid/models/paper_hopper.yaml"
-CONFIG = ROOT / "ros_ws/src/rhythmid_bringup/config"
 
 
 @dataclass(frozen=True)
@@ -211,7 +208,7 @@ TOPIC = Topic("/legs", JOINT_STATE)
 OWN_TOPIC = Topic("/legs", OWN, definition=OWN_DEFINITION, definition_format="ros2msg")
 FIELDS = {
     JOINT_STATE: ("position[leg]", "velocity[0]", "effort[1]"),
-    OWN: ("legs[left].angle", "legs[0].contact[1]", "more[1].angle", "force[2]"),
+    OWN: ("legs[0].angle", "legs[0].contact[1]", "more[1].angle", "force[2]"),
 }
 
 
@@ -277,17 +274,24 @@ def _use_definition(data: bytes, folder: Path, number: int) -> None:
 
 # YAML
 
+MODEL = b"""
+inertia: {mass: {value: 1.0, unit: kg, fixed: true}}
+command: [{input_delay: {delay: {value: 0.01, unit: s}}}]
+force:
+  - linear_spring: {stiffness: {value: 200.0, unit: N/m, prior: {mean: 180.0, std: 20.0}}, rest_length: {value: 0.2, unit: m}}
+  - viscous_damper: {damping: {value: 2.0, unit: N*s/m, bounds: [0.0, .inf]}}
+"""
 SIGNALS = b"""
 time: {column: t_ms, scale: 0.001}
 input: {file: run.csv, column: u, kind: force, hold: zero, scale: 2.0, offset: 0.1, unit: N}
 output: {file: run.csv, column: y}
-forcing: {amplitude: 12.0, frequency: 41.4, phase: 0.1}
+forcing: {amplitude: 12.0, frequency: 61.4, phase: 0.1}
 use: [0.0, 5.0]
-parameters: {position_control.proportional: {run: 12.5, fast: 25}}
+parameters: {position_control.proportional: 12.5}
 """
 TABLE = b"t_ms,u,y\n" + b"".join(b"%d,%.3f,%.3f\n" % (k, VALUES[k], VALUES[-k]) for k in range(COUNT))
 EXPERIMENT = b"""
-model: paper_hopper.yaml
+model: model.yaml
 excitation: {type: sequence, parts: [{type: chirp, amplitude: 0.02, band: [0, 7], sweep: 10.0, shift: {period: 1.0, count: 6}},
   {type: multisine, rms: 0.01, period: 5.0, band: [0.5, 4.0]}, {type: profile, points: [[0, 0], [1, 0.1]], length: 2.0}]}
 forcing: {amplitude: 1.0, frequency: 1.0, phase: 0.0}
@@ -307,7 +311,12 @@ LATENCY = b"delays: {input: {value: 0.04, std: 1.7e-05}, measurement: {value: nu
 
 def _use_model(data: bytes, folder: Path, number: int) -> None:
     (folder / "model.yaml").write_bytes(data)
-    Model.from_text(Model.load(folder / "model.yaml").to_yaml())
+    Model.from_text(Model.load(folder / "model.yaml", _catalogue()).to_yaml(), catalogue=_catalogue())
+
+
+@cache
+def _catalogue() -> Catalogue:
+    return load_catalogue()
 
 
 def _use_signals(data: bytes, folder: Path, number: int) -> None:
@@ -319,7 +328,7 @@ def _use_signals(data: bytes, folder: Path, number: int) -> None:
 
 
 def _use_experiment(data: bytes, folder: Path, number: int) -> None:
-    shutil.copy(MODEL, folder)
+    (folder / "model.yaml").write_bytes(MODEL)
     (folder / "delays.csv").write_bytes(b"time,delay\n0,0.01\n5,0.02\n")
     (folder / "experiment.yaml").write_bytes(data)
     Experiment.load(folder / "experiment.yaml").nodes()
@@ -331,7 +340,7 @@ def _use_latency(data: bytes, folder: Path, number: int) -> None:
 
 
 def _latencies() -> list[bytes]:
-    return [LATENCY + b"".join(b"  " + line for line in MODEL.read_bytes().splitlines(keepends=True))]
+    return [LATENCY + b"".join(b"  " + line for line in MODEL.splitlines(keepends=True))]
 
 
 # Tables
@@ -427,9 +436,9 @@ TARGETS = {
         Target("recover", lambda: _mcaps() + _databases() * 2, _spoil_any_bag, _use_recover),
         Target("message", _messages, spoil_bytes, _use_message),
         Target("definition", _definitions, spoil_text, _use_definition),
-        Target("model", lambda: [MODEL.read_bytes()], spoil_text, _use_model),
+        Target("model", lambda: [MODEL], spoil_text, _use_model),
         Target("signals", lambda: [SIGNALS, SIGNALS.replace(b"file: run.csv, ", b"")], spoil_text, _use_signals),
-        Target("experiment", lambda: [EXPERIMENT, (CONFIG / "demo.yaml").read_bytes()], spoil_text, _use_experiment),
+        Target("experiment", lambda: [EXPERIMENT], spoil_text, _use_experiment),
         Target("latency", _latencies, spoil_text, _use_latency),
         Target("csv", _texts, spoil_text, _use_table(".csv")),
         Target("csv.gz", _texts, _spoil_gzip, _use_table(".csv.gz")),

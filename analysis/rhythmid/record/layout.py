@@ -85,6 +85,8 @@ class Layout:
         return length
 
     def _part(self, msgtype: str) -> dict[str, Any]:
+        if self._at > len(self._message):
+            raise Unsupported("the message is too short")
         return {name: self._walk(kind) for name, kind in self._types[msgtype][1]}
 
     def _walk(self, kind: Any) -> Any:

@@ -13,7 +13,7 @@ from rhythmid.record.field import TypeFields
 TIME_PARTS = (("sec", "int32"), ("nanosec", "uint32"))
 LENGTH_WORD = 4  # bytes in front of a string or list
 LEAST_TEXT = LENGTH_WORD + 1  # with the closing zero
-LARGEST_FIXED = 1 << 28  # bytes of a fixed array; a message that large is not sent
+LARGEST_FIXED = 1 << 28  # bytes that a type may need at least; a message that large is not sent
 MOST_FIXED_PARTS = 10_000  # strings or messages in a fixed array: each becomes lines of code of its own
 _SEPARATOR = "=" * 80 + "\n"
 
@@ -40,37 +40,42 @@ def type_fields(topic: Topic) -> TypeFields:
             f"{topic.name}: the bag does not define its type {topic.type!r}, which is not a standard type"
         )
     try:
-        _check_size(types, topic.type)
-    except InputError as error:
+        _check_size(types, topic.type, {})
+    except (InputError, RecursionError) as error:
         raise InputError(f"{topic.name}: its type {topic.type!r} cannot be read: {error}") from None
     return types
 
 
-def _check_size(types: TypeFields, name: str, above: tuple[str, ...] = ()) -> int:
-    """Least size [bytes] of a message, padding left out.
+def _check_size(types: TypeFields, name: str, sizes: dict[str, int | None]) -> int:
+    """Least size [bytes] of a message, padding left out; `sizes` collects those of its parts, None while one is being worked out.
 
-    Raises InputError for types that no message could have: those that hold themselves, fixed arrays larger than any message, and
-    lists of parts without size, of which a few bytes would claim billions.
+    Raises InputError for types that no message could have: that hold themselves, that need more bytes than any message, or none,
+    so that a few bytes would claim billions of them.
     """
-    if name in above:
-        raise InputError(f"{name} holds itself")
-    return sum(_least(types, kind, (*above, name)) for _, kind in types[name][1])
+    if name in sizes:
+        if (known := sizes[name]) is None:
+            raise InputError(f"{name} holds itself")
+        return known
+    sizes[name] = None
+    size = sum(_least(types, kind, sizes) for _, kind in types[name][1])
+    if not 0 < size <= LARGEST_FIXED:
+        raise InputError(f"every {name} would take {size} bytes")
+    sizes[name] = size
+    return size
 
 
-def _least(types: TypeFields, kind: Any, above: tuple[str, ...]) -> int:
+def _least(types: TypeFields, kind: Any, sizes: dict[str, int | None]) -> int:
     if kind[0] == Nodetype.NAME:
-        return _check_size(types, kind[1], above)
+        return _check_size(types, kind[1], sizes)
     if kind[0] == Nodetype.BASE:
         return LEAST_TEXT if "string" in kind[1][0] else 1
     element, count = kind[1]
-    each = _least(types, element, above)
-    if each == 0:
-        raise InputError(f"a list in {above[-1]} has parts without size")
+    each = _least(types, element, sizes)
     if kind[0] == Nodetype.SEQUENCE:
         return LENGTH_WORD
     single = element[0] == Nodetype.BASE and "string" not in element[1][0]
-    if count * each > LARGEST_FIXED or not (single or count <= MOST_FIXED_PARTS):
-        raise InputError(f"a fixed array in {above[-1]} has {count} parts")
+    if not single and count > MOST_FIXED_PARTS:
+        raise InputError(f"it holds a fixed array of {count} parts")
     return count * each
 
 
