@@ -29,7 +29,8 @@ def call(seconds: float) -> dict:
 
 
 @needs_namespaces
-def test_a_stranger_in_the_same_domain_reaches_an_open_plant_but_no_isolated_one(domain, graph):
+def test_a_stranger_in_the_same_domain_reaches_an_open_plant_but_no_isolated_one(domain, graph, monkeypatch):
+    monkeypatch.delenv("RHYTHMID_SUPERVISOR")  # its child is a shell
     script = f"{' '.join(PLANT)} & {' '.join(STRANGER)} 30; wait"
     with subprocess.Popen(
         isolation.isolated(["sh", "-c", script]), stdout=subprocess.PIPE, text=True, start_new_session=True
@@ -76,6 +77,7 @@ def test_another_machine_is_heard_only_when_the_user_asks_for_it(tmp_path, chose
     if chosen:
         given["ROS_AUTOMATIC_DISCOVERY_RANGE"] = chosen
     environment = run_environment(given, 77, tmp_path)
+    del environment["RHYTHMID_SUPERVISOR"]  # its child is a shell
     user = [] if os.geteuid() == 0 else ["--user", "--map-root-user"]
     script = ["sh", str(HERE / "two_machines.sh"), environment["ROS_AUTOMATIC_DISCOVERY_RANGE"], sys.executable, str(MODEL)]
     done = subprocess.run(
@@ -84,6 +86,7 @@ def test_another_machine_is_heard_only_when_the_user_asks_for_it(tmp_path, chose
     )  # fmt: skip
     if done.returncode == 3:
         pytest.skip("this kernel has no virtual cables (veth)")
+    assert done.returncode == 0, done.stderr
     at_home, abroad = map(json.loads, done.stdout.splitlines())
     assert at_home["reached"] and at_home["heard"], done.stderr
     assert bool(abroad["reached"]) == bool(abroad["heard"]) == reached

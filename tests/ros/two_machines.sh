@@ -5,14 +5,8 @@ set -eu
 unshare --net sleep 60 &
 other=$!
 ip link set lo up
-# the second network exists a moment after its process does
-tries=0
-until ip link add here type veth peer name there netns "$other" 2>/dev/null && nsenter -t "$other" -n ip link show there >/dev/null 2>&1
-do
-    ip link delete here 2>/dev/null || true
-    tries=$((tries + 1)); [ "$tries" -lt 100 ] || exit 3
-    sleep 0.05
-done
+until [ "$(readlink "/proc/$other/ns/net")" != "$(readlink /proc/self/ns/net)" ]; do sleep 0.02; done
+ip link add here type veth peer name there netns "$other" || exit 3
 ip address add 10.213.7.1/24 dev here && ip link set here up && ip route add 224.0.0.0/4 dev here
 nsenter -t "$other" -n sh -c 'ip link set lo up; ip address add 10.213.7.2/24 dev there; ip link set there up; ip route add 224.0.0.0/4 dev there'
 export FASTDDS_BUILTIN_TRANSPORTS=UDPv4 # shared memory is no cable

@@ -1,47 +1,57 @@
-"""A call in a process of its own, for readers in machine code that trust their file: a damaged one may kill the process."""
+"""Arrays read in a process of its own, for readers in machine code that trust their file: a damaged one may kill the process."""
 
 import multiprocessing
 import resource
-from collections.abc import Callable
-from typing import Any, TypeVar
+from collections.abc import Callable, Mapping
+from tempfile import TemporaryFile
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 
-Result = TypeVar("Result")
+Arrays = Mapping[str, NDArray[Any]]
+FAILED, UNSUPPORTED = 3, 4  # exit codes: the reader refused the file, or its version
 
 
-def in_own_process(call: Callable[[], Result], problem: str) -> Result:
-    """Result of `call`, made in a fork of this process; its exceptions are raised here.
+def arrays_in_own_process(read: Callable[[], Arrays], problem: str) -> Arrays:
+    """What `read` returns, called in a fork of this process; arrays of objects come back as empty arrays of text.
 
-    Raises InputError, beginning with `problem`, where the process dies of it. Where the system cannot fork, the call is made here.
+    Nothing but numbers and texts comes back, in NumPy's own format without pickles, so that the reader cannot be made to hand over
+    anything else. Raises InputError, beginning with `problem`, where it raises or the process dies; NotImplementedError where it
+    raises that. Where the system cannot fork, `read` is called here.
     """
     if "fork" not in multiprocessing.get_all_start_methods():
-        return call()
-    context = multiprocessing.get_context("fork")
-    receive, send = context.Pipe(duplex=False)
-    process = context.Process(target=_answer, args=(call, send), daemon=True)
-    process.start()
-    send.close()
-    try:
-        result, error = receive.recv()
-    except EOFError:
+        return read()
+    with TemporaryFile() as file:
+        process = multiprocessing.get_context("fork").Process(target=_write, args=(read, file), daemon=True)
+        process.start()
         process.join()
-        raise InputError(f"{problem}: it is damaged such that its reader fails") from None
-    finally:
-        receive.close()
-    process.join()
-    if error is not None:
-        raise error
-    return result
+        file.seek(0)
+        if process.exitcode == UNSUPPORTED:
+            raise NotImplementedError
+        if process.exitcode == FAILED:
+            raise InputError(f"{problem}: {file.read().decode()}")
+        if process.exitcode != 0:
+            raise InputError(f"{problem}: it is damaged such that its reader fails")
+        with np.load(file, allow_pickle=False) as found:
+            names, *keys = found.files
+            return dict(zip(found[names].tolist(), (found[key] for key in keys), strict=True))
 
 
-def _answer(call: Callable[[], Any], pipe: Any) -> None:
+def _write(read: Callable[[], Arrays], file: IO[bytes]) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
-        answer = call(), None
-    except Exception as error:
-        answer = None, error
-    try:
-        pipe.send(answer)
-    except Exception as error:  # what was read, or the error, cannot be sent
-        pipe.send((None, ValueError(str(error))))
+        found = read()
+        arrays = (np.empty(0, dtype=str) if array.dtype.hasobject else array for array in found.values())
+        np.savez(file, np.array(list(found), dtype=str), *arrays)
+        file.flush()
+    except NotImplementedError:
+        raise SystemExit(UNSUPPORTED) from None
+    except Exception as error:  # the reader of damaged files raises anything
+        file.seek(0)
+        file.truncate()
+        file.write(" ".join(str(error).split()).encode())
+        file.flush()
+        raise SystemExit(FAILED) from None

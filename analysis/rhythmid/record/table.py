@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.record.compression import largest
-from rhythmid.record.own_process import in_own_process
+from rhythmid.record.own_process import arrays_in_own_process
 from rhythmid.record.text_table import COMPRESSED, TEXT, read_text
 
 SUFFIXES = (".mat", ".npz", ".parquet", *TEXT)
@@ -110,10 +109,12 @@ class Table:
 def _mat(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
-    if not path.exists():
-        raise FileNotFoundError
-    found = in_own_process(partial(loadmat, path, simplify_cells=True), f"{path}: cannot be read as a table")
-    return dict(_flat({name: value for name, value in found.items() if not name.startswith("__")}))
+    def read() -> dict[str, NDArray[Any]]:
+        found = loadmat(path, simplify_cells=True)
+        return dict(_flat({name: value for name, value in found.items() if not name.startswith("__")}))
+
+    with path.open("rb"):  # what cannot be opened is told as of any file
+        return dict(arrays_in_own_process(read, f"{path}: cannot be read as a table"))
 
 
 def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
