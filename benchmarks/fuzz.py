@@ -36,12 +36,21 @@ from rhythmid.errors import InputError
 TIME_LIMIT = 5.0  # s of the processor for one input, of which none is larger than some kB
 PATIENCE = 60.0  # s by the clock: the machine may be busy with other things
 MEMORY_LIMIT = 512  # MiB that one input may take
-ADDRESS_SPACE = 8 << 30  # bytes, beyond which the process gets no memory: this machine has to survive its findings
+ADDRESS_SPACE = (
+    8 << 30
+)  # bytes, beyond which the process gets no memory: this machine has to survive its findings
 WARM_UP = 6  # valid inputs that are read before
 BATCH = 1000  # inputs that one process reads
 LONGEST_LINE = 1500  # characters of a refusal that still is one clear line
 KEPT = 20  # failures of one kind that are listed by number
-FORBIDDEN = ("os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "pickle.find_class", "socket.connect")
+FORBIDDEN = (
+    "os.system",
+    "os.exec",
+    "os.posix_spawn",
+    "subprocess.Popen",
+    "pickle.find_class",
+    "socket.connect",
+)
 
 
 @dataclass
@@ -88,7 +97,9 @@ class Watch:
             self.seen.append(event)
         elif event == "open" and isinstance(arguments[0], (str, bytes)):
             flags = arguments[2] if isinstance(arguments[2], int) else 0
-            if flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT) and not os.fsdecode(arguments[0]).startswith(self.folder):
+            if flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT) and not os.fsdecode(arguments[0]).startswith(
+                self.folder
+            ):
                 self.seen.append(f"writes {os.fsdecode(arguments[0])}")
 
     @contextmanager
@@ -102,7 +113,9 @@ class Watch:
             self.folder = ""
 
 
-def attempt(target: Target, data: bytes, folder: Path, number: int, watch: Watch | None = None) -> tuple[str, str]:
+def attempt(
+    target: Target, data: bytes, folder: Path, number: int, watch: Watch | None = None
+) -> tuple[str, str]:
     """What becomes of an input: ("accepted" or "refused" or "failed", and how it failed)."""
     try:
         if watch is None:
@@ -230,7 +243,9 @@ def campaign(target: Target, seed: int, first: int, count: int, until: float, sc
 
 def table(tallies: dict[str, Tally]) -> str:
     """One line a target, and the failures by kind."""
-    lines = [f"{'target':12}{'inputs':>9}{'refused':>9}{'accepted':>9}{'crashes':>9}{'worst s':>9}{'peak MiB':>9}"]
+    lines = [
+        f"{'target':12}{'inputs':>9}{'refused':>9}{'accepted':>9}{'crashes':>9}{'worst s':>9}{'peak MiB':>9}"
+    ]
     total = Tally()
     for name, tally in tallies.items():
         lines.append(_row(name, tally))

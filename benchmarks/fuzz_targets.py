@@ -23,6 +23,7 @@ from mutation import Mutation, spoil_bytes, spoil_text
 from scipy.io import savemat
 
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
+from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment
 from rhythmid.identify.latency import Latency
 from rhythmid.model import Model
@@ -39,7 +40,6 @@ from rhythmid.record.messages import Messages
 from rhythmid.record.read import read_record
 from rhythmid.record.recover import recover
 from rhythmid.record.signals import Signals
-from rhythmid.errors import InputError
 
 COUNT = 24  # messages and rows of the valid inputs: few, so that damage often strikes what matters
 STAMPS = 5_000_000_000 + np.arange(COUNT, dtype=np.int64) * 1_000_000
@@ -96,7 +96,12 @@ def mcap(compression: CompressionType, chunked: bool = True) -> bytes:
     """The topics as an independent writer of MCAP puts them, without checksums, so that damage reaches the messages."""
     file = io.BytesIO()
     writer = McapWriter(
-        file, chunk_size=2048, compression=compression, use_chunking=chunked, enable_crcs=False, repeat_schemas=False
+        file,
+        chunk_size=2048,
+        compression=compression,
+        use_chunking=chunked,
+        enable_crcs=False,
+        repeat_schemas=False,
     )
     writer.start(profile="ros2", library="")
     definition = standard_types().generate_msgdef(JOINT_STATE, ros_version=2)[0].encode()
@@ -121,7 +126,9 @@ def _spoil_mcap(rng: random.Random, valid: bytes) -> bytes:
     places = list(_records(valid))
     at = rng.choice(places)
     spoilt = bytearray(valid)
-    spoilt[at + 1 : at + 9] = struct.pack("<Q", rng.choice((0, 1, 5, 21, 22, 23, 2**31, 2**60, 2**63, 2**64 - 1)))
+    spoilt[at + 1 : at + 9] = struct.pack(
+        "<Q", rng.choice((0, 1, 5, 21, 22, 23, 2**31, 2**60, 2**63, 2**64 - 1))
+    )
     return bytes(spoilt)
 
 
@@ -138,7 +145,19 @@ def _databases() -> list[bytes]:
         return [(path / "bag.db3").read_bytes()]
 
 
-CELLS = ("NULL", "1", "-1", "9223372036854775807", "'x'", "x'00'", "x'28b52ffd'", "zeroblob(70000)", "1.5", "''", "char(27,0)")
+CELLS = (
+    "NULL",
+    "1",
+    "-1",
+    "9223372036854775807",
+    "'x'",
+    "x'00'",
+    "x'28b52ffd'",
+    "zeroblob(70000)",
+    "1.5",
+    "''",
+    "char(27,0)",
+)
 COLUMNS = {
     "messages": ("id", "topic_id", "timestamp", "data"),
     "topics": ("id", "name", "type", "serialization_format", "offered_qos_profiles"),
@@ -158,7 +177,9 @@ def _spoil_database(rng: random.Random, valid: bytes) -> bytes:
             column = rng.choice(COLUMNS[table])
             cell = rng.choice(CELLS)
             try:
-                database.execute(f"UPDATE {table} SET {column} = {cell} WHERE rowid % {rng.randint(1, 4)} = 0")
+                database.execute(
+                    f"UPDATE {table} SET {column} = {cell} WHERE rowid % {rng.randint(1, 4)} = 0"
+                )
             except sqlite3.Error:
                 continue
         database.commit()
@@ -264,7 +285,12 @@ def _definitions() -> list[bytes]:
 
 
 def _use_definition(data: bytes, folder: Path, number: int) -> None:
-    topic = Topic("/legs", OWN, definition=data.decode("utf-8", "replace"), definition_format=("ros2msg", "ros2idl")[number % 9 == 0])
+    topic = Topic(
+        "/legs",
+        OWN,
+        definition=data.decode("utf-8", "replace"),
+        definition_format=("ros2msg", "ros2idl")[number % 9 == 0],
+    )
     message = _own_message()
     one = np.array([0], dtype=np.int64)
     block = Block(topic, message, one, one + len(message), one)
@@ -322,9 +348,9 @@ def _catalogue() -> Catalogue:
 def _use_signals(data: bytes, folder: Path, number: int) -> None:
     (folder / "run.csv").write_bytes(TABLE)
     (folder / "signals.yaml").write_bytes(data)
-    read_record(folder / "run.csv", Signals.load(folder / "signals.yaml")) if b"run.csv" not in data else read_record(
-        folder / "signals.yaml"
-    )
+    read_record(
+        folder / "run.csv", Signals.load(folder / "signals.yaml")
+    ) if b"run.csv" not in data else read_record(folder / "signals.yaml")
 
 
 def _use_experiment(data: bytes, folder: Path, number: int) -> None:
@@ -386,7 +412,12 @@ def _spoil_npz(rng: random.Random, valid: bytes) -> bytes:
 
 def _mats() -> list[bytes]:
     made = []
-    nested = {**_arrays(), "s": {"q": VALUES, "t": {"u": 1.0}}, "c": np.array([1, "x"], dtype=object), "n": "name"}
+    nested = {
+        **_arrays(),
+        "s": {"q": VALUES, "t": {"u": 1.0}},
+        "c": np.array([1, "x"], dtype=object),
+        "n": "name",
+    }
     for content, options in ((nested, {}), (nested, {"do_compression": True}), (_arrays(), {"format": "4"})):
         file = io.BytesIO()
         savemat(file, content, **options)

@@ -5,7 +5,23 @@ import re
 from collections.abc import Callable, Sequence
 
 Mutation = Callable[[random.Random, bytes], bytes]
-EXTREME = (0, 1, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 2**31 - 1, 2**31, 2**32 - 1, 2**60, 2**63 - 1, 2**63, 2**64 - 1)
+EXTREME = (
+    0,
+    1,
+    0x7F,
+    0x80,
+    0xFF,
+    0x7FFF,
+    0x8000,
+    0xFFFF,
+    2**31 - 1,
+    2**31,
+    2**32 - 1,
+    2**60,
+    2**63 - 1,
+    2**63,
+    2**64 - 1,
+)
 SIZES = (1, 2, 4, 8)  # bytes of the numbers that file formats hold
 PIECE = 64  # bytes that are cut, repeated or inserted at once, at most
 WORD = re.compile(rb"[A-Za-z_][A-Za-z_0-9]*|[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")

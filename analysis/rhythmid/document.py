@@ -11,7 +11,9 @@ import yaml
 
 from rhythmid.errors import InputError
 
-LARGEST = 4 << 20  # characters of a document: a minute's reading; the largest that are written have some thousands
+LARGEST = (
+    4 << 20
+)  # characters of a document: a minute's reading; the largest that are written have some thousands
 MOST_VALUES = 200_000  # of a document, those that aliases repeat counted each time: a few lines of them stand for billions
 LONGEST_PATH = 1024  # characters; as long as YAML lets a plain key be
 

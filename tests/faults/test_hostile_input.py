@@ -98,7 +98,9 @@ def test_a_document_of_many_megabytes_is_not_even_read(tmp_path, bounded):
     assert "is too large" in refusal(lambda: document.read(tmp_path / "model.yaml"))
 
 
-@pytest.mark.parametrize("tag", ["!!timestamp x", "!!int ''", "!!bool x", "!!float ''", "!!python/object/apply:os.system [ls]"])
+@pytest.mark.parametrize(
+    "tag", ["!!timestamp x", "!!int ''", "!!bool x", "!!float ''", "!!python/name:os.system x"]
+)
 def test_a_value_that_its_tag_does_not_fit_is_refused_with_its_line(tag):
     assert refusal(lambda: document.parse(f"a: 1\nb: {tag}", "model.yaml")).startswith("model.yaml:2")
 
@@ -118,7 +120,9 @@ def test_metadata_that_names_anything_else_is_damaged_metadata(listed, tmp_path)
     bag = write_bag(tmp_path / "bag", {"/a": Messages(np.arange(9), np.arange(9.0))})
     (bag / "metadata.yaml").write_text(f"rosbag2_bagfile_information: {{relative_file_paths: {listed}}}")
     found = Bag(bag)
-    assert [file.name for file in found.files] == ["bag.mcap"] and "metadata.yaml is damaged" in found.notes[0]
+    assert [file.name for file in found.files] == ["bag.mcap"] and "metadata.yaml is damaged" in found.notes[
+        0
+    ]
 
 
 def test_files_are_put_in_order_whatever_digits_their_names_hold(tmp_path):
@@ -128,7 +132,13 @@ def test_files_are_put_in_order_whatever_digits_their_names_hold(tmp_path):
 
 
 def chunk(plain_size: int, method: bytes, packed: bytes) -> bytes:
-    body = struct.pack("<QQQI", 0, 0, plain_size, 0) + struct.pack("<I", len(method)) + method + struct.pack("<Q", len(packed)) + packed
+    body = (
+        struct.pack("<QQQI", 0, 0, plain_size, 0)
+        + struct.pack("<I", len(method))
+        + method
+        + struct.pack("<Q", len(packed))
+        + packed
+    )
     return b"\x89MCAP0\r\n" + b"\x06" + struct.pack("<Q", len(body)) + body
 
 
@@ -146,7 +156,9 @@ def test_a_chunk_that_would_fill_the_memory_is_skipped_and_told(method, tmp_path
 def test_a_packed_bag_that_would_fill_the_disk_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(compression, "HARMLESS", 1 << 20)
     (tmp_path / "bomb.mcap.zstd").write_bytes(compress(ZEROS * 64))
-    assert "cannot be decompressed: it holds more than" in refusal(lambda: list(Bag(tmp_path / "bomb.mcap.zstd").blocks()))
+    assert "cannot be decompressed: it holds more than" in refusal(
+        lambda: list(Bag(tmp_path / "bomb.mcap.zstd").blocks())
+    )
 
 
 @pytest.mark.parametrize("size", [0, 21, 2**60, 2**64 - 1])
@@ -205,7 +217,11 @@ def own(definition: str) -> Topic:
         "float64[99999999999] angles\n",
         "float64[0] nothing\n",
         "Leg[] legs\n" + "=" * 80 + "\nMSG: robot_msgs/Leg\nfloat64[0] angle\n",
-        "Leg[9000] legs\n" + "=" * 80 + "\nMSG: robot_msgs/Leg\nToe[9000] toes\n" + "=" * 80 + "\nMSG: robot_msgs/Toe\nint64[9] a\n",
+        "Leg[9000] legs\n"
+        + "=" * 80
+        + "\nMSG: robot_msgs/Leg\nToe[9000] toes\n"
+        + "=" * 80
+        + "\nMSG: robot_msgs/Toe\nint64[9] a\n",
     ],
 )
 def test_types_that_no_message_could_have_are_refused(definition, bounded):
@@ -297,6 +313,7 @@ def test_one_long_cell_does_not_make_all_others_as_long(tmp_path, bounded):
 def test_a_forcing_too_fast_to_be_followed_is_refused(tmp_path, bounded):
     (tmp_path / "run.csv").write_text("t,y\n" + "".join(f"{k},{k % 7}\n" for k in range(50)))
     signals = Signals.from_text(
-        "time: {column: t}\noutput: {column: y}\nforcing: {amplitude: 1, frequency: 1.0e9}", tmp_path / "signals.yaml"
+        "time: {column: t}\noutput: {column: y}\nforcing: {amplitude: 1, frequency: 1.0e9}",
+        tmp_path / "signals.yaml",
     )
     assert "cannot be followed" in refusal(lambda: read_record(tmp_path / "run.csv", signals))

@@ -17,7 +17,16 @@ from rhythmid_bringup.environment import run_environment
 HERE = Path(__file__).parent
 MODEL = HERE.parents[1] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"
 STRANGER = [sys.executable, str(HERE / "stranger.py")]
-PLANT = [sys.executable, "-m", "rhythmid_nodes.plant", "--ros-args", "-r", "__ns:=/hopper", "-p", f"model:={MODEL}"]
+PLANT = [
+    sys.executable,
+    "-m",
+    "rhythmid_nodes.plant",
+    "--ros-args",
+    "-r",
+    "__ns:=/hopper",
+    "-p",
+    f"model:={MODEL}",
+]
 REASON = isolation.why_not()
 needs_namespaces = pytest.mark.skipif(REASON is not None, reason=f"no namespaces here: {REASON}")
 
@@ -69,7 +78,9 @@ def test_an_isolated_run_leaves_its_bag(tmp_path, monkeypatch):
     assert (tmp_path / "bag" / "metadata.yaml").is_file()
 
 
-@pytest.mark.skipif(shutil.which("ip") is None or shutil.which("nsenter") is None, reason="iproute2 or nsenter is missing")
+@pytest.mark.skipif(
+    shutil.which("ip") is None or shutil.which("nsenter") is None, reason="iproute2 or nsenter is missing"
+)
 @needs_namespaces
 @pytest.mark.parametrize(("chosen", "reached"), [("", False), ("SUBNET", True)])
 def test_another_machine_is_heard_only_when_the_user_asks_for_it(tmp_path, chosen, reached):
@@ -79,7 +90,13 @@ def test_another_machine_is_heard_only_when_the_user_asks_for_it(tmp_path, chose
     environment = run_environment(given, 77, tmp_path)
     del environment["RHYTHMID_SUPERVISOR"]  # its child is a shell
     user = [] if os.geteuid() == 0 else ["--user", "--map-root-user"]
-    script = ["sh", str(HERE / "two_machines.sh"), environment["ROS_AUTOMATIC_DISCOVERY_RANGE"], sys.executable, str(MODEL)]
+    script = [
+        "sh",
+        str(HERE / "two_machines.sh"),
+        environment["ROS_AUTOMATIC_DISCOVERY_RANGE"],
+        sys.executable,
+        str(MODEL),
+    ]
     done = subprocess.run(
         ["unshare", *user, "--net", "--", *script, STRANGER[1]],
         env=environment, capture_output=True, text=True, check=False, timeout=120,
@@ -95,7 +112,10 @@ def test_another_machine_is_heard_only_when_the_user_asks_for_it(tmp_path, chose
 def test_a_machine_without_the_program_is_told_in_one_line(monkeypatch):
     monkeypatch.setenv("PATH", "/nowhere")
     done = subprocess.run(
-        [sys.executable, "-m", "rhythmid_bringup.isolation", "true"], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "rhythmid_bringup.isolation", "true"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 2 and done.stderr.count("\n") == 1
     assert "unshare (util-linux) is missing" in done.stderr

@@ -174,6 +174,7 @@ def _forward(value: Array) -> bool:
     return bool(value[-1] > value[0]) and float(np.mean(step >= 0.0)) >= FORWARD
 
 
+@np.errstate(over="ignore", invalid="ignore")  # numbers near the largest are no times
 def _table_clock(path: Path, columns: list[tuple[str, Array]]) -> tuple[Clock, str]:
     """The column that holds the time. Raises InputError where there is none."""
     for name, value in columns:

@@ -20,7 +20,9 @@ from rhythmid.record.mcap_writer import CHANNEL, CHUNK, FOOTER, MAGIC, MESSAGE, 
 
 _head = struct.Struct("<BQ")
 _FOOTER_SIZE = 9 + 8 + 8 + 4
-_MESSAGE_HEAD = 2 + 4 + 8 + 8  # bytes of channel, sequence number and two times in front of the message's data
+_MESSAGE_HEAD = (
+    2 + 4 + 8 + 8
+)  # bytes of channel, sequence number and two times in front of the message's data
 _MESSAGE_BATCH = 100_000  # messages that lie outside of chunks are handed out in blocks of at most this many
 
 

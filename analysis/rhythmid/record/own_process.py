@@ -1,5 +1,6 @@
 """Arrays read in a process of its own, for readers in machine code that trust their file: a damaged one may kill the process."""
 
+import faulthandler
 import multiprocessing
 import resource
 from collections.abc import Callable, Mapping
@@ -42,6 +43,7 @@ def arrays_in_own_process(read: Callable[[], Arrays], problem: str) -> Arrays:
 
 def _write(read: Callable[[], Arrays], file: IO[bytes]) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    faulthandler.disable()  # the parent tells of it, in one line
     try:
         found = read()
         arrays = (np.empty(0, dtype=str) if array.dtype.hasobject else array for array in found.values())

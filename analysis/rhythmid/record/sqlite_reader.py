@@ -73,7 +73,9 @@ class SqliteReader:
     def _read(self, path: Path, mode: str, wanted: Wanted) -> Iterator[Block]:
         with closing(sqlite3.connect(f"{path.absolute().as_uri()}?{mode}", uri=True)) as database:
             database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST_ROW)
-            database.execute("PRAGMA trusted_schema = OFF")  # no function with side effects, should its schema call one
+            database.execute(
+                "PRAGMA trusted_schema = OFF"
+            )  # no function with side effects, should its schema call one
             numbered = _topics(database)
             self.topics = {topic.name: topic for topic in numbered.values()}
             chosen = {number: topic for number, topic in numbered.items() if wanted(topic)}

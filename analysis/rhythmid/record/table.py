@@ -140,7 +140,9 @@ def _npz(path: Path) -> dict[str, Any]:
 def _check_size(path: Path, size: int) -> None:
     """Raise InputError where a file claims to hold more bytes than its own size allows."""
     if size > largest(path.stat().st_size):
-        raise InputError(f"{path}: claims to hold {size} bytes in {path.stat().st_size}: no such table is read")
+        raise InputError(
+            f"{path}: claims to hold {size} bytes in {path.stat().st_size}: no such table is read"
+        )
 
 
 def _parquet(path: Path) -> dict[str, Any]:

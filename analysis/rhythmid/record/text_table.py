@@ -227,7 +227,9 @@ def _check_size(path: Path) -> None:
         while piece := file.read(SAMPLE):
             size += len(piece)
             if size > most:
-                raise InputError(f"{path}: holds more than {most} bytes in {path.stat().st_size}: no such table is read")
+                raise InputError(
+                    f"{path}: holds more than {most} bytes in {path.stat().st_size}: no such table is read"
+                )
 
 
 def _opened(path: Path, encoding: str) -> TextIO:

@@ -29,7 +29,9 @@ def add(app: typer.Typer) -> None:
         ] = None,
         isolated: Annotated[
             bool,
-            typer.Option("--isolated", help="Give the nodes a network of their own: nobody else reaches them."),
+            typer.Option(
+                "--isolated", help="Give the nodes a network of their own: nobody else reaches them."
+            ),
         ] = False,
     ) -> None:
         """Run the graph of an experiment: starts, watches and stops its nodes and leaves a bag."""

@@ -32,7 +32,9 @@ _INSIDE = "--inside"  # first argument of this module once it runs within the na
 def isolated(command: Sequence[str]) -> list[str]:
     """The command line that runs `command` isolated. Raises InputError where this machine does not allow it, with the reason."""
     if (reason := why_not()) is not None:
-        raise InputError(f"nodes cannot be isolated on this machine: {reason}; use a container with a network of its own")
+        raise InputError(
+            f"nodes cannot be isolated on this machine: {reason}; use a container with a network of its own"
+        )
     return [*_unshare(), sys.executable, "-m", _MODULE, _INSIDE, *command]
 
 
@@ -41,7 +43,10 @@ def why_not() -> str | None:
     if shutil.which("unshare") is None:
         return "the program unshare (util-linux) is missing"
     tried = subprocess.run(
-        [*_unshare(), "mount", "-t", "tmpfs", "tmpfs", "/dev/shm"], capture_output=True, text=True, check=False
+        [*_unshare(), "mount", "-t", "tmpfs", "tmpfs", "/dev/shm"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     return None if tried.returncode == 0 else " ".join(tried.stderr.split()) or "unshare failed"
 
