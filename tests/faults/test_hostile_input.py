@@ -16,7 +16,8 @@ import lz4.frame
 import numpy as np
 import pytest
 from fuzz import MEMORY_LIMIT, Watch, attempt
-from fuzz_targets import OWN, TARGETS
+from fuzz_bags import OWN
+from fuzz_targets import TARGETS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
@@ -26,9 +27,11 @@ from rhythmid.errors import LONGEST, InputError
 from rhythmid.record import compression
 from rhythmid.record.bag import Bag
 from rhythmid.record.bag_writer import write_bag
-from rhythmid.record.block import Topic
+from rhythmid.record.block import Block, Topic
+from rhythmid.record.columns import read_columns
 from rhythmid.record.compression import compress
 from rhythmid.record.field import Field
+from rhythmid.record.inventory import inventory
 from rhythmid.record.message_types import stamp_path, type_fields, typestore
 from rhythmid.record.messages import Messages
 from rhythmid.record.read import read_record
@@ -251,6 +254,15 @@ def test_a_position_is_no_number_of_any_length(text):
     assert isinstance(Field.parse(text).steps[1], tuple)
 
 
+def test_a_truth_value_of_any_byte_is_one_or_zero_by_either_way_of_reading():
+    topic, data = own("bool on\n"), b"\0\1\0\0\x08"
+    place = np.array([0])
+    block = Block(topic, data, place, place + len(data), place)
+    field = Field.parse("on")
+    for direct in (True, False):
+        assert read_columns([block], {topic.name: [field]}, direct)[topic.name].values[field] == [1.0]
+
+
 # Tables
 
 
@@ -305,6 +317,12 @@ def test_one_long_cell_does_not_make_all_others_as_long(tmp_path, bounded):
     rows = b"".join(b"%d,a\n" % k for k in range(20_000))
     (tmp_path / "a.csv").write_bytes(b"t,note\n" + b"0," + b"x" * 100_000 + b"\n" + rows)
     assert len(Table.load(tmp_path / "a.csv").columns["note"]) == 20_001
+
+
+def test_numbers_near_the_largest_are_no_time(tmp_path, recwarn):
+    (tmp_path / "a.csv").write_text("q,u\n" + "".join(f"{k}e200,{k % 7}\n" for k in range(1, 50)))
+    assert "goes forward like a time" in refusal(lambda: inventory(tmp_path / "a.csv"))
+    assert not recwarn.list
 
 
 # Records

@@ -21,7 +21,7 @@ HEAD = 4  # bytes of encapsulation in front of every message; alignment counts f
 LITTLE_ENDIAN = 0x0100  # the first two of them, plain CDR in little-endian byte order, read as a number
 _PARTS_AT_MOST = 1000  # a message with more sub-messages and strings in its lists is not laid out
 NUMBERS = {
-    "bool": "u1", "byte": "u1", "char": "u1", "octet": "u1", "int8": "i1", "uint8": "u1", "int16": "<i2", "uint16": "<u2",
+    "bool": "?", "byte": "u1", "char": "u1", "octet": "u1", "int8": "i1", "uint8": "u1", "int16": "<i2", "uint16": "<u2",
     "int32": "<i4", "uint32": "<u4", "int64": "<i8", "uint64": "<u8", "float32": "<f4", "float64": "<f8",
 }  # fmt: skip
 
