@@ -6,6 +6,7 @@ import random
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from fuzz_inputs import COUNT, VALUES
@@ -63,7 +64,12 @@ def mats() -> list[bytes]:
         "c": np.array([1, "x"], dtype=object),
         "n": "name",
     }
-    for content, options in ((nested, {}), (nested, {"do_compression": True}), (_arrays(), {"format": "4"})):
+    kinds: tuple[tuple[dict[str, Any], dict[str, Any]], ...] = (
+        (nested, {}),
+        (nested, {"do_compression": True}),
+        (_arrays(), {"format": "4"}),
+    )
+    for content, options in kinds:
         file = io.BytesIO()
         savemat(file, content, **options)
         made.append(file.getvalue())

@@ -38,8 +38,11 @@ class Field:
                     f"field {text!r} is not a path such as effort[leg], data[3] or wrench.force.z"
                 )
             name, entry = match.groups()
-            position = entry is not None and entry.isdecimal() and len(entry) <= LONGEST_POSITION
-            steps.append(name if name else int(entry) if position else (entry,))
+            if name:
+                steps.append(name)
+            else:
+                position = entry.isdecimal() and len(entry) <= LONGEST_POSITION
+                steps.append(int(entry) if position else (entry,))
             at = match.end()
         if not steps:
             raise InputError(
