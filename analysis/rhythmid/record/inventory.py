@@ -111,6 +111,7 @@ def inventory(source: str | Path, rate: float | None = None) -> Inventory:
     return _of_bag(Bag(source))
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of numbers near the largest, and NaN of every kind
 def _of_table(table: Table, rate: float | None) -> Inventory:
     columns = list(_vectors(table))
     if not columns:
@@ -174,7 +175,6 @@ def _forward(value: Array) -> bool:
     return bool(value[-1] > value[0]) and float(np.mean(step >= 0.0)) >= FORWARD
 
 
-@np.errstate(over="ignore", invalid="ignore")  # numbers near the largest are no times
 def _table_clock(path: Path, columns: list[tuple[str, Array]]) -> tuple[Clock, str]:
     """The column that holds the time. Raises InputError where there is none."""
     for name, value in columns:
