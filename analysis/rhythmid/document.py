@@ -1,6 +1,6 @@
 """A YAML document that remembers where each value stands, so that a complaint can name file and line."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -9,6 +9,12 @@ from typing import Any, NoReturn
 import yaml
 
 from rhythmid.errors import InputError
+
+LARGEST = (
+    4 << 20
+)  # characters of a document: a minute's reading; the largest that are written have some thousands
+MOST_VALUES = 200_000  # of a document, those that aliases repeat counted each time: a few lines of them stand for billions
+LONGEST_PATH = 1024  # characters; as long as YAML lets a plain key be
 
 
 @dataclass(frozen=True)
@@ -77,11 +83,21 @@ def as_node(plain: Any, name: str, path: str = "") -> Node:
 
 
 def _node(
-    raw: yaml.Node | None, name: str, path: str, loader: yaml.SafeLoader, line: int | None = None
+    raw: yaml.Node | None,
+    name: str,
+    path: str,
+    loader: yaml.SafeLoader,
+    left: Iterator[int],
+    line: int | None = None,
 ) -> Node:
-    """`line` is where the key of this value stands: the value itself may begin further down."""
+    """`line` is where the key of this value stands: the value itself may begin further down. `left` counts down the values
+    that the document may still hold."""
     if raw is None:
         return Node(None, name, path)
+    if len(path) > LONGEST_PATH:
+        raise InputError(f"{name}: is nested too deeply, or has a key of more than {LONGEST_PATH} characters")
+    if next(left, None) is None:
+        raise InputError(f"{name}: holds more than {MOST_VALUES} values, those of aliases included")
     place = f"{name}:{(raw.start_mark.line if line is None else line) + 1}"
     if isinstance(raw, yaml.MappingNode):
         found: dict[str, Node] = {}
@@ -90,7 +106,7 @@ def _node(
                 raise InputError(f"{name}:{key_node.start_mark.line + 1}: a key is a single word")
             key = str(key_node.value)
             inner = _node(
-                value_node, name, f"{path}.{key}" if path else key, loader, key_node.start_mark.line
+                value_node, name, f"{path}.{key}" if path else key, loader, left, key_node.start_mark.line
             )
             if key in found:
                 inner.fail("is given twice")
@@ -98,20 +114,24 @@ def _node(
         return Node(found, place, path)
     if isinstance(raw, yaml.SequenceNode):
         return Node(
-            [_node(item, name, f"{path}[{i}]", loader) for i, item in enumerate(raw.value)], place, path
+            [_node(item, name, f"{path}[{i}]", loader, left) for i, item in enumerate(raw.value)], place, path
         )
     try:
         return Node(loader.construct_object(raw), place, path)
     except ValueError as error:  # a date that does not exist, say
         raise InputError(f"{place}: {path}: {error}") from None
+    except (LookupError, AttributeError, TypeError, OverflowError):
+        raise InputError(f"{place}: {path}: {raw.value!r} is no {raw.tag.rsplit(':', 1)[-1]}") from None
 
 
 def parse(text: str, name: str) -> Node:
     """The document in `text`; `name` stands for it in messages. Raises InputError when it is not YAML."""
+    if len(text) > LARGEST:
+        raise InputError(f"{name}: is too large: {len(text)} characters, {LARGEST} are the most")
     try:
         loader = yaml.SafeLoader(text)
         try:
-            return _node(loader.get_single_node(), name, "", loader)
+            return _node(loader.get_single_node(), name, "", loader, iter(range(MOST_VALUES)))
         finally:
             loader.dispose()
     except yaml.YAMLError as error:
@@ -126,7 +146,8 @@ def parse(text: str, name: str) -> Node:
 def read(path: str | Path) -> Node:
     """The document in the file `path`. Raises InputError when it cannot be read or is not YAML."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        with Path(path).open(encoding="utf-8") as file:
+            text = file.read(LARGEST + 1)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "is not a text file"
         raise InputError(f"{path}: cannot be read: {reason}") from None

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import yaml
-
+from rhythmid import document
 from rhythmid.errors import InputError
 from rhythmid.record.block import Block, Topic, Wanted
 from rhythmid.record.compression import decompress_file
@@ -62,26 +61,31 @@ class Bag:
 
     def _files_of_directory(self) -> list[Path]:
         metadata = self.path / "metadata.yaml"
-        present = [file for file in self.path.iterdir() if file.name.endswith(SUFFIXES)]
+        present = [file for file in self.path.iterdir() if file.name.endswith(SUFFIXES) and file.is_file()]
         if not present:
             raise InputError(f"{self.path}: holds no recording (no {' or '.join(SUFFIXES[:2])} file)")
         present.sort(
-            key=lambda file: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", file.name)]
+            key=lambda file: [
+                int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", file.name)
+            ]
         )
         if not metadata.is_file():
             self.notes.append("metadata.yaml is missing: the recorder was not closed")
             return present
         try:
-            listed = yaml.safe_load(metadata.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
+            listed = document.read(metadata).plain["rosbag2_bagfile_information"]
             files = [self.path / Path(name).name for name in listed["relative_file_paths"]]
+            if not all(file.name.endswith(SUFFIXES) for file in files):
+                raise ValueError("names other files than recordings")
+            missing = [file.name for file in files if not file.is_file()]
             self.stated = {
                 str(topic["topic_metadata"]["name"]): int(topic["message_count"])
                 for topic in listed["topics_with_message_count"]
             }
-        except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError):
             self.notes.append("metadata.yaml is damaged: all storage files of the directory were read")
             return present
-        if missing := [file.name for file in files if not file.is_file()]:
+        if missing:
             raise InputError(f"{self.path}: {missing[0]}, which metadata.yaml lists, is missing")
         return files
 

@@ -29,6 +29,9 @@ from rhythmid.record.mcap_damage import (
 from rhythmid.record.mcap_writer import CHANNEL, CHUNK, FOOTER, MAGIC, MESSAGE, SCHEMA
 
 _head = struct.Struct("<BQ")
+_MESSAGE_HEAD = (
+    2 + 4 + 8 + 8
+)  # bytes of channel, sequence number and two times in front of the message's data
 _MESSAGE_BATCH = 100_000  # messages that lie outside of chunks are handed out in blocks of at most this many
 
 
@@ -100,7 +103,8 @@ class McapReader:
             if following > end or (len(found) >= _MESSAGE_BATCH and data is self._data):
                 break
             if op == MESSAGE:
-                add(at)
+                if size >= _MESSAGE_HEAD:  # a shorter one is none
+                    add(at)
             elif op == SCHEMA:
                 self._declare_schema(bytes(data[at + 9 : following]))
             elif op == CHANNEL:
@@ -115,7 +119,7 @@ class McapReader:
             return
         at = np.array(found, dtype=np.int64)
         topics = {number: topic for number, topic in self._channels.items() if wanted(topic)}
-        size = gather(data, at + 1, "<i8") - 22
+        size = gather(data, at + 1, "<i8") - _MESSAGE_HEAD
         log_ns = gather(data, at + 15, "<i8")
         yield from by_topic(topics, gather(data, at + 9, "<u2"), data, at + 31, size, log_ns)
 

@@ -16,7 +16,9 @@ from rhythmid.errors import InputError
 from rhythmid.record.block import Block, Topic, Wanted, by_topic
 from rhythmid.record.sqlite_damage import next_readable, wrong_checksums
 
-_ROWS = 50_000  # rows fetched at once
+_ROWS = 50_000  # rows fetched at once,
+_BYTES = 64 << 20  # and bytes, behind which no further one is fetched
+_LARGEST_ROW = 256 << 20  # bytes; sqlite's own limit is larger, and a database may compute its rows
 
 
 class SqliteReader:
@@ -72,11 +74,15 @@ class SqliteReader:
 
     def _read(self, path: Path, mode: str, wanted: Wanted) -> Iterator[Block]:
         with closing(sqlite3.connect(f"{path.absolute().as_uri()}?{mode}", uri=True)) as database:
+            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST_ROW)
+            database.execute(
+                "PRAGMA trusted_schema = OFF"
+            )  # no function with side effects, should its schema call one
             numbered = _topics(database)
             self.topics = {topic.name: topic for topic in numbered.values()}
             chosen = {number: topic for number, topic in numbered.items() if wanted(topic)}
             rows = self._rows(database, ",".join(map(str, chosen)))
-            while batch := self._messages(list(islice(rows, _ROWS))):
+            while batch := self._messages(_batch(rows)):
                 number, log_ns, data = zip(*batch, strict=True)
                 size = np.fromiter(map(len, data), dtype=np.int64, count=len(data))
                 start = np.cumsum(size) - size
@@ -125,6 +131,18 @@ class SqliteReader:
         return {}
 
 
+def _batch(rows: Iterator[tuple[int, int, bytes]]) -> list[tuple[int, int, bytes]]:
+    """The next rows, as many as memory may hold at once."""
+    batch: list[tuple[int, int, bytes]] = []
+    fetched = 0
+    for row in islice(rows, _ROWS):
+        batch.append(row)
+        fetched += len(row[2]) if isinstance(row[2], bytes) else 0
+        if fetched > _BYTES:
+            break
+    return batch
+
+
 def _sizes_by_header(head: bytes) -> tuple[int, int]:
     """Sizes [bytes] of a page and of the whole database by the first 32 of its bytes (https://sqlite.org/fileformat.html)."""
     if len(head) < 32:
@@ -141,7 +159,10 @@ def _topics(database: sqlite3.Connection) -> dict[int, Topic]:
     definitions: dict[str, tuple[str, str]] = {}
     if "message_definitions" in tables:
         query = "SELECT topic_type, encoded_message_definition, encoding FROM message_definitions"
-        definitions = {name: (definition, form) for name, definition, form in database.execute(query)}
+        rows = list(database.execute(query))
+        if any({*map(type, row)} != {str} for row in rows):
+            raise sqlite3.DatabaseError("its table 'message_definitions' holds no texts")
+        definitions = {name: (definition, form) for name, definition, form in rows}
     stored = {column[1] for column in database.execute("PRAGMA table_info(topics)")}
     qos = "offered_qos_profiles" if "offered_qos_profiles" in stored else "''"
     query = f"SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id"
