@@ -44,6 +44,7 @@ class Rows:
     unseen : separate series that no fit sees.
     noise : noise model under which residuals are whitened.
     record : (n,) record of each row: the seen rows first, then the hidden ones, then those of separate series.
+    spread : (n,) relative standard deviation of the noise of each row, see `Series`.
     blocks : blocks of the rows.
     size : rms of what errors are a share of, over all rows.
     heldout_size : the same over the rows that no fit sees; 0 without any.
@@ -54,6 +55,7 @@ class Rows:
     unseen: tuple[Series, ...]
     noise: NoiseModel
     record: Whole
+    spread: Array
     blocks: Blocks
     size: float
     heldout_size: float = 0.0
@@ -77,6 +79,7 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
     names = list(dict.fromkeys(record_of(one) for one in series))
     other_names = list(dict.fromkeys(record_of(one) for one in unseen))
     lengths: list[tuple[int, int]] = []
+    spread: list[Array] = []
     power, total, held_power, held_total = 0.0, 0, 0.0, 0
     for parts, group, first in (
         (seen, series, 0),
@@ -90,6 +93,7 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
             mask = np.zeros(one.blocks, bool)
             for part in slices:
                 mask[part] = True
+                spread.append(one.spread_of(part))
             power, total = power + one.power(mask), total + count
             if group is unseen or parts is hidden:
                 held_power, held_total = held_power + one.power(mask), held_total + count
@@ -101,20 +105,21 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
         tuple(unseen),
         noise,
         record,
+        np.concatenate(spread),
         Blocks.of(record, noise.order, held),
         float(np.sqrt(power / max(total, 1))),
         float(np.sqrt(held_power / max(held_total, 1))),
     )
 
 
-def _stretched(rows: Rows, values: Sequence[Array], which: tuple[tuple[slice, ...], ...]) -> list[Array]:
-    return [value[part] for value, parts in zip(values, which) for part in parts]
-
-
 def linearised(fit: Fit, rows: Rows) -> Linearised:
     """A fit on the rows: what it leaves of each, and how what it saw depends on its parameters."""
     unseen = [_of_unseen(fit, rows)] if rows.unseen else []
-    hidden = [rows.noise.whiten(part) for part in _stretched(rows, fit.residuals, rows.hidden)]
+    hidden = [
+        rows.noise.whiten(one.levelled(residual[part], part))
+        for one, residual, parts in zip(fit.run.series, fit.residuals, rows.hidden)
+        for part in parts
+    ]
     residual = np.concatenate([fit.linearisation.residual, *hidden, *unseen])
     jacobian = np.zeros((len(residual), len(fit.names)))
     jacobian[: len(fit.linearisation.residual)] = fit.linearisation.jacobian
@@ -136,7 +141,7 @@ def _of_unseen(fit: Fit, rows: Rows) -> Array:
     except InputError:
         return np.concatenate(
             [
-                rows.noise.whiten(one.averaged[part] - one.averaged.mean())
+                rows.noise.whiten(one.levelled(one.averaged[part] - one.averaged.mean(), part))
                 for one in rows.unseen
                 for part in _long_enough(one, rows.noise)
             ]
@@ -166,7 +171,7 @@ def measured_errors(error: Array, rows: Rows) -> Array:
     for length in lengths:
         made.append(rows.noise.colour(error[first : first + length]))
         first += length
-    return np.concatenate(made)
+    return rows.spread * np.concatenate(made)
 
 
 def contend(

@@ -21,6 +21,7 @@ from rhythmid.diagnose.contenders import Rows, linearised
 from rhythmid.diagnose.evidence import CrossValidated, Linearised, cross_validate
 from rhythmid.diagnose.search.score_tests import Trajectories, residual_line
 from rhythmid.identify.output_error import Fit
+from rhythmid.identify.series import Series
 from rhythmid.simulation.signal import first_order_hold
 
 Array = NDArray[np.float64]
@@ -180,8 +181,9 @@ class Reach:
         return hidden - self.starts / norms @ taken
 
 
-def _white(rows: Rows, values: Array, parts: Sequence[slice]) -> Array:
-    return np.concatenate([rows.noise.whiten(values[part]) for part in parts] or [values[:0]])
+def _white(rows: Rows, one: Series, values: Array, parts: Sequence[slice]) -> Array:
+    white = [rows.noise.whiten(one.levelled(values[part], part)) for part in parts]
+    return np.concatenate(white or [values[:0]])
 
 
 def reach_of(fit: Fit, rows: Rows, pool: ThreadPoolExecutor | None = None) -> list[Reach]:
@@ -198,7 +200,7 @@ def reach_of(fit: Fit, rows: Rows, pool: ThreadPoolExecutor | None = None) -> li
         for column, output in enumerate(outputs):
             if output is not None:
                 change[:, column] = (output[index] - series.averaged - residual) / scale[column]
-        seen, hidden = (_white(rows, change, which[index]) for which in (rows.seen, rows.hidden))
+        seen, hidden = (_white(rows, series, change, which[index]) for which in (rows.seen, rows.hidden))
         plain = Reach(hidden[:, :p], hidden[:, p:], seen[:, p:])
         found.append(Reach(plain.refitted(seen[:, :p], hidden[:, :p]), plain.starts, plain.seen))
     return found
@@ -218,9 +220,10 @@ def beside(fit: Fit, base: Linearised, one: FreeMap, rows: Rows, reach: Sequence
     seen, hidden = [], []
     for index, basis in enumerate(fit.linearisation.bases):
         columns = np.column_stack([column[index] for column in one.columns])
-        white = _white(rows, columns, rows.seen[index])
+        series = fit.run.series[index]
+        white = _white(rows, series, columns, rows.seen[index])
         seen.append(white - basis @ (basis.T @ white))
-        hidden.append(reach[index].refitted(white, _white(rows, columns, rows.hidden[index])))
+        hidden.append(reach[index].refitted(white, _white(rows, series, columns, rows.hidden[index])))
     added = np.concatenate([*seen, *hidden])
     wide = np.zeros((len(base.residual), added.shape[1]))
     wide[: len(added)] = added

@@ -10,7 +10,7 @@ CLOCKS_APART = 1.0
 
 def clock_notes(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) -> tuple[str, ...]:
     """Notes on the clocks of channels by role; `clocks` says whether their times are those of `header` or `receive`."""
-    return (*_different(channels), *_assumed(channels, clocks))
+    return (*_different(channels), *_assumed(channels, clocks), *_jittered(channels))
 
 
 def _different(channels: Mapping[str, ChannelQuality]) -> tuple[str, ...]:
@@ -34,4 +34,14 @@ def _assumed(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) 
     return (
         f"assumed: {received} (time of receipt) and {' and '.join(stamped)} (stamps) share one clock; the stamps are at least "
         f"{1e3 * least:.3g} ms older than their receipt, and an offset between the clocks counts as delay",
+    )
+
+
+def _jittered(channels: Mapping[str, ChannelQuality]) -> tuple[str, ...]:
+    """A note for a channel whose stamps are out by so much that its noise grows with the slope of the signal."""
+    return tuple(
+        f"{role}: the stamps jitter by {1e3 * channel.stamp_jitter:.3g} ± {1e3 * channel.stamp_jitter_std:.1g} ms; samples count for "
+        "less the faster the signal changes"
+        for role, channel in channels.items()
+        if channel.stamp_jitter is not None and channel.stamp_jitter_std is not None
     )

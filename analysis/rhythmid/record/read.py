@@ -18,6 +18,7 @@ from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality, clipped, resolution
 from rhythmid.record.record import SHORTEST, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
+from rhythmid.record.stamp_jitter import stamp_jitter
 from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
 from rhythmid.record.timing import Timing, put_in_order
 from rhythmid.record.unit_notes import unit_notes
@@ -251,6 +252,7 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
                 f"{label}: {conflicts} of {len(samples.time)} samples have the time of another one with another value: "
                 f"two publishers, a clock set back or too coarse stamps; {mend}"
             )
+        jitter = stamp_jitter([(time[~absent], value[~absent])]) if role == "output" else None
         judged[role] = ChannelQuality(
             str(samples.source),
             timing,
@@ -262,6 +264,8 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
             lateness_max=None if samples.lateness is None else float(samples.lateness.max()),
             lateness_min=None if samples.lateness is None else float(samples.lateness.min()),
             lateness_std=None if samples.lateness is None else float(samples.lateness.std()),
+            stamp_jitter=None if jitter is None else jitter.std,
+            stamp_jitter_std=None if jitter is None else jitter.uncertainty,
             resolution=resolution(value[~absent]),
         )
         channels[role] = Channel(time[~absent], value[~absent], samples.source.unit, str(samples.source))

@@ -90,7 +90,11 @@ def noise_without(fit: Fit, changes: Sequence[Change], most: int = 60) -> NoiseM
         share = samples / max(samples - int(rank), 1)
         for i, r in enumerate(residuals):
             r += np.column_stack([c.outputs[i] for c in picked]) @ solution
-    stretches = [r[s] * math.sqrt(share) for r, one in zip(residuals, fit.run.series) for s in runs(one.used)]
+    stretches = [
+        one.levelled(r[s], s) * math.sqrt(share)
+        for r, one in zip(residuals, fit.run.series)
+        for s in runs(one.used)
+    ]
     return estimate_noise(stretches, floor=fit.noise.std * 1e-6)
 
 

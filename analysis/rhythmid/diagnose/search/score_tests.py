@@ -226,7 +226,8 @@ def whitened(fit: Fit, samples: Sequence[Array], noise: NoiseModel) -> list[Arra
     """Used stretches of each series, whitened and joined."""
     found = []
     for one, given in zip(fit.run.series, samples):
-        parts = [noise.whiten(given[s]) for s in runs(one.used) if s.stop - s.start > noise.order + 1]
+        stretches = [s for s in runs(one.used) if s.stop - s.start > noise.order + 1]
+        parts = [noise.whiten(one.levelled(given[s], s)) for s in stretches]
         found.append(np.concatenate(parts) if parts else given[:0])
     return found
 
