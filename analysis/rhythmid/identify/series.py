@@ -15,6 +15,7 @@ from scipy.interpolate import PPoly
 
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
+from rhythmid.identify.inputs import Inputs
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.record.stamp_jitter import StampJitter, stamp_jitter
@@ -106,6 +107,11 @@ class Series:
         kept = self.time[: self.blocks * self.block]
         away = (kept - np.repeat(self.centres, self.block)) / (self.block * self.period)
         return 0.5 * (away**2).reshape(self.blocks, self.block).mean(axis=1)
+
+    @cached_property
+    def inputs(self) -> Inputs:
+        """Command and forcing as the compiled loop takes them."""
+        return Inputs(self.command, self.forcing, self.period, self.block > 1)
 
     @cached_property
     def averaged(self) -> Array:
