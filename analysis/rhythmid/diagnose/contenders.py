@@ -28,6 +28,7 @@ from rhythmid.identify.series import Series, record_of
 from rhythmid.identify.start_cost import felt_starts, start_freedom
 from rhythmid.identify.student import autocorrelation_time
 from rhythmid.parallel import fork_map
+from rhythmid.progress import Tell, counted, silent
 
 Array = NDArray[np.float64]
 Shape = Callable[[Trial], Mapping[str, float]]
@@ -175,7 +176,11 @@ def measured_errors(error: Array, rows: Rows) -> Array:
 
 
 def contend(
-    trials: Sequence[tuple[Trial, Kind]], series: Sequence[Series], rows: Rows, step: float
+    trials: Sequence[tuple[Trial, Kind]],
+    series: Sequence[Series],
+    rows: Rows,
+    step: float,
+    tell: Tell = silent,
 ) -> list[Contender]:
     """Contenders of these trials, in their order; those that diverge are left out."""
 
@@ -190,7 +195,8 @@ def contend(
             found = replace(found, penalty=free / max(rows.fitted, 1))
         return found, measured_errors(found.error, rows)
 
-    done = {i: r for i, r in fork_map(one, list(trials)) if not isinstance(r, Exception)}
+    results = counted(fork_map(one, list(trials)), len(trials), "hypotheses", tell)
+    done = {i: r for i, r in results if not isinstance(r, Exception)}
     return [Contender(*trials[i], *done[i]) for i in sorted(done)]
 
 

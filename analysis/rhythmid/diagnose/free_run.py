@@ -73,7 +73,7 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     step = found.fit.run.max_step
     rows = rows_of(seen, unseen, found.noise)
     kinds: list[tuple[Trial, Kind]] = [(t, "effects" if t.added else "nominal") for t in found.trials]
-    contenders = contend(kinds, seen, rows, step)
+    contenders = contend(kinds, seen, rows, step, case.tell)
     run = trajectories(found.fit)
     sizes = scales(seen, found.fit.model)
     chosen = select(_contest(contenders, {}, rows, found, run, sizes)).chosen
@@ -84,7 +84,7 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         nominal = next(one.trial for one in contenders if one.kind == "nominal")
         weighed = [one.trial for one in contenders]
         others = alternatives(nominal, trial, seen, known, found.noise, step, run, found.rounds, weighed)
-        contenders += contend(others, seen, rows, step)
+        contenders += contend(others, seen, rows, step, case.tell)
     case.tell("locating what is left")
     after = dependences(run, rows, case.pool)
     contest = _contest(contenders, _maps(after, contenders, rows), rows, found, run, sizes)

@@ -16,9 +16,9 @@ from scipy.interpolate import PPoly
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
 from rhythmid.identify.inputs import Inputs
+from rhythmid.identify.spread import relative_spreads
 from rhythmid.model import Model
 from rhythmid.record.record import Record
-from rhythmid.record.stamp_jitter import StampJitter, stamp_jitter
 from rhythmid.simulation.generated_source import InputKind, OutputKind
 from rhythmid.simulation.signal import continuous, fast_length, spline
 
@@ -233,23 +233,8 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
     if block is None:
         block = min(block_length(s.value, s.period) for s in longest_of_each(made))
     made = [replace(s, block=block, used=_whole_blocks(s, block)) for s in made]
-    return [replace(s, spread=spread) for s, spread in zip(made, _spreads(made))]
-
-
-def _spreads(series: Sequence[Series]) -> list[Array | None]:
-    """Relative standard deviation of the noise of each series' averages, as the jitter of its record's stamps makes it."""
-    found = {
-        name: stamp_jitter([(one.time, one.value) for one in series if record_of(one) == name])
-        for name in dict.fromkeys(record_of(one) for one in series)
-    }
-    return [_spread(one, found[record_of(one)]) for one in series]
-
-
-def _spread(series: Series, jitter: StampJitter | None) -> Array | None:
-    if jitter is None:
-        return None
-    square = series.average(jitter.relative(series.time, series.value) ** 2)
-    return np.sqrt(square / square.mean())
+    spreads = relative_spreads([(record_of(s), s.time, s.value) for s in made], block)
+    return [replace(s, spread=spread) for s, spread in zip(made, spreads)]
 
 
 def record_of(series: Series) -> str:

@@ -34,6 +34,8 @@ class ChannelQuality:
     conflicts : duplicates whose values differ.
     lateness_mean, lateness_max, lateness_min, lateness_std : receive time minus header stamp [s], the last its jitter; None
         where there is none.
+    skew, skew_std : by how much faster the clock of its stamps runs than that of receipt [s/s], and the standard deviation of that;
+        None where it cannot be seen. See `clock_skew`.
     stamp_jitter, stamp_jitter_std : standard deviation of the jitter of the stamps that the samples themselves show [s], and how well
         that is known [s] (a standard deviation); None where they show none. See `stamp_jitter`.
     resolution : step of the grid that its values are rounded to, in its unit; 0 where they lie on none.
@@ -49,6 +51,8 @@ class ChannelQuality:
     lateness_max: float | None = None
     lateness_min: float | None = None
     lateness_std: float | None = None
+    skew: float | None = None
+    skew_std: float | None = None
     stamp_jitter: float | None = None
     stamp_jitter_std: float | None = None
     resolution: float = 0.0

@@ -42,7 +42,7 @@ def defend(
         if not fresh:
             return []
         tell(f"testing {', '.join(' + '.join(p.added) for p in fresh)}")
-        found, _ = run_trials(fresh, series, known.starts, _states(known), noise, step)
+        found, _ = run_trials(fresh, series, known.starts, _states(known), noise, step, tell=tell)
         tried.update({tuple(sorted(t.added)): t for t in found})
         return found
 
