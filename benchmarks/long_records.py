@@ -1,6 +1,6 @@
 """Memory and time of analysis on many long records.
 
-    python benchmarks/long_records.py [--records N …] [--minutes M] [--rate HZ] [--command NAME …] [--budget S] [--seed N] [--keep FOLDER]
+    python benchmarks/long_records.py [--records N …] [--minutes M] [--rate HZ] [--command NAME …] [--forcing] [--budget S] [--seed N] [--keep FOLDER]
 
 Simulates runs of a mass on a spring with Coulomb friction, each with a multisine of its own, and writes them as bags. Then runs
 `rhythmid identify`, with the machine's own model, and `rhythmid diagnose`, with a nominal model that lacks the friction, on the first N
@@ -98,7 +98,9 @@ def simulated(folder: Path, index: int, given: argparse.Namespace) -> Path:
         "excitation": {
             "type": "multisine", "rms": 3.0, "period": length / 6.0, "periods": 6, "band": [0.3, 6.0], "seed": given.seed + index,
         },
+        "forcing": {"amplitude": 1.0 if given.forcing else 0.0, "frequency": 1.0, "phase": 0.0},
         "noise": {"measurement_std": 2e-5},
+        "record": {"topics": ["excitation", "joint_states", "run", *(["forcing"] if given.forcing else [])]},
         "time": {"rate": given.rate},
         "duration": length,
         "seed": given.seed + index,
@@ -121,6 +123,7 @@ def main() -> None:
     parser.add_argument(
         "--command", nargs="+", choices=("identify", "diagnose"), default=("identify", "diagnose")
     )
+    parser.add_argument("--forcing", action="store_true", help="a third channel, of a forcing of 1 N at 1 Hz")
     parser.add_argument("--budget", type=float, help="seconds of search of each diagnosis")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", type=Path, help="folder for the bags, used again where they are there")
