@@ -1,6 +1,7 @@
 """Memory and time of analysis on many long records.
 
-    python benchmarks/long_records.py [--records N …] [--minutes M] [--rate HZ] [--command NAME …] [--forcing] [--budget S] [--seed N] [--keep FOLDER]
+    python benchmarks/long_records.py [--records N …] [--minutes M] [--rate HZ] [--command NAME …] [--forcing] [--budget S] [--longest S]
+        [--seed N] [--keep FOLDER]
 
 Simulates runs of a mass on a spring with Coulomb friction, each with a multisine of its own, and writes them as bags. Then runs
 `rhythmid identify`, with the machine's own model, and `rhythmid diagnose`, with a nominal model that lacks the friction, on the first N
@@ -10,7 +11,9 @@ the answer. Needs /proc.
 """
 
 import argparse
+import math
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -69,8 +72,8 @@ def memory_of(root: int) -> int:
     return total
 
 
-def measured(command: list[str], log: Path) -> Used:
-    """Run a command to its end, its messages of progress to `log`."""
+def measured(command: list[str], log: Path, longest: float) -> Used:
+    """Run a command to its end, its messages of progress to `log`; after `longest` [s] it is interrupted as by Ctrl-C."""
     begun, most = time.monotonic(), 0
     with log.open("w") as errors, tempfile.TemporaryFile("w+") as output:
         process = subprocess.Popen(command, stdout=output, stderr=errors)
@@ -79,6 +82,9 @@ def measured(command: list[str], log: Path) -> Used:
             if pid:
                 break
             most = max(most, memory_of(process.pid))
+            if time.monotonic() - begun > longest:
+                process.send_signal(signal.SIGINT)
+                longest = math.inf
             time.sleep(LOOK)
         process.returncode = os.waitstatus_to_exitcode(status)
         output.seek(0)
@@ -125,6 +131,12 @@ def main() -> None:
     )
     parser.add_argument("--forcing", action="store_true", help="a third channel, of a forcing of 1 N at 1 Hz")
     parser.add_argument("--budget", type=float, help="seconds of search of each diagnosis")
+    parser.add_argument(
+        "--longest",
+        type=float,
+        default=math.inf,
+        help="seconds after which a command is interrupted (exit code 130)",
+    )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--keep", type=Path, help="folder for the bags, used again where they are there")
     given = parser.parse_args()
@@ -140,7 +152,7 @@ def main() -> None:
                 command = [*RHYTHMID, name, *bags[:count], "--model", str(model)]
                 if name == "diagnose" and given.budget is not None:
                     command += ["--budget", str(given.budget)]
-                used = measured(command, folder / f"{name}_{count}.log")
+                used = measured(command, folder / f"{name}_{count}.log", given.longest)
                 print(
                     f"{name:8} {count:3} records of {given.minutes:g} min at {given.rate} Hz: {used.memory / 2**20:6.0f} MiB, "
                     f"{used.seconds:5.0f} s, {used.processor:5.0f} s of processor time, exit code {used.code}  {used.answer}",
