@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-ROWS = 200_000  # that are kept as they are
+ROWS = 100_000  # that are kept as they are
 
 
 def reduced(parts: Iterable[tuple[Array, Array]], most: int = ROWS) -> tuple[Array, Array]:
