@@ -11,6 +11,7 @@ from scipy.interpolate import PPoly
 from rhythmid.elements.element import STEP
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model
+from rhythmid.identify.inputs import Inputs
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import Compiled, compile_model
@@ -34,6 +35,7 @@ class FreeRun:
     compiled: Compiled
     stopping: Callable[[], Compiled]
     series: tuple[Series, ...]
+    inputs: tuple[Inputs, ...]
     smooth: bool
     max_step: float
 
@@ -48,8 +50,7 @@ class FreeRun:
         The start is the state at the first centre; what the record declares of the model's parameters replaces the model's own.
         None when the simulation diverges.
         """
-        one = self.series[index]
-        given = one.inputs
+        one, given = self.series[index], self.inputs[index]
         model = own_model(model, one)
         times = np.ascontiguousarray(physical_times(model, one.centres))
         late = _delay_of(model, given.stamps)
@@ -145,6 +146,7 @@ def prepare_run(
         compile_model(model, disturbed, excited, smooth, measured),
         lambda: compile_model(model, disturbed, excited, measured=measured),
         tuple(series),
+        tuple(one.inputs for one in series),
         smooth,
         max_step or min([*(one.period * one.block for one in series), *([] if smooth else _ticks(series))]),
     )
@@ -169,7 +171,8 @@ def _value(signal: PPoly | None, time: float) -> float:
 def with_series(run: FreeRun, index: int, series: Series) -> FreeRun:
     """The run with one series exchanged, such as for one with another command; its steps end at the command's knots."""
     every = (*run.series[:index], series, *run.series[index + 1 :])
-    return replace(run, compiled=run.stopping(), series=every, smooth=False)
+    inputs = (*run.inputs[:index], series.inputs, *run.inputs[index + 1 :])
+    return replace(run, compiled=run.stopping(), series=every, inputs=inputs, smooth=False)
 
 
 def accurate(
