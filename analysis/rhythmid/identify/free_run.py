@@ -15,9 +15,10 @@ from rhythmid.identify.inputs import Inputs
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import Compiled, compile_model
-from rhythmid.simulation.generated_source import InputKind, OutputKind
+from rhythmid.simulation.generated_source import InputKind, OutputKind, Variant
 from rhythmid.simulation.signal import pieces
-from rhythmid.simulation.simulate import physical_times, start_states
+from rhythmid.simulation.simulate import start_states
+from rhythmid.simulation.transport import command_delay, physical_times
 
 Array = NDArray[np.float64]
 DIVERGED = 1e100  # of any unit; squares of what is larger would overflow
@@ -29,7 +30,7 @@ class FreeRun:
     """A structure and the series that it is run over.
 
     `stopping` is the structure whose steps end at the command's knots, `compiled` the one that is used while the delay is
-    constant: it takes the `smooth` stand-ins of the commands where every one has one.
+    constant: it takes the `smooth` surrogates of the commands where every one has one.
     """
 
     compiled: Compiled
@@ -53,7 +54,7 @@ class FreeRun:
         one, given = self.series[index], self.inputs[index]
         model = own_model(model, one)
         times = np.ascontiguousarray(physical_times(model, one.centres))
-        late = _delay_of(model, given.stamps)
+        late = command_delay(model, given.stamps)
         varies = late is not None and len(late) > 0 and np.ptp(late) > 0.0
         smooth = given.smooth if self.smooth else None
         compiled = self.compiled if smooth is None or not varies else self.stopping()
@@ -86,27 +87,8 @@ class FreeRun:
         return list(pool.map(lambda case: self.outputs(*case), cases))
 
 
-def _delay_of(model: Model, stamps: Array) -> Array | None:
-    """Delays (n,) [s] that the command path adds to these stamps, one element after another; None where it adds none.
-
-    A command cannot overtake an earlier one.
-    """
-    now, shift, found, varies = stamps, 0.0, False, False
-    for term in model.terms:
-        if term.element.slot == "command" and term.element.delay is not None:
-            late = term.element.delay(now, **{n: v.value for n, v in term.values.items()})
-            found = True
-            if len(late) and np.ptp(late) > 0.0:
-                now, varies = np.maximum.accumulate(now + late), True
-            elif len(late):
-                now, shift = now + late[0], shift + float(late[0])
-    if not found:
-        return None
-    return now - stamps if varies else np.full(len(stamps), shift)
-
-
 def _sees_steps(model: Model) -> bool:
-    """Whether an element of the command's path takes a held command otherwise than its smooth stand-in: one with memory
+    """Whether an element of the command's path takes a held command otherwise than its smooth surrogate: one with memory
     of extremes, or with a limit of rate."""
     path = [term.element for term in model.terms if term.element.slot in ("command", "actuator")]
     return any(
@@ -142,9 +124,10 @@ def prepare_run(
     smooth = not _sees_steps(model) and all(
         one.command is None or one.inputs.smooth is not None for one in series
     )
+    variant = Variant(excited, measured, smooth, disturbed)
     return FreeRun(
-        compile_model(model, disturbed, excited, smooth, measured),
-        lambda: compile_model(model, disturbed, excited, measured=measured),
+        compile_model(model, variant),
+        lambda: compile_model(model, replace(variant, smooth=False)),
         tuple(series),
         tuple(one.inputs for one in series),
         smooth,
@@ -158,7 +141,7 @@ def start_of(model: Model, run: FreeRun, index: int, position: float, velocity: 
     one = run.series[index]
     model = own_model(model, one)
     begin = physical_times(model, one.centres[:1])
-    late = _delay_of(model, begin)
+    late = command_delay(model, begin)
     command = _value(one.command, begin[0] - (0.0 if late is None else late[0]))
     return start_states(model, run.compiled, position, velocity, command, _value(one.forcing, begin[0]))
 

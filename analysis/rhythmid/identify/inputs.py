@@ -11,7 +11,7 @@ from rhythmid.simulation.signal import FAR, impulse_preserving, pieces
 
 Array = NDArray[np.float64]
 Pieces = tuple[Array, Array]
-FEWEST = 16  # knots of a command that has a smooth stand-in, more than these
+FEWEST = 16  # knots of a command that has a smooth surrogate, more than these
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Inputs:
 
     @cached_property
     def smooth(self) -> Pieces | None:
-        """Smooth stand-in for a held command that changes about as often as the measurement is sampled, or more often; None where
+        """Smooth surrogate for a held command that changes about as often as the measurement is sampled, or more often; None where
         there is none."""
         command = self.commanded
         if command is None or command.c.shape[0] > 1 or len(command.x) <= FEWEST or not self.averaged:
