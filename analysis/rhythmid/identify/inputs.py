@@ -11,7 +11,7 @@ from rhythmid.simulation.signal import FAR, impulse_preserving, pieces
 
 Array = NDArray[np.float64]
 Pieces = tuple[Array, Array]
-FEWEST = 16  # knots of a command that has a smooth surrogate, more than these
+SMOOTHED_FROM = 16  # knots of a command that has a smooth surrogate, more than these
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Inputs:
         """Smooth surrogate for a held command that changes about as often as the measurement is sampled, or more often; None where
         there is none."""
         command = self.commanded
-        if command is None or command.c.shape[0] > 1 or len(command.x) <= FEWEST or not self.averaged:
+        if command is None or command.c.shape[0] > 1 or len(command.x) <= SMOOTHED_FROM or not self.averaged:
             return None
         if float(np.median(np.diff(command.x[:-1]))) > 2.0 * self.period * (1.0 + 1e-6):
             return None

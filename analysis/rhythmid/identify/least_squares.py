@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-ROWS = 100_000  # that are kept as they are
+KEPT_ROWS = 100_000  # that are kept as they are
 
 
-def reduced(parts: Iterable[tuple[Array, Array]], most: int = ROWS) -> tuple[Array, Array]:
+def reduced(parts: Iterable[tuple[Array, Array]], most: int = KEPT_ROWS) -> tuple[Array, Array]:
     """One design (m, p) and target (m,) with the least-squares solution of all parts, (n, p) and (n,) each; with `most` rows or
     fewer in all, the parts one below the other."""
     kept: list[Array] = []

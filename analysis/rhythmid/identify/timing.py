@@ -32,7 +32,9 @@ DRIFT_PARAMETER = {"clock_skew": "skew", "input_delay_drift": "rate"}
 ALIKE = {"clock_skew": ("delay_drift",)}  # the same to first order
 EVIDENT_BY = 5.0  # standard deviations from which a timing effect becomes part of the model
 SMEARS = 3  # widths of command jitter that are tried
-ENOUGH = 1_000_000  # samples that tell of a roll-off what there is to be told: further records are not asked
+ROLL_OFF_SAMPLES = (
+    1_000_000  # samples that tell of a roll-off what there is to be told: further records are not asked
+)
 UNEXPLAINED = 1.5  # times the noise floor, beyond which a hold is looked for
 HOLD_GAIN = 25.0  # in chi2 that a hold must bring
 SLOWER = 3.0  # sample periods from which a hold can be told from the commands' own
@@ -212,7 +214,7 @@ def _smear(fit: Fit, largest: float, pool: ThreadPoolExecutor | None) -> tuple[f
 
     The profile likelihood over the variance is a parabola. None where the response does not roll off at all.
     """
-    fit = _first_samples(fit, ENOUGH)
+    fit = _first_samples(fit, ROLL_OFF_SAMPLES)
     at = np.linspace(0.0, largest, SMEARS + 1) ** 2
     best = spread = 0.0
     for _ in range(3):

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 STRETCHES = 30  # of a recording, one median each
-FEWEST = 20  # samples of a stretch
-RESOLVED = 1e-9  # s; what stamps are whole multiples of, so that no skew is known better than this over the recording
+SAMPLES_OF_A_STRETCH = 20  # samples of a stretch
+STAMP_RESOLUTION = 1e-9  # s; what stamps are whole multiples of, so that no skew is known better than this over the recording
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class ClockSkew:
 
 def clock_skew(time: NDArray[np.float64], lateness: NDArray[np.floating]) -> ClockSkew | None:
     """Skew from stamps (n,) [s] and what they are older than their receipt (n,) [s]; None of too short a recording."""
-    if len(time) < STRETCHES * FEWEST or np.ptp(time) == 0.0:
+    if len(time) < STRETCHES * SAMPLES_OF_A_STRETCH or np.ptp(time) == 0.0:
         return None
     middle = [float(np.median(part)) for part in np.array_split(time, STRETCHES)]
     late = [float(np.median(part)) for part in np.array_split(lateness, STRETCHES)]
@@ -37,4 +37,4 @@ def clock_skew(time: NDArray[np.float64], lateness: NDArray[np.floating]) -> Clo
     growth = float(at @ late) / power
     left = np.array(late) - np.mean(late) - growth * at
     variance = float(left @ left) / (STRETCHES - 2)
-    return ClockSkew(-growth, math.sqrt(variance / power + (RESOLVED / float(np.ptp(time))) ** 2))
+    return ClockSkew(-growth, math.sqrt(variance / power + (STAMP_RESOLUTION / float(np.ptp(time))) ** 2))

@@ -7,8 +7,8 @@ from rhythmid.record.quality import ChannelQuality
 
 # seconds between the ages at receipt of two channels, from which their stamps hardly share a clock
 CLOCKS_APART = 1.0
-CERTAIN = 5.0  # standard deviations from which two clocks are said to run apart
-NOTABLE = 0.1  # of a sample period by which they do over a record, below which it matters to no delay
+APART_BY = 5.0  # standard deviations from which two clocks are said to run apart
+WORTH_TELLING = 0.1  # of a sample period by which they do over a record, below which it matters to no delay
 
 
 def clock_notes(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) -> tuple[str, ...]:
@@ -57,7 +57,7 @@ def _running_apart(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, 
             continue
         apart, std = own[0] - other[0], math.hypot(own[1], other[1])
         grown = abs(apart) * (timing.end - timing.start)
-        if abs(apart) > CERTAIN * std and grown > NOTABLE * timing.period:
+        if abs(apart) > APART_BY * std and grown > WORTH_TELLING * timing.period:
             found.append(
                 f"the times of the output run {1e6 * apart:+.3g} ± {1e6 * std:.1g} µs/s against those of the {role}, as their arrivals "
                 f"tell ({1e3 * grown:.3g} ms over the record); use  time: receive  for both"

@@ -23,14 +23,16 @@ AGREE = (
 )
 CLOSE = 0.3  # periods; where samples follow one another sooner, a polynomial through them swings
 BINS = 16  # of equally many samples, by slope
-FEWEST = 100  # samples of a bin
+SAMPLES_OF_A_BIN = 100  # samples of a bin
 SLOWER = (
     2 / 3
 )  # share of the slower samples that have to show it, too: kinks of a motion, such as impacts, come at the highest speed
-CERTAIN = 5.0  # standard deviations from which jitter is taken to be there
-SHOWS = 3.0  # the same among the slower samples
-LEAST = 1e-3  # of a sample period, below which jitter is beyond what clocks and numbers of a log resolve
-NOTABLE = 0.05  # of the variance of the noise at rest, below which weights would hardly differ
+JITTER_SHOWN = 5.0  # standard deviations from which jitter is taken to be there
+SHOWN_BY_SLOWER = 3.0  # the same among the slower samples
+RESOLVED_JITTER = (
+    1e-3  # of a sample period, below which jitter is beyond what clocks and numbers of a log resolve
+)
+WORTH_WEIGHING = 0.05  # of the variance of the noise at rest, below which weights would hardly differ
 OUTLYING = 4.0  # robust standard deviations of a bin at which a deviation is clipped
 CORRELATED = 4.0  # neighbouring deviations share samples: their squares count for as many times fewer
 NORMAL_MEDIAN = 0.6745  # of the absolute value of a normal deviate
@@ -56,7 +58,7 @@ class StampJitter:
 def stamp_jitter(stretches: Sequence[Samples]) -> StampJitter | None:
     """Jitter of the stamps of one channel, recorded in these stretches; None where it does not show."""
     given = [(t, v) for t, v in stretches if len(t) > 4 * max(SIDES)]
-    if sum(len(t) for t, _ in given) < BINS * FEWEST:
+    if sum(len(t) for t, _ in given) < BINS * SAMPLES_OF_A_BIN:
         return None
     period = float(np.median([nominal_period(np.diff(time)) for time, _ in given]))
     step = resolution(np.concatenate([value for _, value in given]))
@@ -78,7 +80,7 @@ def _found(stretches: Sequence[Samples], sides: int, period: float, step: float)
     if step > 0.0:
         told = square * period**2 > (COARSE * step) ** 2
         left, square = left[told], square[told]
-    if len(left) < BINS * FEWEST:
+    if len(left) < BINS * SAMPLES_OF_A_BIN:
         return None
     speeds, variances, counts = _binned(left, square)
     whole, slower = _line(speeds, variances, counts), round(SLOWER * BINS)
@@ -86,10 +88,10 @@ def _found(stretches: Sequence[Samples], sides: int, period: float, step: float)
     if whole is None or part is None:
         return None
     (rest, growth, spread), (_, again, doubt) = whole, part
-    if growth < CERTAIN * spread or again < SHOWS * doubt or not 0.5 < again / growth < 2.0:
+    if growth < JITTER_SHOWN * spread or again < SHOWN_BY_SLOWER * doubt or not 0.5 < again / growth < 2.0:
         return None
     std = math.sqrt(growth)
-    if std < LEAST * period or growth * float(speeds.mean()) < NOTABLE * rest:
+    if std < RESOLVED_JITTER * period or growth * float(speeds.mean()) < WORTH_WEIGHING * rest:
         return None
     return StampJitter(std, 0.5 * spread / std, math.sqrt(rest))
 

@@ -33,7 +33,9 @@ from rhythmid.simulation.signal import first_order_hold
 from rhythmid.simulation.transport import delayed_command, delays, physical_times
 
 Array = NDArray[np.float64]
-ROWS = 200_000  # averages in all, beyond which changes are kept to seven digits: a score needs no more
+FULL_PRECISION_ROWS = (
+    200_000  # averages in all, beyond which changes are kept to seven digits: a score needs no more
+)
 SMALL = 1e-3  # of the force that shakes the machine: a force that is tried is no larger, so that the answer is in proportion
 
 
@@ -286,7 +288,7 @@ def changes_of(
 
 def _kept(outputs: Sequence[Array]) -> tuple[Array, ...]:
     """Changes as they are kept for the whole catalogue: in half the memory over records that are very long."""
-    if sum(map(len, outputs)) <= ROWS:
+    if sum(map(len, outputs)) <= FULL_PRECISION_ROWS:
         return tuple(outputs)
     return tuple(one.astype(np.float32) for one in outputs)
 
