@@ -20,6 +20,6 @@ def reduced(parts: Iterable[tuple[Array, Array]], most: int = KEPT_ROWS) -> tupl
     for design, target in parts:
         kept.append(np.column_stack([design, target]))
         if sum(map(len, kept)) > most:
-            kept = [np.linalg.qr(np.concatenate(kept), mode="r")]
+            kept = [np.asarray(np.linalg.qr(np.concatenate(kept), mode="r"))]
     joined = np.concatenate(kept)
     return np.ascontiguousarray(joined[:, :-1]), joined[:, -1].copy()
