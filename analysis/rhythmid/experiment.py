@@ -167,6 +167,8 @@ class Experiment:
                     "seed": self.seed,
                     "initial": [] if self.initial is None else list(self.initial),
                     "consumers": sinks,
+                    "max_effort": self.safety.max_effort,
+                    "command_timeout": self.safety.command_timeout,
                 },
             ),
             injector("command_delay", "excitation", "command", self.input_delay),
@@ -182,6 +184,9 @@ class Experiment:
                     "ramp": self.safety.ramp,
                     "stale_after": self.safety.stale_after,
                     "envelope": [low, high],
+                    "max_speed": self.safety.max_speed,
+                    "frozen_after": self.safety.frozen_after,
+                    "max_gap": self.safety.max_gap,
                     "run": _json(self.description()),
                     "subscribers": 1 + ("excitation" in self.record.topics),
                     "consumers": ["plant", *sinks],
@@ -221,9 +226,9 @@ def perform(experiment: Experiment) -> dict[str, Messages]:
 
     Equals the graph's lockstep run, sample by sample and stamp by stamp. Raises InputError for a run too long to keep.
     """
-    from rhythmid.simulation.plant import (
-        Plant,  # the compiler behind it is slow to load, and most nodes need no plant
-    )
+    # the compiler behind the plant is slow to load, and most nodes need no plant
+    from rhythmid.simulation.command_hold import RAMP, CommandHold
+    from rhythmid.simulation.plant import Plant
 
     if experiment.count > LONGEST:
         raise InputError(
@@ -235,7 +240,7 @@ def perform(experiment: Experiment) -> dict[str, Messages]:
     effort = ramped(experiment.excitation, experiment.safety, time, experiment.count * period * 1e-9)
     arrival = experiment.input_delay.release(stamps)
     plant = Plant(experiment.plant_model, period, experiment.seed, experiment.initial)
-    plant.push_many(arrival, effort)
+    plant.push_many(*CommandHold(experiment.safety.command_timeout, RAMP, period).fill(arrival, effort))
     samples = plant.advance(int(stamps[-1]))
     seen = experiment.measurement_delay.release(stamps)
     return {
@@ -365,12 +370,10 @@ def _time(node: Node | None) -> TimeMode:
 def _safety(node: Node | None) -> Safety:
     if node is None:
         return Safety()
-    keys = node.mapping(["max_effort", "ramp", "stale_after", "envelope"])
-    made: dict[str, Any] = {
-        name: keys[name].number(low=low)
-        for name, low in (("max_effort", 0.0), ("ramp", 0.0), ("stale_after", 1e-3))
-        if name in keys
-    }
+    numbers = {"max_effort": 0.0, "ramp": 0.0, "stale_after": 1e-3, "max_speed": 0.0, "frozen_after": 0.0,
+               "max_gap": 0.0, "command_timeout": 0.0}  # fmt: skip
+    keys = node.mapping([*numbers, "envelope"])
+    made: dict[str, Any] = {name: keys[name].number(low=low) for name, low in numbers.items() if name in keys}
     if "envelope" in keys:
         ends = [end.number(finite=False) for end in keys["envelope"].items()]
         if len(ends) != 2 or not ends[0] < ends[1]:

@@ -78,7 +78,7 @@ class Supervisor:
         try:
             self._launch()
             outcome = self._wait_until_ready(observer) or self._play(observer)
-            self._tell_timing(observer)
+            self._tell_outcome(observer, outcome)
             end([process for process in self._processes if process.name != "recorder"], self._listen)
             end(self._processes, self._listen)  # the recorder hears the others' last words
             for process in self._processes:
@@ -115,19 +115,17 @@ class Supervisor:
             if not self._lockstep:
                 self._processes[-1].hurry()
 
-    def _trouble(self) -> Outcome | None:
-        """A node that has ended, or the user's wish to stop."""
-        for process in self._processes:
-            code = process.returncode
-            if code is None:
-                continue
-            process.join_output()
-            if code == 2:
-                return Outcome(2, process.refusal)
-            how = (
-                f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
-            )
-            return Outcome(1, f"{process.name} {how}")
+    def _trouble(self, observer: Observer) -> Outcome | None:
+        """A node that has ended or stopped early, or the user's wish to stop."""
+        dead = next((process for process in self._processes if process.returncode is not None), None)
+        if dead is not None:
+            dead.join_output()
+            self._listen()  # it may have said why
+        for name, reason in observer.tripped.items():
+            if name != "excitation":  # which says so on `run`
+                return Outcome(1, f"{name} stopped: {reason}")
+        if dead is not None:
+            return _death(dead)
         return Outcome(0, "stopped by the user") if self._interrupted() else None
 
     def _wait_until_ready(self, observer: Observer) -> Outcome | None:
@@ -136,7 +134,7 @@ class Supervisor:
         refusal: str | None = None
         with self._console.status("waiting for the nodes") as status:
             while not observer.state:
-                if trouble := self._trouble():
+                if trouble := self._trouble(observer):
                     return trouble
                 silent = [name for name in self._nodes if name not in observer.obstacles]
                 waiting = [f"{name}: {why}" for name, why in observer.obstacles.items() if why]
@@ -174,11 +172,10 @@ class Supervisor:
                     moved = now
                 self.observed.elapsed, self.observed.played = now, min(played, self._length)
                 progress.update(bar, completed=self.observed.played)
-                outcome = self._trouble() or self._ending(observer)
+                outcome = self._trouble(observer) or self._ending(observer)
                 if outcome is None and now - moved > STALLED_AFTER:
                     outcome = Outcome(1, f"nothing has moved for {STALLED_AFTER:g} s")
-        if self._interrupted():
-            self._fade_out(observer)
+        self._fade_out(observer)
         return outcome
 
     def _ending(self, observer: Observer) -> Outcome | None:
@@ -187,7 +184,8 @@ class Supervisor:
             return None
         if self._lockstep:
             if (
-                self._streams
+                "excitation" not in observer.tripped
+                and self._streams
                 and observer.acknowledged_ns < self._experiment.count * self._experiment.time.period_ns
             ):
                 return None
@@ -206,7 +204,7 @@ class Supervisor:
             self._listen()
 
     def _fade_out(self, observer: Observer) -> None:
-        """Let the excitation ramp down before the graph goes."""
+        """Let the excitation ramp down, if it still plays, before the graph goes."""
         if self._lockstep or observer.state != "running":
             return
         observer.ask_stop()
@@ -215,17 +213,26 @@ class Supervisor:
             self._listen()
         self._record_tail()
 
-    def _tell_timing(self, observer: Observer) -> None:
-        """Let the bag say how punctual the run was; simulated time knows no lateness."""
-        if self._lockstep or not observer.run:
+    def _tell_outcome(self, observer: Observer, outcome: Outcome) -> None:
+        """Let the bag say how the run ended and how punctual it was; simulated time knows no lateness."""
+        if not observer.run:
             return
         before = dict(observer.heard)
         patience = time.monotonic() + FIGURES_WITHIN
-        while any(observer.heard[name] == before[name] for name in before):
+        while not self._lockstep and any(observer.heard[name] == before[name] for name in before):
             if time.monotonic() > patience:
                 break
             self._listen()
-        observer.tell_timing()
+        observer.tell_outcome(outcome.sentence if outcome.code == 1 else "", punctual=not self._lockstep)
+
+
+def _death(process: Supervised) -> Outcome:
+    code = process.returncode
+    assert code is not None
+    if code == 2:
+        return Outcome(2, process.refusal)
+    how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+    return Outcome(1, f"{process.name} {how}")
 
 
 def longest(delay: Delay) -> float:

@@ -43,6 +43,14 @@ PRIORITY = Parameter(
     "SCHED_FIFO priority of the clock thread; 0: none; needs the right to set it",
     bounds=(0, 99),
 )
+CATCH_UP = Parameter(
+    "catch_up",
+    0.05,
+    "realtime: overrun up to which missed samples follow; after a longer one only the newest does",
+    "s",
+    (0.0, 10.0),
+)
+"""Half of the time for which a command is held: what follows so late still acts in the place that it was made for."""
 
 
 class GraphNode(Node):
@@ -54,7 +62,8 @@ class GraphNode(Node):
         self.lockstep = self.values["time_mode"] == "lockstep"
         self.workers: list[Worker] = []
         self.done = False  # set by a node whose work ends by itself; the process then ends
-        self.diagnostics = Diagnostics(self, self.figures, self.obstacles)
+        self.tripped = ""  # why the node stopped its work early, if it did; the process then ends with code 1
+        self.diagnostics = Diagnostics(self, self.figures, self.obstacles, lambda: self.tripped)
 
     @property
     def period_ns(self) -> int:
@@ -68,6 +77,14 @@ class GraphNode(Node):
     def obstacles(self) -> list[str]:
         """What keeps the node from its work; empty when it is ready."""
         return []
+
+    def trip(self, reason: str) -> None:
+        """Stop the work for good, because of `reason`: say so, and end the process soon. Only the first reason is told."""
+        if self.tripped:
+            return
+        self.tripped = reason
+        self.get_logger().error(f"stopped: {reason}")
+        self.done = True
 
     def begin(self) -> None:
         """Start the workers, once every node of the process stands."""
@@ -98,7 +115,7 @@ def _end_with_supervisor() -> None:
 def serve(build: Sequence[Callable[[], GraphNode]], arguments: list[str]) -> int:
     """Run the nodes in this process on one EventsExecutor until SIGINT, SIGTERM or a failure; the exit code.
 
-    0: asked to stop; 2: a parameter or other input was refused, told in one line; 1: a failure of ours.
+    0: asked to stop; 2: a parameter or other input was refused, told in one line; 1: a node stopped early, or a failure of ours.
     """
     asked: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -136,7 +153,9 @@ def serve(build: Sequence[Callable[[], GraphNode]], arguments: list[str]) -> int
             print(f"error: {problem}", file=sys.stderr)
         else:
             traceback.print_exception(problem)
-    return 0 if not problems else 2 if isinstance(problems[0], InputError) else 1
+    if problems:
+        return 2 if isinstance(problems[0], InputError) else 1
+    return 1 if any(node.tripped for node in nodes) else 0
 
 
 def _spin(executor: Executor, nodes: Sequence[GraphNode], asked: list[int]) -> None:

@@ -1,0 +1,88 @@
+"""Who may command: one publisher a topic. A second one is named, counted, and never obeyed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rclpy.node import Node
+
+_LOOK_PERIOD = (
+    0.02  # seconds between two looks at who publishes: a fifth of the time in which effort has to be zero
+)
+
+
+class Sequence:
+    """Tells one publisher's messages from another's by the sequence numbers that the middleware gives to each publisher's own.
+
+    `foreign` counts the messages that were refused.
+    """
+
+    def __init__(self) -> None:
+        self.foreign = 0
+        self._last: int | None = None
+
+    def admits(self, number: int, publishers: Callable[[], int]) -> bool:
+        """Whether the message with that number goes on where the last one ended.
+
+        A number out of order is taken for a loss, or for a publisher that took the place of another, while there is but one;
+        `publishers()`, how many there are, is asked only then.
+        """
+        if self._last is None or number == self._last + 1 or publishers() <= 1:
+            self._last = number
+            return True
+        self.foreign += 1
+        return False
+
+
+class Authority:
+    """Watches who publishes on `topic`; `intrusion(reason)` is called whenever a second publisher comes.
+
+    Attributes
+    ----------
+    topic : its full name.
+    """
+
+    def __init__(self, node: Node, topic: str, intrusion: Callable[[str], None]) -> None:
+        self.topic = node.resolve_topic_name(topic)
+        self._node, self._intrusion = node, intrusion
+        self._sequence = Sequence()
+        self._conflict = ""  # now
+        self._publishers = ""  # the newest conflict that there was
+        self._timer = node.create_timer(_LOOK_PERIOD, self._look)
+
+    @property
+    def foreign(self) -> int:
+        """Messages of other publishers, which were not obeyed."""
+        return self._sequence.foreign
+
+    def figures(self) -> dict[str, str]:
+        """For /diagnostics; the publishers only where there are too many."""
+        said = {"foreign_messages": str(self.foreign)}
+        return {**said, "conflict": self._publishers} if self._publishers else said
+
+    def admits(self, about: Mapping[str, Any]) -> bool:
+        """Whether a message is the one publisher's, by what the middleware says about it."""
+        admitted = self._sequence.admits(about["publication_sequence_number"], self._count)
+        if not admitted:
+            self._look()
+        return admitted
+
+    def conflict(self) -> str:
+        """Which publishers there are, if there is more than one; else empty."""
+        if self._count() <= 1:
+            return ""
+        found = self._node.get_publishers_info_by_topic(self.topic)
+        names = sorted(f"{end.node_namespace.rstrip('/')}/{end.node_name}" for end in found)
+        return f"{len(names)} publishers of {self.topic}: {', '.join(names)}" if len(names) > 1 else ""
+
+    def _count(self) -> int:
+        return self._node.count_publishers(self.topic)
+
+    def _look(self) -> None:
+        conflict, before = self.conflict(), self._conflict
+        self._conflict = conflict
+        if conflict:
+            self._publishers = conflict
+        if conflict and not before:
+            self._intrusion(conflict)
