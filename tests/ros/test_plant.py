@@ -80,7 +80,7 @@ def test_a_command_for_another_joint_is_counted_and_ignored(graph):
     node = graph.add(PlantNode, model=str(MODEL), joint="arm")
     send = graph.talk("command")
     send(graph.joint_state(time.time_ns(), effort=0.3))
-    graph.until(lambda: node.figures()["foreign_commands"] == "1", "the command")
+    graph.until(lambda: node.figures()["commands_of_other_joints"] == "1", "the command")
     assert node.figures()["commands"] == "0"
 
 
