@@ -7,32 +7,11 @@ from typing import Any
 
 from rclpy.node import Node
 
+from .sequence_check import SequenceCheck
+
 _LOOK_PERIOD = (
     0.02  # seconds between two looks at who publishes: a fifth of the time in which effort has to be zero
 )
-
-
-class Sequence:
-    """Tells one publisher's messages from another's by the sequence numbers that the middleware gives to each publisher's own.
-
-    `foreign` counts the messages that were refused.
-    """
-
-    def __init__(self) -> None:
-        self.foreign = 0
-        self._last: int | None = None
-
-    def admits(self, number: int, publishers: Callable[[], int]) -> bool:
-        """Whether the message with that number goes on where the last one ended.
-
-        A number out of order is taken for a loss, or for a publisher that took the place of another, while there is but one;
-        `publishers()`, how many there are, is asked only then.
-        """
-        if self._last is None or number == self._last + 1 or publishers() <= 1:
-            self._last = number
-            return True
-        self.foreign += 1
-        return False
 
 
 class Authority:
@@ -46,7 +25,7 @@ class Authority:
     def __init__(self, node: Node, topic: str, intrusion: Callable[[str], None]) -> None:
         self.topic = node.resolve_topic_name(topic)
         self._node, self._intrusion = node, intrusion
-        self._sequence = Sequence()
+        self._sequence = SequenceCheck()
         self._conflict = ""  # now
         self._publishers = ""  # the newest conflict that there was
         self._timer = node.create_timer(_LOOK_PERIOD, self._look)

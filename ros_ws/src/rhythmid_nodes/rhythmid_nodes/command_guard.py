@@ -26,8 +26,9 @@ from .joint_state import JointStateReader
 from .node import JOINT, PRIORITY, RATE, TIME_MODE, GraphNode, run
 from .parameters import Parameter
 from .qos import stream, subscribe_informed
-from .watch import PARAMETERS as WATCHED
-from .watch import Watch, limits
+from .watch import Watch
+from .watch_parameters import PARAMETERS as WATCHED
+from .watch_parameters import limits
 
 _FAR = math.inf
 _INSIST = (

@@ -32,8 +32,9 @@ from .lockstep import Credit
 from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
 from .parameters import Parameter
 from .qos import latched, stream
-from .watch import PARAMETERS as WATCHED
-from .watch import Watch, limits
+from .watch import Watch
+from .watch_parameters import PARAMETERS as WATCHED
+from .watch_parameters import limits
 
 _FAR = float("inf")
 PARAMETERS = (

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import NamedTuple
 
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
+
+from .sample import Sample
 
 _FIELDS = ("position", "velocity", "effort")
 _CDR = 4  # encapsulation header; CDR aligns relative to its end
@@ -18,15 +19,6 @@ _LITTLE_ENDIAN = b"\x00\x01"
 _stamp = struct.Struct("<iI")
 _count = struct.Struct("<I")
 _double = struct.Struct("<d")
-
-
-class Sample(NamedTuple):
-    """What a message says of one joint; NaN where it says nothing. SI: ns since the epoch, m, m/s, N."""
-
-    stamp_ns: int
-    position: float
-    velocity: float
-    effort: float
 
 
 def stamp_of(data: bytes) -> int:

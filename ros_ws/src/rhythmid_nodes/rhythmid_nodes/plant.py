@@ -20,12 +20,13 @@ from rhythmid.simulation.plant import Plant
 from .authority import Authority
 from .clock import Clock, Grid
 from .effort_limits import EffortLimits
-from .joint_state import JointStateReader, JointStateWriter, Sample
+from .joint_state import JointStateReader, JointStateWriter
 from .lateness import Lateness
 from .lockstep import Acknowledger, Credit, block
 from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
 from .parameters import Parameter
 from .qos import stream, subscribe_informed
+from .sample import Sample
 
 _LARGE = 1e12
 PARAMETERS = (

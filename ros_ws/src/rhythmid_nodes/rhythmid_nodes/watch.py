@@ -3,27 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
-from rhythmid.errors import InputError
-
-from .joint_state import Sample
-from .parameters import Parameter
+from .sample import Sample
 
 _DRIFT = 1e-3
 """Seconds a second by which the offset of a robot's clock may drift: ten times what quartz clocks do."""
-
-_FAR = math.inf
-PARAMETERS = (
-    Parameter("stale_after", 0.5, "realtime: stop when the newest measurement is older, by arrival or stamp; 0: never", "s", (0.0, _FAR)),
-    Parameter("envelope", [-_FAR, _FAR], "realtime: stop when the position leaves [low, high] in m"),
-    Parameter("max_speed", _FAR, "realtime: stop when the machine is faster", "m/s", (0.0, _FAR)),
-    Parameter("frozen_after", 0.0, "realtime: stop when the position stays exactly the same for so long; 0: never", "s", (0.0, _FAR)),
-    Parameter("max_gap", 0.0, "realtime: stop when stamps step by more; 0: as stale_after", "s", (0.0, _FAR)),
-    Parameter("measurement_clock", "system", "clock of the stamps: this system's, or another one", choices=("system", "other")),
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -47,17 +32,6 @@ class Limits:
     frozen_after: float = 0.0
     gap: float = 0.0
     other_clock: bool = False
-
-
-def limits(values: Mapping[str, Any]) -> Limits:
-    """The limits that the values of `PARAMETERS` say. Raises InputError where the envelope is none."""
-    envelope = values["envelope"]
-    if len(envelope) != 2 or not envelope[0] < envelope[1]:
-        raise InputError(f"parameter envelope = {envelope}: two positions low < high in m are expected")
-    return Limits(
-        values["stale_after"], *envelope, values["max_speed"], values["frozen_after"], values["max_gap"],
-        values["measurement_clock"] == "other",
-    )  # fmt: skip
 
 
 class Watch:

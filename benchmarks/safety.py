@@ -1,0 +1,323 @@
+"""How soon the effort at a robot is zero after a fault, over real topics and processes; and whether it stops without one.
+
+    python benchmarks/safety.py [--count 100] [--fault NAME ...] [--load 2]
+    python benchmarks/safety.py --healthy 1800 [--load 2]
+
+This process is the robot: it measures at 200 Hz and hears its commands. `excitation` and `command_guard` are processes
+of their own. A fault's time counts from its injection to the first zero of those that last. Limits of time are 0.05 s, so
+that what is found by waiting has its place within the 0.1 s, too. `--load` adds busy processes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import rclpy
+import typer
+import yaml
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from rclpy.utilities import try_shutdown
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from rhythmid_bringup.environment import own_domain, run_environment
+from rhythmid_bringup.processes import Supervised, end
+from rhythmid_nodes.clock import Clock, Grid, Worker
+from rhythmid_nodes.joint_state import JointStateReader, JointStateWriter
+from rhythmid_nodes.qos import stream
+
+PROMISED = 0.1  # seconds to zero effort
+LIMIT = 0.05  # seconds: stale_after, command_timeout, frozen_after, max_gap
+EFFORT = 0.5  # N
+SETTLED = 0.25  # seconds for which zero has to last
+EXCITATION = {
+    "excitation": json.dumps({"type": "profile", "points": [[0.0, EFFORT]], "length": 7200.0}),
+    "max_effort": 1.0, "stale_after": LIMIT, "frozen_after": LIMIT, "max_gap": LIMIT, "envelope": [0.0, 0.4],
+    "max_speed": 3.0, "subscribers": 1,
+}  # fmt: skip
+GUARD = {"max_effort": 1.0, "command_timeout": LIMIT, "command_ramp": 0.02, "stale_after": 0.0}
+
+
+class Robot:
+    """Measures at 200 Hz, as `spoil` distorts it, and keeps when which effort was commanded."""
+
+    def __init__(self) -> None:
+        self.node = Node("robot", namespace="/hopper")
+        self.heard: list[tuple[float, float]] = []
+        self.spoil: Callable[[int, float], tuple[int, float] | None] = lambda stamp, position: (
+            stamp,
+            position,
+        )
+        self._writer, self._reader = JointStateWriter("leg", "position"), JointStateReader("leg")
+        self._states = self.node.create_publisher(JointState, "joint_states", qos_profile_sensor_data)
+        self.listen()
+        self._grid = Grid(Clock(), 5_000_000, self._measure)
+        self._executor = EventsExecutor()
+        self._executor.add_node(self.node)
+        self._server = Worker("executor", self._serve)
+        for worker in (self._grid, self._server):
+            worker.start()
+
+    def listen(self) -> None:
+        profile = stream(lockstep=False)
+        self._commands = self.node.create_subscription(
+            JointState, "robot/command", self._hear, profile, raw=True
+        )
+
+    def deaf(self) -> None:
+        self.node.destroy_subscription(self._commands)
+
+    def measure_well(self) -> None:
+        self.spoil = lambda stamp, position: (stamp, position)
+
+    def effort(self) -> float:
+        return self.heard[-1][1] if self.heard else 0.0
+
+    def call(self, service: str) -> bool:
+        client = self.node.create_client(Trigger, service)
+        wait(client.service_is_ready, service)
+        future = client.call_async(Trigger.Request())
+        wait(future.done, service)
+        self.node.destroy_client(client)
+        return future.result().success
+
+    def close(self) -> None:
+        for worker in (self._grid, self._server):
+            worker.stop()
+        self._executor.shutdown()
+        self.node.destroy_node()
+
+    def _measure(self, stamp_ns: int) -> None:
+        measured = self.spoil(stamp_ns, 0.15 + 0.02 * math.sin(stamp_ns * 1e-9 % 1000.0 * 6.0))
+        if measured is not None:
+            self._states.publish(self._writer.write(*measured))
+
+    def _hear(self, data: bytes) -> None:
+        sample = self._reader.read(data)
+        if sample is not None:
+            self.heard.append((time.monotonic(), sample.effort))
+
+    def _serve(self) -> None:
+        while not self._server.stopping.is_set():
+            self._executor.spin_once(timeout_sec=0.05)
+
+
+class Bench:
+    """The two nodes under test, restarted where a fault has ended one."""
+
+    def __init__(self, folder: Path) -> None:
+        self.robot = Robot()
+        self._folder = folder
+        self._running: dict[str, Supervised] = {}
+
+    def pid(self, name: str) -> int:
+        return self._running[name]._process.pid
+
+    def playing(self) -> None:
+        """Everything is healthy, and effort flows."""
+        self.robot.measure_well()
+        self._keep("command_guard", GUARD, {"joint_states": "unmeasured"})
+        self._keep("excitation", EXCITATION, {"excitation": "command"})
+        wait(lambda: self.robot.call("excitation/start") or self.robot.effort() == EFFORT, "the start")
+        wait(lambda: self.robot.effort() == EFFORT, "effort")
+        time.sleep(0.05)
+
+    def end(self) -> None:
+        end(list(self._running.values()))
+        self.robot.close()
+
+    def _keep(self, name: str, parameters: dict[str, Any], remap: dict[str, str]) -> None:
+        if name in self._running and self._running[name].returncode is None:
+            return
+        path = self._folder / f"{name}.yaml"
+        path.write_text(yaml.safe_dump({"/**": {"ros__parameters": parameters}}, width=2**16))
+        line = [
+            sys.executable,
+            "-P",
+            "-m",
+            f"rhythmid_nodes.{name}",
+            "--ros-args",
+            "--params-file",
+            str(path),
+        ]
+        for source, target in {"__ns": "/hopper", **remap}.items():
+            line += ["-r", f"{source}:={target}"]
+        self._running[name] = Supervised(name, line, os.environ, lambda *_: None)
+
+
+def wait(condition: Callable[[], Any], what: str, timeout: float = 60.0) -> None:
+    patience = time.monotonic() + timeout
+    while not condition():
+        if time.monotonic() > patience:
+            raise SystemExit(f"no {what} within {timeout:g} s")
+        time.sleep(0.002)
+
+
+def spoilt(spoil: Callable[[int, float], tuple[int, float] | None]) -> Callable[[Bench], Callable[[], None]]:
+    """A fault of the measurements, which ends with them."""
+
+    def inject(bench: Bench) -> Callable[[], None]:
+        bench.robot.spoil = spoil
+        return bench.robot.measure_well
+
+    return inject
+
+
+def jump(bench: Bench) -> Callable[[], None]:
+    """One gap in the stamps: they are behind by less than is stale, then up to date."""
+    offset = -int(0.8 * LIMIT * 1e9)
+    bench.robot.spoil = lambda stamp, position: (stamp + offset, position)
+    time.sleep(2 * LIMIT)
+    step = int(1.6 * LIMIT * 1e9)
+    bench.robot.spoil = lambda stamp, position: (stamp + offset + step, position)
+    return bench.robot.measure_well
+
+
+def killed(name: str) -> Callable[[Bench], Callable[[], None]]:
+    def inject(bench: Bench) -> Callable[[], None]:
+        os.kill(bench.pid(name), signal.SIGKILL)
+        return lambda: wait(lambda: bench.robot.node.count_publishers("/hopper/command") == 0, "its end")
+
+    return inject
+
+
+def paused(bench: Bench) -> Callable[[], None]:
+    os.kill(bench.pid("excitation"), signal.SIGSTOP)
+    return lambda: os.kill(bench.pid("excitation"), signal.SIGCONT)
+
+
+def stranger(topic: str, effort: float) -> Callable[[Bench], Callable[[], None]]:
+    def inject(bench: Bench) -> Callable[[], None]:
+        node = Node("stranger", namespace="/hopper")
+        publisher = node.create_publisher(JointState, topic, stream(lockstep=False))
+        wait(lambda: publisher.get_subscription_count() > 0, "a listener")
+        publisher.publish(JointStateWriter("leg", "effort").write(time.time_ns(), effort))
+        return node.destroy_node
+
+    return inject
+
+
+def leaving(bench: Bench) -> Callable[[], None]:
+    """The guard ends in good order, so that nobody hears the excitation; the guard's own last command is zero."""
+    os.kill(bench.pid("command_guard"), signal.SIGINT)
+    return lambda: wait(lambda: bench._running["command_guard"].returncode is not None, "its end")
+
+
+FAULTS: dict[str, Callable[[Bench], Callable[[], None]]] = {
+    "stale_arrival": spoilt(lambda *_: None),
+    "stale_stamp": spoilt(lambda stamp, position: (stamp - 1_000_000_000, position)),
+    "gap": jump,
+    "frozen": spoilt(lambda stamp, _: (stamp, 0.15)),
+    "nan": spoilt(lambda stamp, _: (stamp, math.nan)),
+    "envelope": spoilt(lambda stamp, _: (stamp, 0.5)),
+    "speed": spoilt(lambda stamp, _: (stamp, 0.15 + 0.1 * (stamp // 5_000_000 % 2))),
+    "killed_excitation": killed("excitation"),
+    "paused_excitation": paused,
+    "second_commander": stranger("command", 5.0),
+    "nan_command": stranger("command", math.nan),
+    "guard_leaves": leaving,
+}
+
+
+def trial(bench: Bench, fault: str) -> float:
+    """Seconds from a fault to zero effort that lasts; infinite if there is none."""
+    bench.playing()
+    heard = bench.robot.heard
+    begin = time.monotonic()
+    mend = FAULTS[fault](bench)
+    if fault in ("gap", "second_commander", "nan_command"):
+        begin = time.monotonic()  # these prepare themselves first
+    time.sleep(PROMISED + SETTLED)
+    after = [(at, effort) for at, effort in list(heard) if at >= begin]
+    last = max((number for number, (_, effort) in enumerate(after) if effort != 0.0), default=-1)
+    zero = after[last + 1][0] - begin if last + 1 < len(after) else math.inf
+    if not after:  # nothing came any more, and the last was zero before
+        zero = 0.0 if bench.robot.effort() == 0.0 else math.inf
+    if any(abs(effort) > 1.0 for _, effort in after):
+        zero = math.inf
+    mend()
+    time.sleep(0.05)
+    heard.clear()
+    return zero
+
+
+@contextmanager
+def load(number: int) -> Iterator[None]:
+    """So many busy processes."""
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(number)]
+    try:
+        yield
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+
+
+@contextmanager
+def benched() -> Iterator[Bench]:
+    """A bench in a DDS domain of its own."""
+    with tempfile.TemporaryDirectory() as folder, own_domain() as domain:
+        os.environ.pop("ROS_DOMAIN_ID", None)
+        os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = (
+            "UDPv4"  # killed processes would leave shared memory behind
+        )
+        os.environ.update(run_environment(os.environ, domain, Path(folder)))
+        rclpy.init(args=[])
+        bench = Bench(Path(folder))
+        try:
+            yield bench
+        finally:
+            bench.end()
+            try_shutdown()
+
+
+def stay_healthy(bench: Bench, seconds: float) -> bool:
+    """Whether effort flows without a break for so long."""
+    bench.playing()
+    bench.robot.heard.clear()
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        time.sleep(1.0)
+        heard, bench.robot.heard = bench.robot.heard, []
+        if not heard or any(effort != EFFORT for _, effort in heard):
+            print(f"effort was not {EFFORT:g} N after {seconds - until + time.monotonic():.1f} s")
+            return False
+    print(f"no stop and no lapse in {seconds:g} s")
+    return True
+
+
+def main(
+    count: int = 10,
+    fault: Annotated[list[str] | None, typer.Option(help="which faults; none: all")] = None,
+    busy: Annotated[int, typer.Option("--load", help="busy processes beside")] = 0,
+    healthy: Annotated[float, typer.Option(help="seconds without any fault, instead")] = 0.0,
+) -> None:
+    kept = True
+    with load(busy), benched() as bench:
+        if healthy:
+            raise typer.Exit(0 if stay_healthy(bench, healthy) else 1)
+        print(f"{'fault':20} {'n':>4} {f'in {PROMISED:g} s':>9} {'median':>8} {'worst':>8}")
+        for name in fault or FAULTS:
+            times = sorted(trial(bench, name) for _ in range(count))
+            within = sum(seconds <= PROMISED for seconds in times)
+            kept &= within == count
+            median, worst = times[count // 2], times[-1]
+            print(f"{name:20} {count:4} {within:9} {median:8.4f} {worst:8.4f}", flush=True)
+    raise typer.Exit(0 if kept else 1)
+
+
+if __name__ == "__main__":
+    typer.run(main)
