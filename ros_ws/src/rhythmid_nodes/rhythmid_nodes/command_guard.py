@@ -65,6 +65,7 @@ class CommandGuard(GraphNode):
         self._reader = JointStateReader(values["joint"])
         self._wall = Clock()
         self._lock = threading.Lock()  # messages come on another thread than ticks
+        self._obeys = True
         self._given = 0.0  # effort sent last
         self._given_ns = 0
         self._quiet_ns = 0  # when to fall silent
@@ -100,15 +101,15 @@ class CommandGuard(GraphNode):
             found.append(f"no subscriber of {self._output.publisher.topic}")
         return [obstacle for obstacle in found if obstacle]
 
-    def close(self) -> None:
-        """A guard that is ended leaves a last command of zero."""
-        super().close()
+    def stand_down(self) -> None:
+        """A guard that is ended obeys no more, and leaves a last command of zero."""
+        self._obeys = False
         if self._given_ns:
-            self._output.send(self._wall.now(), 0.0)
+            self._zero()
             self._output.publisher.wait_for_all_acked(Duration(seconds=0.5))
 
     def _on_command(self, data: bytes, about: dict[str, Any]) -> None:
-        if self.tripped or not self._authority.admits(about):
+        if not self._obeys or not self._authority.admits(about):
             return
         sample = self._reader.read(data)
         if sample is None:
@@ -118,7 +119,8 @@ class CommandGuard(GraphNode):
         else:
             with self._lock:
                 self._commands += 1
-                self._hold.renew(self._wall.now(), sample.effort)
+                # its arrival counts, not when a busy machine gets round to it
+                self._hold.renew(min(self._wall.now(), about["received_timestamp"]), sample.effort)
 
     def _on_measurement(self, data: bytes) -> None:
         sample = self._reader.read(data)
@@ -137,15 +139,19 @@ class CommandGuard(GraphNode):
 
     def _stop(self, reason: str) -> None:
         """Zero effort at once, whatever its rate may be, and an end of the process."""
+        self._obeys = False
+        self._zero()
+        self.trip(reason)
+
+    def _zero(self) -> None:
         with self._lock:
             if self._given_ns:
                 self._send(self._wall.now(), 0.0)
-        self.trip(reason)
 
     def _tick(self, stamp_ns: int) -> None:
         with self._lock:
             self._hold.until(stamp_ns)
-            wanted = 0.0 if self.tripped else self._hold.effort
+            wanted = self._hold.effort if self._obeys else 0.0
             engaged = self._engaged(stamp_ns)
             danger = self._watch.danger(self._wall.now()) if wanted or engaged else ""
             if not danger and (wanted or engaged):

@@ -149,9 +149,7 @@ class ExcitationNode(GraphNode):
     def _unheard(self) -> str:
         """How many of those who must listen do not; empty when all do."""
         matched, wanted = self._output.publisher.get_subscription_count(), self.values["subscribers"]
-        return (
-            f"{matched} of {wanted} subscribers of {self._output.publisher.topic}" if matched < wanted else ""
-        )
+        return f"{matched} of {wanted} subscribers of {self._authority.topic}" if matched < wanted else ""
 
     def _other_graphs(self) -> list[str]:
         """Namespaces of the other excitations in this DDS domain; each is told when it is seen first."""
@@ -162,13 +160,12 @@ class ExcitationNode(GraphNode):
         self._neighbours |= found
         return sorted(found)
 
-    def close(self) -> None:
+    def stand_down(self) -> None:
         """A node that is ended while it plays leaves a last command of zero."""
         with self._lock:
             playing = not self.lockstep and self._state in ("running", "ramping")
             if playing:
                 self._halt(self._wall.now(), "the node was ended")
-        super().close()
         if playing:
             for publisher in (self._output.publisher, self._run):
                 publisher.wait_for_all_acked(Duration(seconds=0.5))

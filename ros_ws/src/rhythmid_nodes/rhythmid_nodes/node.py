@@ -86,6 +86,9 @@ class GraphNode(Node):
         self.get_logger().error(f"stopped: {reason}")
         self.done = True
 
+    def stand_down(self) -> None:
+        """Give no more effort, at once; called when the node is about to end, perhaps more than once."""
+
     def begin(self) -> None:
         """Start the workers, once every node of the process stands."""
         for worker in self.workers:
@@ -97,7 +100,8 @@ class GraphNode(Node):
         return next((worker.failure for worker in self.workers if worker.failure is not None), None)
 
     def close(self) -> None:
-        """End the workers and say the last figures; the context is still valid."""
+        """Give no more effort, end the workers and say the last figures; the context is still valid."""
+        self.stand_down()
         for worker in self.workers:
             worker.stop()
         self.diagnostics.publish_last()
@@ -176,6 +180,8 @@ def _spin(executor: Executor, nodes: Sequence[GraphNode], asked: list[int]) -> N
                 raise failure
             if end_at == math.inf and (asked or any(node.done for node in nodes)):
                 end_at = time.monotonic() + _LAST_WORDS
+                for node in nodes:
+                    node.stand_down()
 
 
 def run(build: Callable[[], GraphNode]) -> None:
