@@ -23,7 +23,7 @@ from .clock import Clock, Grid
 from .command import STAMPED, TYPES, Commander
 from .effort_limits import EffortLimits
 from .joint_state import JointStateReader
-from .node import JOINT, PRIORITY, RATE, TIME_MODE, GraphNode, run
+from .node import JOINT, PRIORITY, RATE, TIME_MODE, GraphNode, lapse_notice, run
 from .parameters import Parameter
 from .qos import stream, subscribe_informed
 from .watch import Watch
@@ -157,10 +157,7 @@ class CommandGuard(GraphNode):
             if not danger and (wanted or engaged):
                 self._give(stamp_ns, wanted)
         if self._hold.lapses:
-            self.get_logger().warning(
-                f"a command was not renewed within {self.values['command_timeout']:g} s: it fades to zero",
-                once=True,
-            )
+            self.notice(lapse_notice(self.values["command_timeout"]))
         if danger and engaged:
             self._stop(danger)
 

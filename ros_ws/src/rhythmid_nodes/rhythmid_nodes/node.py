@@ -10,6 +10,7 @@ import signal
 import sys
 import time
 import traceback
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -21,6 +22,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
 from rhythmid.errors import InputError
+from rhythmid.simulation.command_hold import TIMEOUT
 
 from .clock import Worker
 from .diagnostics import Diagnostics
@@ -28,6 +30,7 @@ from .parameters import Parameter, declare
 
 _PR_SET_PDEATHSIG = 1
 _LAST_WORDS = 0.1  # seconds
+_NOTICE_PERIOD = 0.05  # seconds
 
 RATE = Parameter("rate", 1000, "samples per second of the common grid", "Hz", (1, 100_000))
 TIME_MODE = Parameter(
@@ -45,12 +48,17 @@ PRIORITY = Parameter(
 )
 CATCH_UP = Parameter(
     "catch_up",
-    0.05,
+    TIMEOUT,
     "realtime: overrun up to which missed samples follow; after a longer one only the newest does",
     "s",
     (0.0, 10.0),
 )
-"""Half of the time for which a command is held: what follows so late still acts in the place that it was made for."""
+"""By default as long as a command is held: after a longer overrun the robot has been given up already."""
+
+
+def lapse_notice(timeout: float) -> str:
+    """What a node says that holds a command for `timeout` seconds at most."""
+    return f"a command was not renewed within {timeout:g} s: it fades to zero"
 
 
 class GraphNode(Node):
@@ -63,6 +71,9 @@ class GraphNode(Node):
         self.workers: list[Worker] = []
         self.done = False  # set by a node whose work ends by itself; the process then ends
         self.tripped = ""  # why the node stopped its work early, if it did; the process then ends with code 1
+        self._noticed: set[str] = set()
+        self._notices: deque[str] = deque()
+        self.create_timer(_NOTICE_PERIOD, self._tell_notices)
         self.diagnostics = Diagnostics(self, self.figures, self.obstacles, lambda: self.tripped)
 
     @property
@@ -85,6 +96,17 @@ class GraphNode(Node):
         self.tripped = reason
         self.get_logger().error(f"stopped: {reason}")
         self.done = True
+
+    def notice(self, text: str) -> None:
+        """Have `text` logged as a warning, once, by the executor: the first log of a process takes tens of milliseconds, which
+        a clock thread does not have."""
+        if text not in self._noticed:
+            self._noticed.add(text)
+            self._notices.append(text)
+
+    def _tell_notices(self) -> None:
+        while self._notices:
+            self.get_logger().warning(self._notices.popleft())
 
     def stand_down(self) -> None:
         """Give no more effort, at once; called when the node is about to end, perhaps more than once."""

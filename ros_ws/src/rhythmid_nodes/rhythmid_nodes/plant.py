@@ -23,7 +23,7 @@ from .effort_limits import EffortLimits
 from .joint_state import JointStateReader, JointStateWriter
 from .lateness import Lateness
 from .lockstep import Acknowledger, Credit, block
-from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
+from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, lapse_notice, run
 from .parameters import Parameter
 from .qos import stream, subscribe_informed
 from .sample import Sample
@@ -165,10 +165,7 @@ class PlantNode(GraphNode):
 
     def _tell_lapse(self) -> None:
         if self._hold.lapses:
-            self.get_logger().warning(
-                f"a command was not renewed within {self.values['command_timeout']:g} s: it fades to zero",
-                once=True,
-            )
+            self.notice(lapse_notice(self.values["command_timeout"]))
 
     def _publish(self, until_ns: int, origin_ns: int, newest_only: bool = False) -> None:
         samples = self._plant.advance(until_ns)
