@@ -30,7 +30,7 @@ def reference(initial=(0.15, 0.0)):
 
 
 def test_real_time_samples_lie_on_the_grid_without_gaps_and_follow_the_physics(graph):
-    node = graph.add(PlantNode, model=str(MODEL), initial=[0.15, 0.0])
+    node = graph.add(PlantNode, model=str(MODEL), initial=[0.15, 0.0], catch_up=10.0)
     states, forcing = graph.listen("plant/joint_states"), graph.listen("forcing")
     graph.until(lambda: len(states) > 300 and len(forcing) > 300, "300 samples")
     stamps = np.array([stamp_ns(message) for message in states])
@@ -53,7 +53,7 @@ def test_without_the_right_to_priority_it_runs_at_ordinary_priority_and_says_so(
 
 
 def test_a_command_acts_at_its_stamp_and_a_late_one_at_once(graph):
-    node = graph.add(PlantNode, model=str(MODEL), command_timeout=0.0)
+    node = graph.add(PlantNode, model=str(MODEL), command_timeout=0.0, catch_up=10.0)
     states, forcing = graph.listen("plant/joint_states"), graph.listen("forcing")
     send = graph.talk("command")
     graph.until(lambda: len(states) > 50, "samples")
@@ -77,7 +77,7 @@ def test_a_command_acts_at_its_stamp_and_a_late_one_at_once(graph):
 
 
 def test_a_command_that_nobody_renews_fades_to_zero_and_is_counted(graph):
-    node = graph.add(PlantNode, model=str(MODEL), command_timeout=0.1, command_ramp=0.02)
+    node = graph.add(PlantNode, model=str(MODEL), command_timeout=0.1, command_ramp=0.02, catch_up=10.0)
     states, forcing = graph.listen("plant/joint_states"), graph.listen("forcing")
     send = graph.talk("command")
     graph.until(lambda: len(states) > 50, "samples")

@@ -121,11 +121,7 @@ class Supervisor:
         if dead is not None:
             dead.join_output()
             self._listen()  # it may have said why
-        for name, reason in observer.tripped.items():
-            if name != "excitation":  # which says so on `run`
-                return Outcome(1, f"{name} stopped: {reason}")
-        if dead is not None:
-            return _death(dead)
+            return _cause(observer) or _death(dead)
         return Outcome(0, "stopped by the user") if self._interrupted() else None
 
     def _wait_until_ready(self, observer: Observer) -> Outcome | None:
@@ -193,6 +189,8 @@ class Supervisor:
             self._record_tail()
         if observer.state == "finished":
             return Outcome(0, "finished")
+        if cause := _cause(observer):
+            return cause
         reason = observer.run.get("reason", "")
         return Outcome(0 if reason == "asked to stop" else 1, f"excitation stopped: {reason}")
 
@@ -224,6 +222,14 @@ class Supervisor:
                 break
             self._listen()
         observer.tell_outcome(outcome.sentence if outcome.code == 1 else "", punctual=not self._lockstep)
+
+
+def _cause(observer: Observer) -> Outcome | None:
+    """The node that stopped early; the excitation's stop is only a consequence of another's."""
+    for name, reason in observer.tripped.items():
+        if name != "excitation":
+            return Outcome(1, f"{name} stopped: {reason}")
+    return None
 
 
 def _death(process: Supervised) -> Outcome:

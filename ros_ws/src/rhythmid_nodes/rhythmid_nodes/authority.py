@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from .sequence_check import SequenceCheck
 
@@ -13,9 +14,13 @@ _LOOK_PERIOD = (
     0.02  # seconds between two looks at who publishes: a fifth of the time in which effort has to be zero
 )
 
+UNNAMED = "unnamed node"
+"""What a publisher's node is called while its name, which comes after the publisher, is not known."""
+
 
 class Authority:
-    """Watches who publishes on `topic`; `intrusion(reason)` is called whenever a second publisher comes.
+    """Watches who publishes on `topic`; `intrusion(reason)` is called whenever a second publisher comes, and again when its node's
+    name has come, too.
 
     Attributes
     ----------
@@ -26,7 +31,7 @@ class Authority:
         self.topic = node.resolve_topic_name(topic)
         self._node, self._intrusion = node, intrusion
         self._sequence = SequenceCheck()
-        self._conflict = ""  # now
+        self._told = ""  # the conflict that there is now
         self._publishers = ""  # the newest conflict that there was
         self._timer = node.create_timer(_LOOK_PERIOD, self._look)
 
@@ -52,16 +57,23 @@ class Authority:
         if self._count() <= 1:
             return ""
         found = self._node.get_publishers_info_by_topic(self.topic)
-        names = sorted(f"{end.node_namespace.rstrip('/')}/{end.node_name}" for end in found)
+        names = sorted(map(_name, found))
         return f"{len(names)} publishers of {self.topic}: {', '.join(names)}" if len(names) > 1 else ""
 
     def _count(self) -> int:
         return self._node.count_publishers(self.topic)
 
     def _look(self) -> None:
-        conflict, before = self.conflict(), self._conflict
-        self._conflict = conflict
-        if conflict:
+        conflict = self.conflict()
+        if conflict and conflict != self._told:
             self._publishers = conflict
-        if conflict and not before:
-            self._intrusion(conflict)
+            if not self._told or UNNAMED in self._told:
+                self._intrusion(conflict)
+        self._told = conflict
+
+
+def _name(publisher: TopicEndpointInfo) -> str:
+    """Full name of a publisher's node; the publisher's own identifier while the node's name has not come yet."""
+    if "UNKNOWN" in publisher.node_name:
+        return f"{UNNAMED} {bytes(publisher.endpoint_gid).hex()}"
+    return f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -35,11 +36,22 @@ class Diagnostics:
     ) -> None:
         self._node, self._values, self._obstacles, self._tripped = node, values, obstacles, tripped
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", latched(1))
+        self._noticed: set[str] = set()
+        self._notices: deque[str] = deque()
         self._told = ""
         self._told_at = -1.0
         self._timer = node.create_timer(_LOOK_PERIOD, self._look)
 
+    def notice(self, text: str) -> None:
+        """Have `text` logged as a warning, once, by the executor: the first log of a process takes tens of milliseconds, which
+        a clock thread does not have."""
+        if text not in self._noticed:
+            self._noticed.add(text)
+            self._notices.append(text)
+
     def _look(self) -> None:
+        while self._notices:
+            self._node.get_logger().warning(self._notices.popleft())
         message = self._message()
         now = time.monotonic()
         if message != self._told or now - self._told_at >= 1.0:

@@ -23,7 +23,7 @@ from rhythmid.errors import InputError
 from rhythmid.excitation.sequence import build
 from rhythmid.experiment import Safety, ramped
 
-from .authority import Authority
+from .authority import UNNAMED, Authority
 from .clock import Clock, Grid
 from .command import STAMPED, TYPES, Commander
 from .joint_state import JointStateReader
@@ -79,7 +79,7 @@ class ExcitationNode(GraphNode):
         self._lock = threading.Lock()  # measurements and services come on another thread than ticks
         self._reader = JointStateReader(self.values["joint"])
         self._output = self._commander()
-        self._authority = Authority(self, self._output.publisher.topic, self._stop_early)
+        self._authority = Authority(self, self._output.publisher.topic, self._on_intrusion)
         self._run = self.create_publisher(String, "run", latched())
         self.create_service(Trigger, "~/start", self._on_start)
         self.create_service(Trigger, "~/stop", self._on_stop)
@@ -279,12 +279,15 @@ class ExcitationNode(GraphNode):
         self._enter("stopped", reason)
         self.get_logger().error(f"excitation stopped: {reason}")
 
-    def _stop_early(self, danger: str) -> None:
-        """Halt, if it plays: the run has failed."""
+    def _on_intrusion(self, conflict: str) -> None:
         with self._lock:
-            self._abort(self._wall.now(), danger)
+            if UNNAMED in self.tripped:
+                self.tripped = conflict
+                self._enter("stopped", conflict)
+            self._abort(self._wall.now(), conflict)
 
     def _abort(self, stamp_ns: int, danger: str) -> None:
+        """Halt, if it plays: the run has failed."""
         if self._state in ("running", "ramping"):
             self.tripped = danger
             self._halt(stamp_ns, danger)

@@ -10,7 +10,6 @@ import signal
 import sys
 import time
 import traceback
-from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -30,7 +29,7 @@ from .parameters import Parameter, declare
 
 _PR_SET_PDEATHSIG = 1
 _LAST_WORDS = 0.1  # seconds
-_NOTICE_PERIOD = 0.05  # seconds
+_LAST_FINDINGS = 0.5  # seconds after a trip, in which the reason may become clearer: a stranger's name comes after its messages
 
 RATE = Parameter("rate", 1000, "samples per second of the common grid", "Hz", (1, 100_000))
 TIME_MODE = Parameter(
@@ -71,9 +70,6 @@ class GraphNode(Node):
         self.workers: list[Worker] = []
         self.done = False  # set by a node whose work ends by itself; the process then ends
         self.tripped = ""  # why the node stopped its work early, if it did; the process then ends with code 1
-        self._noticed: set[str] = set()
-        self._notices: deque[str] = deque()
-        self.create_timer(_NOTICE_PERIOD, self._tell_notices)
         self.diagnostics = Diagnostics(self, self.figures, self.obstacles, lambda: self.tripped)
 
     @property
@@ -90,23 +86,14 @@ class GraphNode(Node):
         return []
 
     def trip(self, reason: str) -> None:
-        """Stop the work for good, because of `reason`: say so, and end the process soon. Only the first reason is told."""
-        if self.tripped:
-            return
+        """Stop the work for good, because of `reason`: say so, and end the process soon. What is told last counts."""
         self.tripped = reason
         self.get_logger().error(f"stopped: {reason}")
         self.done = True
 
     def notice(self, text: str) -> None:
-        """Have `text` logged as a warning, once, by the executor: the first log of a process takes tens of milliseconds, which
-        a clock thread does not have."""
-        if text not in self._noticed:
-            self._noticed.add(text)
-            self._notices.append(text)
-
-    def _tell_notices(self) -> None:
-        while self._notices:
-            self.get_logger().warning(self._notices.popleft())
+        """Have `text` logged as a warning, once; clock threads use this."""
+        self.diagnostics.notice(text)
 
     def stand_down(self) -> None:
         """Give no more effort, at once; called when the node is about to end, perhaps more than once."""
@@ -201,7 +188,8 @@ def _spin(executor: Executor, nodes: Sequence[GraphNode], asked: list[int]) -> N
             if failure is not None:
                 raise failure
             if end_at == math.inf and (asked or any(node.done for node in nodes)):
-                end_at = time.monotonic() + _LAST_WORDS
+                tripped = any(node.tripped for node in nodes)
+                end_at = time.monotonic() + (_LAST_FINDINGS if tripped and not asked else _LAST_WORDS)
                 for node in nodes:
                     node.stand_down()
 
