@@ -14,6 +14,7 @@ import pytest
 import rclpy
 import yaml
 from rclpy.node import Node
+from rclpy.utilities import try_shutdown
 from rosbags.rosbag2 import Reader
 from sensor_msgs.msg import JointState
 
@@ -257,7 +258,7 @@ def test_a_stranger_who_commands_ends_the_run_with_code_1_and_is_named(
         code, said = run.end()
         stranger.destroy_node()
     finally:
-        rclpy.try_shutdown()
+        try_shutdown()
     assert code == 1
     assert "2 publishers of /hopper/command: /elsewhere/stranger, /hopper/command_delay" in said, said
     rows, states = content(tmp_path / "experiment_bag")
