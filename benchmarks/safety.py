@@ -67,6 +67,7 @@ class Robot:
         self._writer, self._reader = JointStateWriter("leg", "position"), JointStateReader("leg")
         self._states = self.node.create_publisher(JointState, "joint_states", qos_profile_sensor_data)
         self.listen()
+        sys.setswitchinterval(2e-4)  # as in the nodes
         self._grid = Grid(Clock(), 5_000_000, self._measure)
         self._executor = EventsExecutor()
         self._executor.add_node(self.node)
@@ -93,6 +94,10 @@ class Robot:
         while not future.done() and time.monotonic() < patience:
             time.sleep(0.005)
         self.node.destroy_client(client)
+
+    def figures(self) -> dict[str, str]:
+        """How late this process measures, which is the bench's fault."""
+        return self._grid.figures()
 
     def close(self) -> None:
         for worker in (self._grid, self._server):
@@ -124,6 +129,10 @@ class Bench:
         self.stops = 0
         self._folder = folder
         self._running: dict[str, Supervised] = {}
+
+    def _said(self, name: str, line: str) -> None:
+        if not self._strict:
+            print(f"{name}: {line}", flush=True)
 
     def ended(self, name: str) -> bool:
         return self._running[name].returncode is not None
@@ -176,7 +185,7 @@ class Bench:
         ]
         for source, target in {"__ns": "/hopper", **remap}.items():
             line += ["-r", f"{source}:={target}"]
-        self._running[name] = Supervised(name, line, os.environ, lambda *_: None)
+        self._running[name] = Supervised(name, line, os.environ, self._said)
 
 
 def wait(condition: Callable[[], Any], what: str, timeout: float = 60.0) -> None:
@@ -325,8 +334,11 @@ def stay_healthy(bench: Bench, seconds: float) -> bool:
         time.sleep(1.0)
         heard, bench.robot.heard = bench.robot.heard, []
         lapses += any(effort != EFFORT for _, effort in heard)
-        if not heard or heard[-1][1] == 0.0 and heard[0][1] == 0.0:
-            print(f"stopped after {seconds - until + time.monotonic():.1f} s")
+        if not heard or (heard[-1][1] == 0.0 and heard[0][1] == 0.0):
+            late = bench.robot.figures()["lateness_max_ms"]
+            print(
+                f"stopped after {seconds - until + time.monotonic():.1f} s; the robot itself was up to {late} ms late"
+            )
             return False
     print(f"no stop in {seconds:g} s; {lapses} seconds with a lapse of the command")
     return lapses == 0

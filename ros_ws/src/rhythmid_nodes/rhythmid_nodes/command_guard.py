@@ -64,7 +64,8 @@ class CommandGuard(GraphNode):
         self._hold = CommandHold(values["command_timeout"], values["command_ramp"], self.period_ns)
         self._reader = JointStateReader(values["joint"])
         self._wall = Clock()
-        self._lock = threading.Lock()  # messages come on another thread than ticks
+        self._lock = threading.Lock()  # of the hold: messages come on another thread than ticks
+        self._sending = threading.Lock()
         self._obeys = True
         self._given = 0.0  # effort sent last
         self._given_ns = 0
@@ -127,10 +128,8 @@ class CommandGuard(GraphNode):
         if sample is None:
             return
         now = self._wall.now()
-        with self._lock:
-            self._watch.hear(sample, now)
-            danger = self._watch.danger(now) if self._engaged(now) else ""
-        if danger:
+        self._watch.hear(sample, now)
+        if self._engaged(now) and (danger := self._watch.danger(now)):
             self._stop(danger)
 
     def _engaged(self, now_ns: int) -> bool:
@@ -143,19 +142,14 @@ class CommandGuard(GraphNode):
         self._zero()
         self.trip(reason)
 
-    def _zero(self) -> None:
-        with self._lock:
-            if self._given_ns:
-                self._send(self._wall.now(), 0.0)
-
     def _tick(self, stamp_ns: int) -> None:
         with self._lock:
             self._hold.until(stamp_ns)
             wanted = self._hold.effort if self._obeys else 0.0
-            engaged = self._engaged(stamp_ns)
-            danger = self._watch.danger(self._wall.now()) if wanted or engaged else ""
-            if not danger and (wanted or engaged):
-                self._give(stamp_ns, wanted)
+        engaged = self._engaged(stamp_ns)
+        danger = self._watch.danger(self._wall.now()) if wanted or engaged else ""
+        if not danger and (wanted or engaged):
+            self._give(stamp_ns, wanted)
         if self._hold.lapses:
             self.notice(lapse_notice(self.values["command_timeout"]))
         if danger and engaged:
@@ -168,9 +162,15 @@ class CommandGuard(GraphNode):
             self._quiet_ns = stamp_ns + round(_INSIST * 1e9)
         self._send(stamp_ns, effort)
 
+    def _zero(self) -> None:
+        if self._given_ns:
+            self._send(self._wall.now(), 0.0)
+
     def _send(self, stamp_ns: int, effort: float) -> None:
-        self._output.send(stamp_ns, effort)
-        self._given, self._given_ns = effort, stamp_ns
+        with self._sending:
+            effort = effort if self._obeys else 0.0  # nothing follows a last zero
+            self._output.send(stamp_ns, effort)
+            self._given, self._given_ns = effort, stamp_ns
 
 
 def main() -> None:

@@ -296,10 +296,10 @@ class ExcitationNode(GraphNode):
         sample = self._reader.read(data)
         if sample is None:
             return
-        with self._lock:
-            now = self._wall.now()
-            self._watch.hear(sample, now)
-            if danger := self._watch.danger(now):
+        now = self._wall.now()
+        self._watch.hear(sample, now)
+        if danger := self._watch.danger(now):
+            with self._lock:
                 self._abort(now, danger)
 
 

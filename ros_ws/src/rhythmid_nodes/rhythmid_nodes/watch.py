@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from dataclasses import dataclass
 
 from .sample import Sample
@@ -35,7 +36,7 @@ class Limits:
 
 
 class Watch:
-    """Judges measurements one by one (`hear`) and their absence (`danger`). Times are nanoseconds of our clock.
+    """Judges measurements one by one (`hear`) and their absence (`danger`), from any thread. Times are nanoseconds of our clock.
 
     Attributes
     ----------
@@ -45,6 +46,9 @@ class Watch:
     def __init__(self, limits: Limits) -> None:
         self.speed = math.nan
         self._limits = limits
+        self._lock = (
+            threading.Lock()
+        )  # its own: a busy clock thread that holds another for long keeps no measurement waiting
         self._newest: Sample | None = None
         self._gap = 0.0
         self._arrived_ns = self._moved_ns = 0
@@ -54,6 +58,10 @@ class Watch:
 
     def hear(self, sample: Sample, arrived_ns: int) -> None:
         """Take note of a measurement; `danger` judges it."""
+        with self._lock:
+            self._take(sample, arrived_ns)
+
+    def _take(self, sample: Sample, arrived_ns: int) -> None:
         before = self._newest
         self._gap = 0.0 if before is None else (sample.stamp_ns - before.stamp_ns) * 1e-9
         self.speed = _speed(sample, before)
@@ -65,10 +73,11 @@ class Watch:
 
     def danger(self, now_ns: int) -> str:
         """Why the machine must not be excited now; empty when it may."""
-        sample, stale = self._newest, self._limits.stale_after
-        if sample is None:
-            return "no measurement on joint_states yet" if stale > 0.0 else ""
-        return self._state(sample) or self._age(sample, now_ns)
+        with self._lock:
+            sample, stale = self._newest, self._limits.stale_after
+            if sample is None:
+                return "no measurement on joint_states yet" if stale > 0.0 else ""
+            return self._state(sample) or self._age(sample, now_ns)
 
     def _state(self, sample: Sample) -> str:
         limits = self._limits
