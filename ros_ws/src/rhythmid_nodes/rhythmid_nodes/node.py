@@ -23,13 +23,14 @@ from rclpy.utilities import try_shutdown
 from rhythmid.errors import InputError
 from rhythmid.simulation.command_hold import TIMEOUT
 
+from .authority import UNNAMED
 from .clock import Worker
 from .diagnostics import Diagnostics
 from .parameters import Parameter, declare
 
 _PR_SET_PDEATHSIG = 1
 _LAST_WORDS = 0.1  # seconds
-_LAST_FINDINGS = 0.5  # seconds after a trip, in which the reason may become clearer: a stranger's name comes after its messages
+_NAMING = 2.0  # seconds that a tripped node waits for the name of a stranger, which comes after its messages
 
 RATE = Parameter("rate", 1000, "samples per second of the common grid", "Hz", (1, 100_000))
 TIME_MODE = Parameter(
@@ -89,6 +90,12 @@ class GraphNode(Node):
         """Stop the work for good, because of `reason`: say so, and end the process soon. What is told last counts."""
         self.tripped = reason
         self.get_logger().error(f"stopped: {reason}")
+        if UNNAMED in reason:
+            self.create_timer(_NAMING, self._finish)
+        else:
+            self._finish()
+
+    def _finish(self) -> None:
         self.done = True
 
     def notice(self, text: str) -> None:
@@ -188,8 +195,7 @@ def _spin(executor: Executor, nodes: Sequence[GraphNode], asked: list[int]) -> N
             if failure is not None:
                 raise failure
             if end_at == math.inf and (asked or any(node.done for node in nodes)):
-                tripped = any(node.tripped for node in nodes)
-                end_at = time.monotonic() + (_LAST_FINDINGS if tripped and not asked else _LAST_WORDS)
+                end_at = time.monotonic() + _LAST_WORDS
                 for node in nodes:
                     node.stand_down()
 
