@@ -316,7 +316,7 @@ def test_a_machine_that_leaves_its_envelope_ends_the_run_with_code_1(rhythmid, t
         tmp_path,
         time={"mode": "realtime"},
         excitation={"type": "profile", "points": [[0.0, 0.0], [0.5, 20.0]], "length": 20.0},
-        safety={"envelope": [0.0, 0.25], "max_effort": 30.0},
+        safety={"envelope": [0.0, 0.25], "max_effort": 30.0, "stale_after": 5.0},
     )
     done = rhythmid("run", path)
     assert done.returncode == 1 and "outside the envelope" in done.stderr
