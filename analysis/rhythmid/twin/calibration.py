@@ -76,7 +76,9 @@ def calibrate(
     period = nominal_period(np.diff(output.time))
     speed = _speed(output, period, settings)
     if not speed > 0.0:
-        raise InputError("the healthy stretch shows no motion: a machine at rest tells nothing of its physics")
+        raise InputError(
+            "the healthy stretch shows no motion: a machine at rest tells nothing of its physics"
+        )
     block = block_length(output.value, period)
     size = max(round(SEGMENT / period), BLOCKS)
     block = max(1, min(block, size // BLOCKS))

@@ -72,5 +72,3 @@ def without_own_forcing(model: Model) -> Model:
     for term in [term for term in model.terms if term.element.acts == "drive"]:
         model = model.without(term.label)
     return model
-
-

@@ -64,10 +64,10 @@ class Healthy:
         statistic, rank = self.statistic(score)
         if score.count == 0 or rank == 0:
             return 0.0
-        limit = f_distribution.isf(self.probability, rank, threshold.score_freedom)
+        limit = float(f_distribution.isf(self.probability, rank, threshold.score_freedom))
         squares = score.squares / (score.count * threshold.squares_mean)
         count = score.count / threshold.squares_excess
-        most = f_distribution.isf(self.probability, count, threshold.score_freedom * count / rank)
+        most = float(f_distribution.isf(self.probability, count, threshold.score_freedom * count / rank))
         relative = statistic / (rank * threshold.score_excess)  # both have the mean 1 in healthy operation
         return max((relative - 1.0) / (limit - 1.0), (squares - 1.0) / (most - 1.0), 0.0)
 
@@ -97,7 +97,7 @@ def learn_healthy(scores: Sequence[Score], segment: float, false_alarms: float) 
             ranks.append(rank)
             squares.append(one.squares / max(one.count, 1))
         freedom = float(max(sum(ranks), 1))
-        count = np.mean([one.count for one in windows])
+        count = float(np.mean([one.count for one in windows]))
         mean = float(np.mean(squares))
         # variance of a mean of `count` independent squares is 2 mean² / count
         scattered = float(np.var(squares, ddof=1)) * count / (2.0 * mean**2) if len(squares) > 1 else 1.0

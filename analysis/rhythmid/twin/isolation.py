@@ -1,7 +1,7 @@
 """Isolation: in which slot of the signal path the physics has changed, by how much, and the delays now."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,37 +33,44 @@ class Isolation:
 
     `slot` explains most of it, `rivals` are slots that cannot be told from it, `share` is what each slot's best change explains
     of the mismatch, `changes` those best changes, the most likely first. `slot` is "unknown" where none explains half of it.
+    `excess` is how much larger than by theory what they leave is.
     """
 
     slot: str
     rivals: tuple[str, ...]
     share: dict[str, float]
     changes: tuple[Sized, ...]
+    excess: float
 
 
 def isolate(score: Score, healthy: Healthy, changes: Sequence[Change], excess: float) -> Isolation:
-    """The slot whose one change explains the score best. `excess` is the overdispersion of the score."""
+    """The slot whose one change explains the score best.
+
+    `excess` is the overdispersion of the score in healthy operation. What the best change leaves counts, too: a change so large that
+    its effects are no longer proportional to its size leaves more than noise.
+    """
     centred = healthy.centred(score)
     information = np.diag(score.information)
-    inverted, _ = inverse(score.information)
+    inverted, rank = inverse(score.information)
     whole = max(float(centred @ inverted @ centred), 1e-300)
     best: dict[str, Sized] = {}
     for index, change in enumerate(changes):
         if not information[index] > 0.0:
             continue
         size = float(centred[index] / information[index])
-        std = float(np.sqrt(excess / information[index]))
         explained = size**2 * float(information[index])
         if change.slot not in best or explained > best[change.slot].explained:
+            std = float(1.0 / np.sqrt(information[index]))
             best[change.slot] = Sized(change.name, change.slot, size, std, change.unit, explained)
     ranked = sorted(best.values(), key=lambda one: -one.explained)
+    if ranked:
+        excess = max(excess, (whole - ranked[0].explained) / max(rank - 1, 1))
+    ranked = [replace(one, std=one.std * excess**0.5) for one in ranked]
     share = {one.slot: min(1.0, one.explained / whole) for one in ranked}
     if not ranked or share[ranked[0].slot] < SHOWN:
-        return Isolation("unknown", tuple(share), share, tuple(ranked))
-    rivals = tuple(
-        one.slot for one in ranked[1:] if ranked[0].explained - one.explained < ODDS * excess
-    )
-    return Isolation(ranked[0].slot, rivals, share, tuple(ranked))
+        return Isolation("unknown", tuple(share), share, tuple(ranked), excess)
+    rivals = tuple(one.slot for one in ranked[1:] if ranked[0].explained - one.explained < ODDS * excess)
+    return Isolation(ranked[0].slot, rivals, share, tuple(ranked), excess)
 
 
 @dataclass(frozen=True)
@@ -75,7 +82,12 @@ class DelayNow:
 
 
 def delays_now(
-    score: Score, healthy: Healthy, changes: Sequence[Change], values: Sequence[float], beside: str | None, excess: float
+    score: Score,
+    healthy: Healthy,
+    changes: Sequence[Change],
+    values: Sequence[float],
+    beside: str | None,
+    excess: float,
 ) -> dict[str, DelayNow]:
     """Both delays now, and their sum, from the score of a window.
 
@@ -90,7 +102,9 @@ def delays_now(
     found: dict[str, DelayNow] = {}
     information = score.information[np.ix_(chosen, chosen)]
     if not present or not np.all(np.diag(information) > 0.0):
-        return {name.removesuffix("_delay.delay"): DelayNow(value, None) for name, value in zip(DELAYS, values)}
+        return {
+            name.removesuffix("_delay.delay"): DelayNow(value, None) for name, value in zip(DELAYS, values)
+        }
     inverted, rank = inverse(information)
     shift = inverted @ healthy.centred(score)[chosen]
     for place, name in enumerate(present):

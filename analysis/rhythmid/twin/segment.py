@@ -16,9 +16,11 @@ from rhythmid.twin.settings import Settings
 Array = NDArray[np.float64]
 Pieces = tuple[Array, Array]
 SMALL = 1e-3  # of its scale, by which a state or parameter is moved to see what it does
-DELAY_STEP = 2e-4  # s, likewise of a delay: below the sample period of most machines, above the rounding of times
+DELAY_STEP = (
+    2e-4  # s, likewise of a delay: below the sample period of most machines, above the rounding of times
+)
 MARGIN = 4  # samples on either side of a segment that a spline through a smooth signal takes
-LONGEST_STEP = 1e-3  # s of the integration
+LONGEST_STEP = 2e-3  # s of the integration: a hundredth of a period of 5 Hz
 DIVERGED = 1e100
 
 
@@ -63,9 +65,7 @@ class Simulation:
 
     def __init__(self, model: Model, changes: tuple[Change, ...], settings: Settings, period: float) -> None:
         self.model, self.changes, self.settings = model, changes, settings
-        self.compiled = compile_model(
-            model, excited=settings.input_kind, measured=settings.output_kind
-        )
+        self.compiled = compile_model(model, excited=settings.input_kind, measured=settings.output_kind)
         self.parameters = self.compiled.layout.vector(model)
         places = {name: index for index, (name, _) in enumerate(self.compiled.layout.parameters)}
         self.places = [places.get(change.name) for change in changes]

@@ -14,6 +14,7 @@ from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.model import Model
 from rhythmid.twin.calibration import Calibration, calibrate
 from rhythmid.twin.changes import DELAYS, without_own_forcing
+from rhythmid.twin.detector import Threshold
 from rhythmid.twin.isolation import DelayNow, Isolation, delays_now, isolate
 from rhythmid.twin.observer import Observer
 from rhythmid.twin.samples import Samples
@@ -81,6 +82,7 @@ class Twin:
         self._observer: Observer | None = None
         self._since: float | None = None
         self._below: float | None = None
+        self._after = 0  # segments since the mismatch was seen
         if calibration is not None:
             self._engage(calibration)
 
@@ -102,7 +104,9 @@ class Twin:
         assert calibration is not None
         said = []
         size = calibration.filter.samples
-        while self._taken + size <= len(output) and self._complete(float(output.time[self._taken + size - 1])):
+        while self._taken + size <= len(output) and self._complete(
+            float(output.time[self._taken + size - 1])
+        ):
             part = slice(self._taken, self._taken + size)
             status = self._judge(calibration, output.time[part], output.value[part])
             self._taken += size
@@ -131,15 +135,18 @@ class Twin:
         stretch = Samples()
         stretch.append(output.time[:end], output.value[:end])
         self.calibration = calibrate(
-            self.model, self._catalogue, self.settings, stretch, self.samples["input"], self.samples.get("forcing")
+            self.model,
+            self._catalogue,
+            self.settings,
+            stretch,
+            self.samples["input"],
+            self.samples.get("forcing"),
         )
         self._engage(self.calibration)
         self._taken = max(0, end - self.calibration.filter.samples)
 
     def _engage(self, calibration: Calibration) -> None:
-        simulation = Simulation(
-            calibration.model, calibration.changes, self.settings, calibration.period
-        )
+        simulation = Simulation(calibration.model, calibration.changes, self.settings, calibration.period)
         self._observer = Observer(simulation, calibration.filter, calibration.sizes)
         self._whitener = Whitener(calibration.noise, len(calibration.changes))
         longest = max(one.segments for one in calibration.healthy.thresholds)
@@ -157,32 +164,44 @@ class Twin:
             self._settling -= 1
             return Status(float(time[-1]), "learning")
         self._scores.append(score)
-        healthy, scores = calibration.healthy, list(self._scores)
-        sums = [
-            (sum(scores[-one.segments + 1 :] if one.segments > 1 else [], scores[-one.segments]), one)
-            for one in healthy.thresholds
-            if len(scores) >= one.segments
-        ]
-        if not sums:
+        sums = [(self._last(one.segments), one) for one in calibration.healthy.thresholds]
+        if len(self._scores) < sums[-1][1].segments:
             return Status(float(time[-1]), "ok")
+        return self._say(calibration, float(time[-1]), sums)
+
+    def _last(self, segments: int) -> Score:
+        """Score of the last segments."""
+        scores = list(self._scores)[-segments:]
+        return sum(scores[1:], scores[0])
+
+    def _say(self, calibration: Calibration, now: float, sums: list[tuple[Score, Threshold]]) -> Status:
+        """Status from the scores of all windows, the shortest first."""
+        healthy, (shortest, fast), (longest, slow) = calibration.healthy, sums[0], sums[-1]
         mismatch = max(healthy.mismatch(total, one) for total, one in sums)
-        shortest, longest = sums[0], sums[-1]
-        now = float(time[-1])
         level = self._level(now, mismatch)
         where = None
-        excess = longest[1].score_excess
+        excess = slow.score_excess
         if level != "ok":
-            where = isolate(longest[0], healthy, calibration.changes, excess)
+            longest = self._last(self._since_onset(fast.segments, slow.segments))
+            where = isolate(longest, healthy, calibration.changes, excess)
+            excess = where.excess
+            self._after += 1
         values = [_delay(calibration.model, name) for name in DELAYS]
         beside = None if where is None or not where.changes else where.changes[0].name
-        delays = delays_now(longest[0], healthy, calibration.changes, values, beside, excess)
-        squares = shortest[0].squares / max(shortest[0].count * shortest[1].squares_mean, 1e-300)
+        delays = delays_now(longest, healthy, calibration.changes, values, beside, excess)
+        squares = shortest.squares / max(shortest.count * fast.squares_mean, 1e-300)
         return Status(now, level, mismatch, float(np.sqrt(squares)), self._since, where, delays)
+
+    def _since_onset(self, fast: int, slow: int) -> int:
+        """Segments that tell of a mismatch: those since it was seen, later without the transient of the short window."""
+        settled = self._after - fast
+        return min(settled if settled >= fast else max(self._after, 1), slow)
 
     def _level(self, now: float, mismatch: float) -> Level:
         """A mismatch lasts until it has been below its threshold for as long as the longest window."""
         if mismatch >= 1.0:
-            self._since = now if self._since is None else self._since
+            if self._since is None:
+                self._since, self._after = now, 0
             self._below = None
         elif self._since is not None:
             self._below = now if self._below is None else self._below

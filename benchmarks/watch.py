@@ -1,0 +1,333 @@
+"""The live twin on simulated machines: how soon a change of physics is reported, with which slot, and how often nothing is.
+
+    python benchmarks/watch.py changes --runs 34         # of each of three machines; every run is changed in four ways
+    python benchmarks/watch.py days --pieces 12 --hours 2    # healthy operation, each piece another machine
+
+Machines are drawn at random about three designs. The model is not the truth but what `rhythmid identify` finds in a record of the same
+machine; each run has its own noise and excitation. The changes: friction doubled, 5 ms more delay of the command, or of the
+measurement, a payload of 5 % of the inertia. A change counts as reported when a warning comes within 10 s, and its slot as right when
+it is the one that the twin says 10 s after the change.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.excitation.multisine import Multisine
+from rhythmid.identify.identify import identify
+from rhythmid.model import INERTIA, Model
+from rhythmid.record.record import Channel, Record
+from rhythmid.simulation.signal import spline, zero_order_hold
+from rhythmid.simulation.simulate import simulate, start_states
+from rhythmid.simulation.compiled import compile_model
+from rhythmid.twin.settings import DAY, Settings
+from rhythmid.twin.twin import Status, Twin
+
+Array = NDArray[np.float64]
+RATE = 250.0  # Hz
+HEALTHY = 60.0  # s
+WITHIN = 10.0  # s
+LEAD = 12.0  # s before a change from which a twin that knows the healthy machine runs
+IDENTIFIED = 40.0  # s of record for the identification
+CHUNK = 60.0  # s simulated at a time
+DESIGNS = {
+    "hopper": """
+inertia: {mass: {value: 1.0, unit: kg, fixed: true}}
+command: [{input_delay: {delay: {value: 0.02, unit: s}}}]
+force:
+  - gravity: {acceleration: {value: 9.81, unit: m/s^2, fixed: true}}
+  - linear_spring: {stiffness: {value: 200.0, unit: N/m}, rest_length: {value: 0.2, unit: m}}
+  - switched_damper: {stance: {value: 2.0, unit: N*s/m}, flight: {value: 0.0, unit: N*s/m, fixed: true}}
+sensor: [{measurement_delay: {delay: {value: 0.03, unit: s}}}]
+""",
+    "lift": """
+inertia: {mass: {value: 2.0, unit: kg, fixed: true}}
+command: [{input_delay: {delay: {value: 0.01, unit: s}}}]
+force:
+  - gravity: {acceleration: {value: 9.81, unit: m/s^2, fixed: true}}
+  - linear_spring: {stiffness: {value: 800.0, unit: N/m}, rest_length: {value: 0.0, unit: m}}
+  - viscous_damper: {damping: {value: 8.0, unit: N*s/m}}
+  - coulomb_friction: {force: {value: 1.0, unit: N}, transition: {value: 0.005, unit: m/s, fixed: true}}
+sensor: [{measurement_delay: {delay: {value: 0.005, unit: s}}}]
+""",
+    "joint": """
+inertia: {mass: {value: 0.05, unit: kg*m^2}}
+command: [{input_delay: {delay: {value: 0.008, unit: s}}}]
+force:
+  - linear_spring: {stiffness: {value: 3.0, unit: N*m/rad}, rest_length: {value: 0.0, unit: rad, fixed: true}}
+  - viscous_damper: {damping: {value: 0.05, unit: N*m*s/rad}}
+  - coulomb_friction: {force: {value: 0.03, unit: N*m}, transition: {value: 0.02, unit: rad/s, fixed: true}}
+sensor: [{measurement_delay: {delay: {value: 0.0, unit: s, fixed: true}}}]
+""",
+}
+DRIVES = {  # amplitude [N] and frequency [Hz] of the forcing, rms [N] of the excitation
+    "hopper": (1.0, 1.0, 0.25),
+    "lift": (6.0, 1.4, 5.0),
+    "joint": (0.0, 1.0, 0.25),
+}
+FRICTION = {"hopper": "switched_damper.stance", "lift": "coulomb_friction.force", "joint": "coulomb_friction.force"}
+CHANGES = {"friction": "force", "command delay": "command", "measurement delay": "sensor", "payload": "inertia"}
+NOISE = (1e-3, 1e-2)  # of the motion's standard deviation
+LATER = 0.005  # s
+SPREAD = 0.2  # of every free parameter, about its design
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A machine as drawn, with its forcing, excitation and noise."""
+
+    name: str
+    truth: Model
+    forcing: tuple[float, float]
+    rms: float
+    noise: float
+    correlation: float
+
+
+def drawn(name: str, rng: np.random.Generator) -> Machine:
+    """A machine about a design."""
+    design = Model.from_text(DESIGNS[name], name, load_catalogue())
+    values = {n: design.value(n) * rng.uniform(1.0 - SPREAD, 1.0 + SPREAD) for n in design.free}
+    amplitude, frequency, rms = DRIVES[name]
+    share = float(np.exp(rng.uniform(*np.log(NOISE))))
+    return Machine(name, design.with_values(values), (amplitude, frequency), rms, share, rng.choice([0.0, 0.5]))
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Signals of a while: times [s], command, forcing, and the measurement with its stamps; the state at the end."""
+
+    time: Array
+    command: Array
+    forcing: Array
+    stamp: Array
+    measured: Array
+    end: Array
+
+
+class Operation:
+    """A machine at work with one excitation and one noise; the excitation repeats itself with other phases from chunk to chunk."""
+
+    def __init__(self, machine: Machine, seed: int) -> None:
+        self.machine = machine
+        self.random = np.random.default_rng([seed, 1])
+        self.excitation = Multisine(rms=machine.rms, period=20.0, periods=1, band=(0.3, 8.0), seed=seed)
+        tau = machine.truth.value("measurement_delay.delay")
+        self.delay = tau
+        self.before = np.zeros(1)
+        quiet = self._simulated(machine.truth, 0.0, 30.0, self._rest())
+        self.std = machine.noise * float(np.std(quiet.measured))
+        self.coloured = 0.0
+
+    def _rest(self) -> Array:
+        model = self.machine.truth
+        weight = model.mass.value * 9.81 if model.term("gravity") is not None else 0.0
+        rest = model.value("linear_spring.rest_length") - weight / model.value("linear_spring.stiffness")
+        return start_states(model, compile_model(model.without("measurement_delay")), rest, 0.0)
+
+    def command(self, times: Array) -> Array:
+        """The command [N] at its stamps [s]."""
+        return self.excitation(np.mod(times, self.excitation.period))
+
+    def _simulated(self, model: Model, start: float, end: float, state: Array) -> Stretch:
+        """Without noise."""
+        delay = model.value("measurement_delay.delay")
+        time = np.arange(round(start * RATE), round(end * RATE) + 1) / RATE
+        known = np.arange(round((start - 0.2) * RATE), round(end * RATE) + 1) / RATE
+        amplitude, frequency = self.machine.forcing
+        forcing = amplitude * np.cos(2.0 * np.pi * frequency * known)
+        run = simulate(
+            model.without("measurement_delay"), time, zero_order_hold(known, self.command(known)),
+            spline(known, forcing), state,
+        )  # fmt: skip
+        first = len(known) - len(time)
+        return Stretch(
+            time, self.command(time), forcing[first:], time + delay, run.output, run.states[-1]
+        )
+
+    def run(self, model: Model, start: float, end: float, state: Array | None = None) -> Stretch:
+        """The machine at work from `start` to `end` [s] as `model`, from a state, or from rest."""
+        made = self._simulated(model, start, end, self._rest() if state is None else state)
+        rho = self.machine.correlation
+        white = self.std * np.sqrt(1.0 - rho**2) * self.random.standard_normal(len(made.time))
+        noise = np.empty(len(white))
+        for k, one in enumerate(white):
+            self.coloured = rho * self.coloured + one
+            noise[k] = self.coloured
+        return replace(made, measured=made.measured + noise)
+
+
+def record(made: Stretch) -> Record:
+    """A stretch as a record."""
+    forced = Channel(made.time, made.forcing, "N") if np.any(made.forcing) else None
+    return Record("stretch", Channel(made.stamp, made.measured, "m"), Channel(made.time, made.command, "N"), forced)
+
+
+def identified(machine: Machine, seed: int) -> Model:
+    """What identification finds of a machine, starting from its design."""
+    made = Operation(machine, seed).run(machine.truth, 0.0, IDENTIFIED)
+    design = Model.from_text(DESIGNS[machine.name], machine.name, load_catalogue())
+    return identify([record(made)], design, htf="none" if False else "auto").model
+
+
+def fed(twin: Twin, made: Stretch) -> Iterator[Status]:
+    """What a twin says of a stretch that comes in a second at a time."""
+    step = round(RATE)
+    for first in range(0, len(made.time), step):
+        part = slice(first, first + step)
+        twin.push("input", made.time[part], made.command[part])
+        if "forcing" in twin.samples:
+            twin.push("forcing", made.time[part], made.forcing[part])
+        twin.push("output", made.stamp[part], made.measured[part])
+        yield from twin.advance()
+
+
+def changed(model: Model, change: str, name: str) -> Model:
+    """The machine after a change."""
+    parameter, factor, more = {
+        "friction": (FRICTION[name], 2.0, 0.0),
+        "payload": (INERTIA, 1.05, 0.0),
+        "command delay": ("input_delay.delay", 1.0, LATER),
+        "measurement delay": ("measurement_delay.delay", 1.0, LATER),
+    }[change]
+    return model.with_values({parameter: model.value(parameter) * factor + more})
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of one change: seconds until it was reported, None where it was not within ten; the slot said then; alarms before it."""
+
+    machine: str
+    change: str
+    after: float | None
+    slot: str | None
+    rivals: tuple[str, ...]
+    early: bool
+
+    @property
+    def right(self) -> bool:
+        """Whether the slot is right."""
+        return self.after is not None and self.slot == CHANGES[self.change]
+
+
+def one_run(machine: Machine, model: Model, seed: int) -> list[Outcome]:
+    """All changes of one run."""
+    operation, forced = Operation(machine, seed), machine.forcing[0] != 0.0
+    learnt = operation.run(machine.truth, 0.0, HEALTHY + 2.0)
+    twin = Twin(model, Settings(healthy=HEALTHY), forced)
+    for _ in fed(twin, learnt):
+        pass
+    start = HEALTHY + 2.0
+    at = start + LEAD + float(np.random.default_rng([seed, 2]).uniform(0.0, 2.0))
+    lead = operation.run(machine.truth, start, at, learnt.end)
+    found = []
+    for change in CHANGES:
+        after = operation.run(changed(machine.truth, change, machine.name), at, at + WITHIN + 1.0, lead.end)
+        live = Twin(model, Settings(), forced, twin.calibration)
+        joined = [
+            Stretch(*(np.concatenate([a[:-1], b]) for a, b in zip(vars(lead).values(), vars(after).values())))
+        ]
+        said = [status for part in joined for status in fed(live, part)]
+        change_seen = at + operation.delay
+        early = any(one.since is not None and one.time < change_seen for one in said)
+        seen = [one.time - change_seen for one in said if one.since is not None and one.time >= change_seen]
+        last = [one for one in said if one.time <= change_seen + WITHIN][-1].isolation
+        soon = seen[0] if seen and seen[0] <= WITHIN else None
+        slot, rivals = (None, ()) if last is None else (last.slot, last.rivals)
+        found.append(Outcome(machine.name, change, soon, slot, rivals, early))
+    return found
+
+
+def changes(runs: int, machines: int, names: list[str], seed: int) -> None:
+    """Print how soon changes are reported, and with which slot."""
+    outcomes: list[Outcome] = []
+    for name in names:
+        rng = np.random.default_rng([seed, list(DESIGNS).index(name)])
+        for number in range(machines):
+            machine = drawn(name, rng)
+            begun = time.monotonic()
+            model = identified(machine, 1000 + number)
+            took = time.monotonic() - begun
+            begun = time.monotonic()
+            for run in range(number, runs, machines):
+                outcomes += one_run(machine, model, seed + 10_000 * number + run)
+            print(f"{name} {number}: identified in {took:.0f} s, runs in {time.monotonic() - begun:.0f} s", flush=True)
+        show([one for one in outcomes if one.machine == name], name)
+    show(outcomes, "all")
+
+
+def show(outcomes: list[Outcome], title: str) -> None:
+    """A line for each change."""
+    for change, slot in CHANGES.items():
+        mine = [one for one in outcomes if one.change == change]
+        times = sorted(one.after for one in mine if one.after is not None)
+        if not mine:
+            continue
+        middle = f"median {np.median(times):.2f} s, longest {times[-1]:.2f} s" if times else "never"
+        wrong = [f"{one.machine}: {one.slot}" for one in mine if not one.right]
+        alone = sum(one.right and not one.rivals for one in mine)
+        print(
+            f"{title:7s} {change:18s} reported {len(times)} of {len(mine)} ({middle}); slot {slot} in {sum(o.right for o in mine)}, "
+            f"without rival in {alone}; alarms before the change: {sum(o.early for o in mine)}; others: {wrong}", flush=True
+        )  # fmt: skip
+
+
+def days(pieces: int, hours: float, names: list[str], seed: int, false_alarms: float) -> None:
+    """Print how many alarms come in healthy operation."""
+    total, alarms = 0.0, 0
+    largest: list[float] = []
+    for piece in range(pieces):
+        name = names[piece % len(names)]
+        machine = drawn(name, np.random.default_rng([seed, piece, 3]))
+        model = identified(machine, 2000 + piece)
+        operation = Operation(machine, seed + 77 * piece)
+        twin = Twin(model, Settings(healthy=HEALTHY, false_alarms=false_alarms), machine.forcing[0] != 0.0)
+        begun, state, events, last, peak = time.monotonic(), None, set(), 0.0, 0.0
+        for start in np.arange(0.0, hours * 3600.0, CHUNK):
+            made = operation.run(machine.truth, float(start), float(start) + CHUNK, state)
+            state = made.end
+            made = Stretch(*(one[:-1] for one in vars(made).values()))
+            for status in fed(twin, made):
+                if status.level != "learning":
+                    last, peak = status.time, max(peak, status.mismatch)
+                if status.since is not None:
+                    events.add(status.since)
+        watched = max(0.0, last - HEALTHY)
+        total, alarms = total + watched, alarms + len(events)
+        largest.append(peak)
+        print(
+            f"{name} {piece}: {watched / 3600.0:.2f} h watched in {time.monotonic() - begun:.0f} s, {len(events)} alarms, "
+            f"largest statistic {peak:.2f} of its threshold; {total / DAY:.2f} days, {alarms} alarms so far", flush=True
+        )  # fmt: skip
+    print(f"{alarms} false alarms in {total / DAY:.2f} days; {false_alarms:g} a day are allowed")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = parser.add_subparsers(dest="command", required=True)
+    one = commands.add_parser("changes")
+    one.add_argument("--runs", type=int, default=34)
+    one.add_argument("--machines", type=int, default=4, help="drawn of each design")
+    two = commands.add_parser("days")
+    two.add_argument("--pieces", type=int, default=12)
+    two.add_argument("--hours", type=float, default=2.0)
+    two.add_argument("--false-alarms", type=float, default=1.0)
+    for sub in (one, two):
+        sub.add_argument("--designs", nargs="+", choices=list(DESIGNS), default=list(DESIGNS))
+        sub.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args()
+    if given.command == "changes":
+        changes(given.runs, given.machines, given.designs, given.seed)
+    else:
+        days(given.pieces, given.hours, given.designs, given.seed, given.false_alarms)
+
+
+if __name__ == "__main__":
+    main()
