@@ -12,9 +12,11 @@ it is the one that the twin says 10 s after the change.
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +26,9 @@ from rhythmid.excitation.multisine import Multisine
 from rhythmid.identify.identify import identify
 from rhythmid.model import INERTIA, Model
 from rhythmid.record.record import Channel, Record
+from rhythmid.simulation.compiled import compile_model
 from rhythmid.simulation.signal import spline, zero_order_hold
 from rhythmid.simulation.simulate import simulate, start_states
-from rhythmid.simulation.compiled import compile_model
 from rhythmid.twin.settings import DAY, Settings
 from rhythmid.twin.twin import Status, Twin
 
@@ -72,8 +74,17 @@ DRIVES = {  # amplitude [N] and frequency [Hz] of the forcing, rms [N] of the ex
     "lift": (6.0, 1.4, 5.0),
     "joint": (0.0, 1.0, 0.25),
 }
-FRICTION = {"hopper": "switched_damper.stance", "lift": "coulomb_friction.force", "joint": "coulomb_friction.force"}
-CHANGES = {"friction": "force", "command delay": "command", "measurement delay": "sensor", "payload": "inertia"}
+FRICTION = {
+    "hopper": "switched_damper.stance",
+    "lift": "coulomb_friction.force",
+    "joint": "coulomb_friction.force",
+}
+CHANGES = {
+    "friction": "force",
+    "command delay": "command",
+    "measurement delay": "sensor",
+    "payload": "inertia",
+}
 NOISE = (1e-3, 1e-2)  # of the motion's standard deviation
 LATER = 0.005  # s
 SPREAD = 0.2  # of every free parameter, about its design
@@ -97,7 +108,9 @@ def drawn(name: str, rng: np.random.Generator) -> Machine:
     values = {n: design.value(n) * rng.uniform(1.0 - SPREAD, 1.0 + SPREAD) for n in design.free}
     amplitude, frequency, rms = DRIVES[name]
     share = float(np.exp(rng.uniform(*np.log(NOISE))))
-    return Machine(name, design.with_values(values), (amplitude, frequency), rms, share, rng.choice([0.0, 0.5]))
+    return Machine(
+        name, design.with_values(values), (amplitude, frequency), rms, share, rng.choice([0.0, 0.5])
+    )
 
 
 @dataclass(frozen=True)
@@ -148,9 +161,7 @@ class Operation:
             spline(known, forcing), state,
         )  # fmt: skip
         first = len(known) - len(time)
-        return Stretch(
-            time, self.command(time), forcing[first:], time + delay, run.output, run.states[-1]
-        )
+        return Stretch(time, self.command(time), forcing[first:], time + delay, run.output, run.states[-1])
 
     def run(self, model: Model, start: float, end: float, state: Array | None = None) -> Stretch:
         """The machine at work from `start` to `end` [s] as `model`, from a state, or from rest."""
@@ -167,14 +178,16 @@ class Operation:
 def record(made: Stretch) -> Record:
     """A stretch as a record."""
     forced = Channel(made.time, made.forcing, "N") if np.any(made.forcing) else None
-    return Record("stretch", Channel(made.stamp, made.measured, "m"), Channel(made.time, made.command, "N"), forced)
+    return Record(
+        "stretch", Channel(made.stamp, made.measured, "m"), Channel(made.time, made.command, "N"), forced
+    )
 
 
 def identified(machine: Machine, seed: int) -> Model:
     """What identification finds of a machine, starting from its design."""
     made = Operation(machine, seed).run(machine.truth, 0.0, IDENTIFIED)
     design = Model.from_text(DESIGNS[machine.name], machine.name, load_catalogue())
-    return identify([record(made)], design, htf="none" if False else "auto").model
+    return identify([record(made)], design).model
 
 
 def fed(twin: Twin, made: Stretch) -> Iterator[Status]:
@@ -245,20 +258,29 @@ def one_run(machine: Machine, model: Model, seed: int) -> list[Outcome]:
     return found
 
 
-def changes(runs: int, machines: int, names: list[str], seed: int) -> None:
-    """Print how soon changes are reported, and with which slot."""
+def changes(runs: int, machines: int, names: list[str], seed: int, keep: Path | None) -> None:
+    """Print how soon changes are reported, and with which slot; outcomes are added to those in a file of JSON lines."""
     outcomes: list[Outcome] = []
+    if keep is not None and keep.exists():
+        outcomes = [Outcome(**json.loads(line)) for line in keep.read_text(encoding="utf-8").splitlines()]
     for name in names:
         rng = np.random.default_rng([seed, list(DESIGNS).index(name)])
         for number in range(machines):
             machine = drawn(name, rng)
             begun = time.monotonic()
-            model = identified(machine, 1000 + number)
+            model = identified(machine, 1000 * (seed + 1) + number)
             took = time.monotonic() - begun
             begun = time.monotonic()
             for run in range(number, runs, machines):
-                outcomes += one_run(machine, model, seed + 10_000 * number + run)
-            print(f"{name} {number}: identified in {took:.0f} s, runs in {time.monotonic() - begun:.0f} s", flush=True)
+                found = one_run(machine, model, 100_000 * seed + 10_000 * number + run)
+                outcomes += found
+                if keep is not None:
+                    with keep.open("a", encoding="utf-8") as file:
+                        file.writelines(json.dumps(vars(one)) + "\n" for one in found)
+            print(
+                f"{name} {number}: identified in {took:.0f} s, runs in {time.monotonic() - begun:.0f} s",
+                flush=True,
+            )
         show([one for one in outcomes if one.machine == name], name)
     show(outcomes, "all")
 
@@ -310,10 +332,13 @@ def days(pieces: int, hours: float, names: list[str], seed: int, false_alarms: f
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     commands = parser.add_subparsers(dest="command", required=True)
     one = commands.add_parser("changes")
     one.add_argument("--runs", type=int, default=34)
+    one.add_argument("--keep", type=Path, help="file of JSON lines that outcomes are added to")
     one.add_argument("--machines", type=int, default=4, help="drawn of each design")
     two = commands.add_parser("days")
     two.add_argument("--pieces", type=int, default=12)
@@ -324,7 +349,7 @@ def main() -> None:
         sub.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     if given.command == "changes":
-        changes(given.runs, given.machines, given.designs, given.seed)
+        changes(given.runs, given.machines, given.designs, given.seed, given.keep)
     else:
         days(given.pieces, given.hours, given.designs, given.seed, given.false_alarms)
 

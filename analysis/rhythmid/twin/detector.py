@@ -11,6 +11,7 @@ Tests that share data go off together; counting them as separate only makes fals
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +27,11 @@ STATISTICS = 2  # of each window
 
 @dataclass(frozen=True)
 class Threshold:
-    """Of one window: its segments, the overdispersion of both statistics in healthy operation, and the degrees of freedom with
-    which each is known."""
+    """Of one window: its segments, how many of it the healthy stretch had, the overdispersion of both statistics there, and the
+    degrees of freedom with which that of the score is known."""
 
     segments: int
+    windows: int
     score_excess: float
     score_freedom: float
     squares_mean: float
@@ -64,12 +66,18 @@ class Healthy:
         statistic, rank = self.statistic(score)
         if score.count == 0 or rank == 0:
             return 0.0
-        limit = float(f_distribution.isf(self.probability, rank, threshold.score_freedom))
+        limit = _quantile(self.probability, rank, threshold.score_freedom)
         squares = score.squares / (score.count * threshold.squares_mean)
-        count = score.count / threshold.squares_excess
-        most = float(f_distribution.isf(self.probability, count, threshold.score_freedom * count / rank))
+        count = max(1, round(score.count / threshold.squares_excess))
+        most = _quantile(self.probability, count, threshold.windows * count)
         relative = statistic / (rank * threshold.score_excess)  # both have the mean 1 in healthy operation
         return max((relative - 1.0) / (limit - 1.0), (squares - 1.0) / (most - 1.0), 0.0)
+
+
+@lru_cache(maxsize=1024)
+def _quantile(probability: float, first: int, second: float) -> float:
+    """What an F distribution with these degrees of freedom exceeds with this probability."""
+    return float(f_distribution.isf(probability, first, second))
 
 
 def learn_healthy(scores: Sequence[Score], segment: float, false_alarms: float) -> Healthy:
@@ -102,6 +110,8 @@ def learn_healthy(scores: Sequence[Score], segment: float, false_alarms: float) 
         # variance of a mean of `count` independent squares is 2 mean² / count
         scattered = float(np.var(squares, ddof=1)) * count / (2.0 * mean**2) if len(squares) > 1 else 1.0
         thresholds.append(
-            Threshold(length, max(1.0, sum(excess) / freedom), freedom, mean, max(1.0, scattered))
+            Threshold(
+                length, len(windows), max(1.0, sum(excess) / freedom), freedom, mean, max(1.0, scattered)
+            )
         )
     return Healthy(offset, uncertainty, tuple(thresholds), probability)
