@@ -6,7 +6,8 @@
 Machines are drawn at random about three designs. The model is not the truth but what `rhythmid identify` finds in a record of the same
 machine; each run has its own noise and excitation. The changes: friction doubled, 5 ms more delay of the command, or of the
 measurement, a payload of 5 % of the inertia. A change counts as reported when a warning comes within 10 s, and its slot as right when
-it is the one that the twin says 10 s after the change.
+it is the one that the twin says 10 s after the change. The joint has no forcing of its own, so that the delay of its command cannot be
+told from that of its measurement: there the twin has to say that it is one or the other.
 """
 
 from __future__ import annotations
@@ -295,9 +296,10 @@ def show(outcomes: list[Outcome], title: str) -> None:
         middle = f"median {np.median(times):.2f} s, longest {times[-1]:.2f} s" if times else "never"
         wrong = [f"{one.machine}: {one.slot}" for one in mine if not one.right]
         alone = sum(one.right and not one.rivals for one in mine)
+        listed = sum(one.after is not None and slot in (one.slot, *one.rivals) for one in mine)
         print(
             f"{title:7s} {change:18s} reported {len(times)} of {len(mine)} ({middle}); slot {slot} in {sum(o.right for o in mine)}, "
-            f"without rival in {alone}; alarms before the change: {sum(o.early for o in mine)}; others: {wrong}", flush=True
+            f"without rival in {alone}, it or a rival in {listed}; alarms before the change: {sum(o.early for o in mine)}; others: {wrong}", flush=True
         )  # fmt: skip
 
 

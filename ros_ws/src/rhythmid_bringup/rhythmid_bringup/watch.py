@@ -57,7 +57,7 @@ def drawn(newest: Mapping[str, DiagnosticStatus]) -> RenderableType:
         parts.append(Text.assemble((f"{name}  ", "bold"), (status.message, colour)))
         table = Table(box=None, show_header=False, padding=(0, 2), pad_edge=True)
         for pair in status.values:
-            table.add_row(pair.key, pair.value)
+            table.add_row(Text(pair.key), Text(pair.value))
         parts.append(table)
     return Group(*parts) if parts else Text("waiting for the twin")
 
