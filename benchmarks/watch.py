@@ -30,6 +30,7 @@ from rhythmid.record.record import Channel, Record
 from rhythmid.simulation.compiled import compile_model
 from rhythmid.simulation.signal import spline, zero_order_hold
 from rhythmid.simulation.simulate import simulate, start_states
+from rhythmid.twin.changes import DELAYS
 from rhythmid.twin.settings import DAY, Settings
 from rhythmid.twin.twin import Status, Twin
 
@@ -184,8 +185,30 @@ def record(made: Stretch) -> Record:
     )
 
 
-def identified(machine: Machine, seed: int) -> Model:
-    """What identification finds of a machine, starting from its design."""
+def identified(machine: Machine, seed: int, keep: Path | None, off: float | None) -> Model:
+    """What identification finds of a machine, starting from its design; read from the folder `keep` where it has been done before.
+
+    With `off` the true parameters, each off by about that share, and the delays by that share of `LATER`: much quicker.
+    """
+    if off is not None:
+        errors = off * np.random.default_rng([seed, 4]).standard_normal(len(machine.truth.free))
+        values = {
+            name: machine.truth.value(name) * (1.0 + error)
+            if name not in DELAYS
+            else machine.truth.value(name) + LATER * error
+            for name, error in zip(machine.truth.free, errors)
+        }
+        return machine.truth.with_values({name: max(0.0, value) for name, value in values.items()})
+    file = None if keep is None else keep / f"{machine.name}_{seed}.yaml"
+    if file is not None and file.exists():
+        return Model.load(file)
+    found = _identified(machine, seed)
+    if file is not None:
+        found.save(file)
+    return found
+
+
+def _identified(machine: Machine, seed: int) -> Model:
     made = Operation(machine, seed).run(machine.truth, 0.0, IDENTIFIED)
     design = Model.from_text(DESIGNS[machine.name], machine.name, load_catalogue())
     return identify([record(made)], design).model
@@ -219,6 +242,7 @@ class Outcome:
     """Of one change: seconds until it was reported, None where it was not within ten; the slot said then; alarms before it."""
 
     machine: str
+    seed: int
     change: str
     after: float | None
     slot: str | None
@@ -255,29 +279,36 @@ def one_run(machine: Machine, model: Model, seed: int) -> list[Outcome]:
         last = [one for one in said if one.time <= change_seen + WITHIN][-1].isolation
         soon = seen[0] if seen and seen[0] <= WITHIN else None
         slot, rivals = (None, ()) if last is None else (last.slot, last.rivals)
-        found.append(Outcome(machine.name, change, soon, slot, rivals, early))
+        found.append(Outcome(machine.name, seed, change, soon, slot, rivals, early))
     return found
 
 
-def changes(runs: int, machines: int, names: list[str], seed: int, keep: Path | None) -> None:
-    """Print how soon changes are reported, and with which slot; outcomes are added to those in a file of JSON lines."""
+def changes(
+    runs: int, machines: int, names: list[str], seed: int, keep: Path | None, off: float | None
+) -> None:
+    """Print how soon changes are reported, and with which slot. What the folder `keep` holds of earlier calls counts as well."""
     outcomes: list[Outcome] = []
-    if keep is not None and keep.exists():
-        outcomes = [Outcome(**json.loads(line)) for line in keep.read_text(encoding="utf-8").splitlines()]
+    file = None if keep is None else keep / "outcomes.jsonl"
+    if file is not None and file.exists():
+        outcomes = [Outcome(**json.loads(line)) for line in file.read_text(encoding="utf-8").splitlines()]
+    done = {(one.machine, one.seed) for one in outcomes}
     for name in names:
         rng = np.random.default_rng([seed, list(DESIGNS).index(name)])
         for number in range(machines):
             machine = drawn(name, rng)
             begun = time.monotonic()
-            model = identified(machine, 1000 * (seed + 1) + number)
+            model = identified(machine, 1000 * (seed + 1) + number, keep, off)
             took = time.monotonic() - begun
             begun = time.monotonic()
             for run in range(number, runs, machines):
-                found = one_run(machine, model, 100_000 * seed + 10_000 * number + run)
+                own = 100_000 * seed + 10_000 * number + run
+                if (name, own) in done:
+                    continue
+                found = one_run(machine, model, own)
                 outcomes += found
-                if keep is not None:
-                    with keep.open("a", encoding="utf-8") as file:
-                        file.writelines(json.dumps(vars(one)) + "\n" for one in found)
+                if file is not None:
+                    with file.open("a", encoding="utf-8") as lines:
+                        lines.writelines(json.dumps(vars(one)) + "\n" for one in found)
             print(
                 f"{name} {number}: identified in {took:.0f} s, runs in {time.monotonic() - begun:.0f} s",
                 flush=True,
@@ -303,14 +334,22 @@ def show(outcomes: list[Outcome], title: str) -> None:
         )  # fmt: skip
 
 
-def days(pieces: int, hours: float, names: list[str], seed: int, false_alarms: float) -> None:
+def days(
+    pieces: int,
+    hours: float,
+    names: list[str],
+    seed: int,
+    false_alarms: float,
+    keep: Path | None,
+    off: float | None,
+) -> None:
     """Print how many alarms come in healthy operation."""
     total, alarms = 0.0, 0
     largest: list[float] = []
     for piece in range(pieces):
         name = names[piece % len(names)]
         machine = drawn(name, np.random.default_rng([seed, piece, 3]))
-        model = identified(machine, 2000 + piece)
+        model = identified(machine, 500_000 + 1000 * seed + piece, keep, off)
         operation = Operation(machine, seed + 77 * piece)
         twin = Twin(model, Settings(healthy=HEALTHY, false_alarms=false_alarms), machine.forcing[0] != 0.0)
         begun, state, events, last, peak = time.monotonic(), None, set(), 0.0, 0.0
@@ -340,7 +379,6 @@ def main() -> None:
     commands = parser.add_subparsers(dest="command", required=True)
     one = commands.add_parser("changes")
     one.add_argument("--runs", type=int, default=34)
-    one.add_argument("--keep", type=Path, help="file of JSON lines that outcomes are added to")
     one.add_argument("--machines", type=int, default=4, help="drawn of each design")
     two = commands.add_parser("days")
     two.add_argument("--pieces", type=int, default=12)
@@ -348,12 +386,18 @@ def main() -> None:
     two.add_argument("--false-alarms", type=float, default=1.0)
     for sub in (one, two):
         sub.add_argument("--designs", nargs="+", choices=list(DESIGNS), default=list(DESIGNS))
+        sub.add_argument("--keep", type=Path, help="folder for models and outcomes, to go on with later")
+        sub.add_argument(
+            "--off-by", type=float, help="share by which parameters are off, instead of identification"
+        )
         sub.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     if given.command == "changes":
-        changes(given.runs, given.machines, given.designs, given.seed, given.keep)
+        changes(given.runs, given.machines, given.designs, given.seed, given.keep, given.off_by)
     else:
-        days(given.pieces, given.hours, given.designs, given.seed, given.false_alarms)
+        days(
+            given.pieces, given.hours, given.designs, given.seed, given.false_alarms, given.keep, given.off_by
+        )
 
 
 if __name__ == "__main__":
