@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -125,6 +128,27 @@ def test_a_machine_that_mujoco_moves_is_followed_and_its_friction_is_told():
     assert all(status.since is None for status in said if status.time < change)
     assert said[-1].mismatch > 1.0 and said[-1].isolation.slot == "force"
     assert said[-1].isolation.changes[0].size == pytest.approx(0.5, rel=0.2)
+
+
+def test_the_command_watches_until_it_is_interrupted(graph, tmp_path):
+    (tmp_path / "lift.yaml").write_text(LIFT)
+    line = [sys.executable, "-m", "rhythmid.cli", "watch", "lift.yaml", "--json", "watch.json"]
+    heard = graph.listen("/diagnostics", DiagnosticArray, latched(1000))
+    process = subprocess.Popen(line, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    try:
+        graph.until(lambda: any(s.name == "/hopper/twin" for m in heard for s in m.status), "the twin", 60.0)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=40.0)
+    finally:
+        process.kill()
+    assert process.returncode == 0, said
+    assert json.loads((tmp_path / "watch.json").read_text()) == {"events": []}
+    assert "no publisher of /hopper/excitation" in " ".join(said.split())
+
+
+def test_what_the_node_refuses_the_command_says_in_one_line(domain, rhythmid):
+    done = rhythmid("watch", "absent.yaml")
+    assert done.returncode == 2 and done.stderr.startswith("error:") and "absent.yaml: cannot be read" in done.stderr
 
 
 @pytest.mark.parametrize(("parameters", "said"), [

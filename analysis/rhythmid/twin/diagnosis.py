@@ -37,7 +37,7 @@ class Diagnosing:
         )  # fmt: skip
 
     def poll(self, wait: bool = False) -> dict[str, Any] | None:
-        """Verdict, summary and names with slot and probability; None while it is under way, unless told to `wait`.
+        """Verdict, summary, names with slot and probability, and the parameters as refitted; None while it is under way, unless told to `wait`.
 
         A diagnosis that fails has the verdict "failed", with the reason as summary.
         """
@@ -56,7 +56,7 @@ class Diagnosing:
         finally:
             self._folder.cleanup()
         missing = [{key: one[key] for key in ("element", "slot", "probability")} for one in answer["missing"]]
-        return {"verdict": answer["verdict"], "summary": answer["summary"], "missing": missing}
+        return {key: answer[key] for key in ("verdict", "summary", "parameters")} | {"missing": missing}
 
     def stop(self) -> None:
         """End it without an answer."""

@@ -104,15 +104,17 @@ def watch(**options: Any) -> int:
 
 
 def _show(process: Supervised, console: Console, interrupted: Callable[[], bool]) -> None:
-    """Draw the board until the user or the node ends it."""
+    """Draw the board until the user or the node ends it, and leave it on the screen when it was the user."""
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     board, executor = Board(), EventsExecutor()
     executor.add_node(board)
     try:
-        with Live(drawn({}), console=console, refresh_per_second=REFRESH, transient=False) as live:
+        with Live(drawn({}), console=console, refresh_per_second=REFRESH, transient=True) as live:
             while process.returncode is None and not interrupted():
                 executor.spin_once(timeout_sec=0.1)
                 live.update(drawn(board.newest))
+        if process.returncode is None:
+            console.print(drawn(board.newest))
     finally:
         executor.shutdown()
         board.destroy_node()
