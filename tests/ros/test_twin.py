@@ -148,7 +148,11 @@ def test_the_command_watches_until_it_is_interrupted(graph, tmp_path):
 
 def test_what_the_node_refuses_the_command_says_in_one_line(domain, rhythmid):
     done = rhythmid("watch", "absent.yaml")
-    assert done.returncode == 2 and done.stderr.startswith("error:") and "absent.yaml: cannot be read" in done.stderr
+    assert (
+        done.returncode == 2
+        and done.stderr.startswith("error:")
+        and "absent.yaml: cannot be read" in done.stderr
+    )
 
 
 @pytest.mark.parametrize(("parameters", "said"), [

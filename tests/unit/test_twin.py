@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from live_machine import CHANGED, LIFT, Signals, at_work
+from live_machine import CHANGED, LIFT, RATE, Signals, at_work
 
 from rhythmid.commands.watch import watch
 from rhythmid.elements.catalogue import load_catalogue
@@ -16,6 +16,7 @@ from rhythmid.record.convert import write_record
 from rhythmid.record.record import Channel, Record
 from rhythmid.twin.calibration import Calibration
 from rhythmid.twin.changes import watched, without_own_forcing
+from rhythmid.twin.diagnosis import Diagnosing
 from rhythmid.twin.kept import load, save
 from rhythmid.twin.samples import Samples
 from rhythmid.twin.score import inverse
@@ -229,3 +230,12 @@ def test_what_cannot_be_watched_is_refused(files, monkeypatch, options, said):
     monkeypatch.chdir(files[1])
     with pytest.raises(InputError, match=said):
         watch(Path("model.yaml"), **options)
+
+
+def test_a_diagnosis_runs_in_a_process_of_its_own_and_says_why_it_fails():
+    time = np.arange(500) / RATE
+    running = Diagnosing(
+        Record("window", Channel(time, np.zeros(500), "m"), Channel(time, np.ones(500), "N")), model()
+    )
+    answer = running.poll(wait=True)
+    assert answer["verdict"] == "failed" and "never changes" in answer["summary"] and answer["missing"] == []

@@ -33,8 +33,9 @@ class Diagnosing:
                 "--model", str(folder / "model.yaml"), "--json", str(self._answer), "--budget", str(BUDGET), *more,
             ],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-            preexec_fn=lambda: os.nice(NICE),
         )  # fmt: skip
+
+        os.setpriority(os.PRIO_PROCESS, self._process.pid, NICE)
 
     def poll(self, wait: bool = False) -> dict[str, Any] | None:
         """Verdict, summary, names with slot and probability, and the parameters as refitted; None while it is under way, unless told to `wait`.
