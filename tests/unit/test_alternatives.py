@@ -55,7 +55,7 @@ def proposed(monkeypatch: pytest.MonkeyPatch, *given, **options) -> list[Proposa
     """What is fitted, before it is."""
     kept: list[Proposal] = []
 
-    def run_trials(proposals, *_):
+    def run_trials(proposals, *_, **__):
         kept.extend(proposals)
         return [], []
 

@@ -5,6 +5,7 @@ have it in one place only. Kin of a chosen effect (the other lags, the other law
 Each is a hypothesis like any other, fitted and scored in the same way.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -45,10 +46,12 @@ def alternatives(
     known: Trajectories,
     rounds: Sequence[Round],
     weighed: Sequence[Trial],
+    reach: float = math.inf,
 ) -> list[tuple[Trial, Kind]]:
     """Fitted trials of other kinds, for the nominal model and in the place of the chosen effects.
 
-    `known` is the chosen run, `rounds` are the search's scores, and `weighed` the models that are hypotheses already.
+    `known` is the chosen run, `rounds` are the search's scores, and `weighed` the models that are hypotheses already. One whose chi2 would not
+    come to `reach` is not carried to convergence.
     """
     sizes = scales(series, chosen.model)
     freed: list[Proposal] = list(_freed(nominal))
@@ -79,7 +82,7 @@ def alternatives(
     if not kinds:
         return []
     states = compile_model(chosen.model).layout.states
-    trials, _ = run_trials(list(proposals.values()), series, chosen.starts, states, noise, step)
+    trials, _ = run_trials(list(proposals.values()), series, chosen.starts, states, noise, step, reach=reach)
     return [(trial, kinds[tuple(sorted(trial.added))]) for trial in trials]
 
 

@@ -91,13 +91,14 @@ def minimise(
     pool: ThreadPoolExecutor | None = None,
     tolerance: float = 1e-3,
     differences: tuple[Array, Array] | None = None,
+    reach: float = math.inf,
 ) -> Fit:
     """The fit that `descend` leads to, with its sensitivities and covariance.
 
     A parameter that the records cannot tell from its bound is put there: what else it would be drags others along.
     """
     fit = _fit(
-        descend(model, run, names, noise, starts, iterations, pool, tolerance, differences),
+        descend(model, run, names, noise, starts, iterations, pool, tolerance, differences, reach),
         run,
         names,
         noise,
@@ -107,7 +108,17 @@ def minimise(
     if edge:
         put = fit.model.with_values(edge)
         try:
-            end = descend(put, run, names, noise, fit.starts, max(iterations, 3), pool, tolerance)
+            end = descend(
+                put,
+                run,
+                names,
+                noise,
+                fit.starts,
+                max(iterations, 3),
+                pool,
+                tolerance,
+                reach=fit.chi2 + FALSE_EDGE,
+            )
         except InputError:
             # such as without inertia: a value far from its bound, but undetermined together with others
             return fit

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from rhythmid.diagnose.search.refit import run_trials, under_noise
+from rhythmid.diagnose.search.refit import reach_of, run_trials, under_noise
 from rhythmid.diagnose.search.round import Round, distinct
 from rhythmid.diagnose.search.trial import Proposal, Trial, propose
 from rhythmid.elements.catalogue import Catalogue
@@ -42,7 +42,8 @@ def defend(
         if not fresh:
             return []
         tell(f"testing {', '.join(' + '.join(p.added) for p in fresh)}")
-        found, _ = run_trials(fresh, series, known.starts, _states(known), noise, step)
+        reach = reach_of(known.chi2, known.samples) + margin
+        found, _ = run_trials(fresh, series, known.starts, _states(known), noise, step, reach=reach)
         tried.update({tuple(sorted(t.added)): t for t in found})
         return found
 

@@ -18,7 +18,14 @@ from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import PRACTICAL
 from rhythmid.diagnose.search.backward import defend
 from rhythmid.diagnose.search.order import in_best_order
-from rhythmid.diagnose.search.refit import fine_enough, near_under_noise, run_trials, under_noise, whole_fit
+from rhythmid.diagnose.search.refit import (
+    fine_enough,
+    near_under_noise,
+    reach_of,
+    run_trials,
+    under_noise,
+    whole_fit,
+)
 from rhythmid.diagnose.search.round import Round, distinct, not_tried, one_round
 from rhythmid.diagnose.search.score_tests import (
     changes_of,
@@ -214,7 +221,8 @@ def search(
                 sought = replace(top, model=fit.model, starts=fit.starts, converged=False)
             others = [trial for trial in group if trial.added != top.added]
             settled = noise_of(fit.residuals, series, floor)
-            compared = under_noise([sought, *others, best], series, settled, step)
+            reach = reach_of(fit.chi2, fit.samples)
+            compared = under_noise([sought, *others, best], series, settled, step, reach=reach)
             trials |= {tuple(sorted(t.added)): t for t in compared}
             winner = compared[0]
             before = next((t for t in compared if t.added == best.added), best)
