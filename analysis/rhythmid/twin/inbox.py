@@ -82,9 +82,10 @@ class Inbox:
         if self.origin_ns is None and first:
             self.origin_ns = min(first)
         origin = self.origin_ns or 0
-        return {
-            role: (np.asarray((times - origin) * 1e-9), values) for role, (times, values) in stamped.items()
-        }
+        samples: dict[Role, tuple[Array, Array]] = {}
+        for role, (times, values) in stamped.items():
+            samples[role] = np.asarray((times - origin) * 1e-9, dtype=np.float64), values
+        return samples
 
     def _block(self, topic: str) -> Block | None:
         waiting = self._waiting[topic]
