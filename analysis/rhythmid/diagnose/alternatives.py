@@ -33,7 +33,7 @@ SIGNALS: tuple[Slot, ...] = ("command", "actuator", "sensor")  # what a law with
 CLOCKS: tuple[Slot, ...] = ("command", "timing")  # what has a delay that may drift
 LONGER = (2.0, 5.0, 12.0, 30.0)  # samples, at which a longer delay is sought
 SERIES = 3  # laws of one quantity that are more likely a series for one law than causes of their own; two of them real springs have
-LONGEST = 0.25  # periods of the motion: a longer one is another minimum of the same
+LONGEST_DELAY = 0.25  # periods of the motion: a longer one is another minimum of the same
 
 
 def alternatives(
@@ -167,7 +167,7 @@ def _longer_delay(base: Trial, series: Sequence[Series]) -> Iterator[Proposal]:
     if delay is None or delay.prior is None:
         return
     period = max(one.period for one in series)
-    most = LONGEST / max(dominant_frequency(one) for one in series)
+    most = LONGEST_DELAY / max(dominant_frequency(one) for one in series)
     free = base.model.with_parameters(
         {INPUT_DELAY: replace(delay, value=0.0, prior=None, bounds=(delay.bounds[0], most))}
     )

@@ -23,7 +23,7 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 WHITE = NoiseModel(np.empty(0), 1.0)
-LEAST = 1e-6  # damping up to which a step counts as a full one
+LEAST_DAMPING = 1e-6  # damping up to which a step counts as a full one
 STATES = 0.01  # damping beyond which a step holds every state back
 STAY = 0.1  # share of its distance from a lower bound that one step leaves a parameter: a width of zero is hard to leave
 PACE = 3  # iterations over which the present rate of decline is taken
@@ -134,7 +134,7 @@ def descend(
     else:
         steps, state_steps = differences
     held = np.array([float(place in run.compiled.layout.memories) for place in range(run.states)])
-    damping, converged, searched = LEAST, False, not held.any()
+    damping, converged, searched = LEAST_DAMPING, False, not held.any()
     low = np.array([model.parameters[name].bounds[0] for name in names])
     high = np.array([model.parameters[name].bounds[1] for name in names])
     brink = [a + BRINK * (model.value(n) - a) if math.isfinite(a) else math.inf for n, a in zip(names, low)]
@@ -178,7 +178,7 @@ def descend(
                 moved.append(start + change * state_steps)
                 promised += float(np.sum((ahead + state @ change) ** 2))
             enough = max(tolerance * min(1.0, cost / samples), 1e-7 * cost)
-            if whole and damping <= LEAST and cost - promised < enough:
+            if whole and damping <= LEAST_DAMPING and cost - promised < enough:
                 converged = True
                 break
             trial_residuals = problem.residuals(trial, moved)
@@ -191,7 +191,7 @@ def descend(
                 improved = True
                 converged = gain < enough
                 break
-            damping = max(damping * 10.0, LEAST)
+            damping = max(damping * 10.0, LEAST_DAMPING)
             if damping > 1e8:
                 break
         converged = converged or not improved  # no direction lowers the cost any more
@@ -205,7 +205,7 @@ def descend(
                     trial_cost,
                     trial_residuals,
                     None,
-                    LEAST,
+                    LEAST_DAMPING,
                     False,
                 )
         state_steps = state_steps_next

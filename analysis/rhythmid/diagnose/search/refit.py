@@ -31,7 +31,7 @@ PROMISING = 0.3  # share of the spread of chi2 within which a model is carried t
 # share of its ceiling, above which the best of a round has found so little that all minima of all trials are gone through
 LITTLE = 0.5
 HOPS = 12  # at most, from one minimum to the next
-WAYS = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minima, that one hop goes
+HOP_DISTANCES = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minima, that one hop goes
 # of the samples: excess of chi2 over that of the best model, beyond which a model is out of the question on unseen data, too: a gain in
 # log likelihood of a twentieth per sample, where a few per record decide
 EXCESS = 0.1
@@ -142,7 +142,7 @@ def _hopped(
     low, high = best.model.parameters[name].bounds
     for _ in range(HOPS):
         before = best
-        for value in (before.model.value(name) + way * distance for way in WAYS):
+        for value in (before.model.value(name) + hop * distance for hop in HOP_DISTANCES):
             if not low < value < high:
                 continue
             moved = before.model.with_values({name: value})
