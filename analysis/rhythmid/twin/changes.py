@@ -55,7 +55,7 @@ def watched(
     found = [Change(INERTIA, INERTIA_SLOT, model.mass.unit)]
     for term in model.terms:
         element = term.element
-        if element.acts == "drive" or element.name == "gravity" or not element.deterministic:
+        if element.acts == "drive" or element.name == "gravity" or element.sampler is not None:
             continue
         if element.slot == "timing":
             continue

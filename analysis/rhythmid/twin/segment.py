@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import NO_HISTORY, compile_model
 from rhythmid.simulation.signal import FAR, continuous, pieces
-from rhythmid.simulation.simulate import delay_of_command, physical_times
+from rhythmid.simulation.transport import command_delay, physical_times
 from rhythmid.twin.changes import Change
 from rhythmid.twin.samples import Samples
 from rhythmid.twin.settings import Settings
@@ -83,7 +83,7 @@ class Simulation:
         if len(time) == 0:
             return pieces(None)
         if self.settings.hold == "zero":
-            knots = np.maximum.accumulate(time + delay_of_command(self.model, time) + later)
+            knots = np.maximum.accumulate(time + self._late(time) + later)
             coefficients = np.zeros((4, len(time) + 1))
             coefficients[0, 1:] = value
             return np.concatenate([[-FAR], knots, [FAR]]), coefficients
@@ -92,13 +92,18 @@ class Simulation:
         signal = continuous(time, value, self.settings.hold)
         knots, coefficients = pieces(signal)
         knots = knots.copy()
-        knots[1:-1] += delay_of_command(self.model, knots[1:-1]) + later
+        knots[1:-1] += self._late(knots[1:-1]) + later
         return knots, np.ascontiguousarray(coefficients)
 
     @property
     def longest_delay(self) -> float:
         """Longest time [s] from a command's stamp until it acts."""
-        return float(delay_of_command(self.model, np.zeros(1))[0])
+        return float(self._late(np.zeros(1))[0])
+
+    def _late(self, stamps: Array) -> Array:
+        """How much later than their stamps commands act, (n,) [s]."""
+        late = command_delay(self.model, stamps)
+        return np.zeros(len(stamps)) if late is None else late
 
     def forcing(self, samples: Samples | None, start: float, end: float) -> Pieces:
         """The measured forcing between two times [s] as a smooth signal."""
