@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import NO_HISTORY, compile_model
+from rhythmid.simulation.generated_source import Variant
 from rhythmid.simulation.signal import FAR, continuous, pieces
 from rhythmid.simulation.transport import command_delay, physical_times
 from rhythmid.twin.changes import Change
@@ -65,7 +66,7 @@ class Simulation:
 
     def __init__(self, model: Model, changes: tuple[Change, ...], settings: Settings, period: float) -> None:
         self.model, self.changes, self.settings = model, changes, settings
-        self.compiled = compile_model(model, excited=settings.input_kind, measured=settings.output_kind)
+        self.compiled = compile_model(model, Variant(settings.input_kind, settings.output_kind))
         self.parameters = self.compiled.layout.vector(model)
         places = {name: index for index, (name, _) in enumerate(self.compiled.layout.parameters)}
         self.places = [places.get(change.name) for change in changes]
