@@ -83,7 +83,6 @@ def identify(
         )
     known = None if model is None else Model.load(model, load_catalogue(elements or ()))
     with progress(Console(stderr=True)) as tell:
-        tell("reading")
         records = load_records(bags, signals, tell)
         path = "clock_unknown" if offset is not None else cast(Forcing | None, forcing)
         found = find(
