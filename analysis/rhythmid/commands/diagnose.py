@@ -124,17 +124,3 @@ def _simulation(path: Path, signals: Path | None, own: Path | None) -> "Record":
             return read_record(path)
         except InputError:
             raise error from None
-
-
-def show_comparison(result: dict) -> None:
-    """Print a comparison."""
-    console = Console()
-    alignment = result["alignment"]
-    offset = alignment["offset"]
-    console.print(
-        f"[bold]{result['simulation']}[/] against [bold]{result['recording']}[/]: aligned by the {alignment['by']}, the "
-        f"recording is {offset['value']:.6f} ± {2.0 * offset['std']:.2g} s later; {result['overlap']['value']:.4g} s in common"
-    )
-    console.print(result["summary"])
-    for note in result["notes"]:
-        console.print(f"note: {note}")

@@ -7,9 +7,9 @@ with the recording's inputs.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,11 @@ from rhythmid.record.outlier import without_stray
 from rhythmid.record.record import Channel, Record
 from rhythmid.report.comparison import LABELS
 from rhythmid.report.run import Run
+from rhythmid.result import Result, Row, axis_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from rich.console import Console
 
 Array = NDArray[np.float64]
 HARMONICS = 6  # that are listed
@@ -67,7 +72,7 @@ class HarmonicRatio:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Result):
     """A simulation beside a recording. `left` (n,) is what the explanations leave of the difference."""
 
     simulation: str
@@ -105,7 +110,7 @@ class Comparison:
         return {
             "simulation": self.simulation,
             "recording": self.recording,
-            "summary": self.summary,
+            "summary": self.headline,
             "comparable": self.comparable,
             "through_model": self.through_model,
             "parted": self.parted,
@@ -140,8 +145,8 @@ class Comparison:
         }  # fmt: skip
 
     @property
-    def summary(self) -> str:
-        """The answer in a few sentences."""
+    def headline(self) -> str:
+        """The answer in a few sentences; the JSON's `summary`."""
         if not self.comparable:
             return f"Not comparable: different excitation ({self.alignment.mismatch}); with --model the model is run in the simulation's place."
         size = f"{100 * self.nrmse:.3g} % of the motion"
@@ -155,6 +160,32 @@ class Comparison:
         causes = [one for one in self.explanations if one.slot is not None]
         said = "; then ".join(_cause(one) for one in causes)
         return f"They part by {size}, {SENTENCES[causes[0].slot or 'force']}: {said}. {self._where()}"
+
+    def tables(self) -> Mapping[str, Sequence[Row]]:
+        """`explanations` of the difference, the largest first, and `harmonics` of the forcing, recording over simulation."""
+        return {
+            "explanations": [
+                {"name": one.name, "slot": one.slot, "explained": one.explained, "also": ", ".join(one.also)}
+                for one in self.explanations
+            ],
+            "harmonics": [{"number": h.number, "gain": h.gain, "late": h.late} for h in self.harmonics],
+        }
+
+    def show(self, console: "Console") -> None:
+        """Print how the two were aligned, the answer and its notes."""
+        from rhythmid.compare.printed import show
+
+        show(self.to_dict(), console)
+
+    def plot(self, axis: "Axes | None" = None) -> "Axes":
+        """Draw recording, simulation and their difference over time; on a new figure where no axis is given."""
+        axis, pair = axis_or_new(axis), self.pair
+        axis.plot(pair.time, pair.recording, color="black", linewidth=1.0, label=self.recording)
+        axis.plot(pair.time, pair.simulation, linestyle="--", label=f"{self.simulation} (simulation)")
+        axis.plot(pair.time, pair.recording - pair.simulation, linewidth=0.8, label="difference")
+        axis.set(xlabel="time [s]", ylabel=f"output [{self.unit}]")
+        axis.legend(loc="upper right")
+        return axis
 
     def _where(self) -> str:
         place = self.place
@@ -214,12 +245,36 @@ def run_of(found: Comparison) -> Run:
 
 
 def compare(
-    simulation: Record, recordings: Sequence[Record], model: Model | None = None, tell: Tell = lambda _: None
+    simulation: Record,
+    recordings: Record | Sequence[Record],
+    model: Model | None = None,
+    tell: Tell = lambda _: None,
 ) -> Comparison:
     """Compare a simulation with the recording of the same excitation, the best match of several.
 
-    Raises InputError when there is too little in common.
+    Parameters
+    ----------
+    simulation : record of the simulation.
+    recordings : one or more records of the machine.
+    model : runs in the simulation's place, fitted to it, where the excitations differ.
+    tell : is told what begins.
+
+    Raises
+    ------
+    InputError
+        Where there is too little in common.
+
+    Examples
+    --------
+    >>> import rhythmid as rh
+    >>> run = {"excitation": {"type": "chirp", "amplitude": 0.02, "sweep": 3.0}, "noise": {"measurement_std": 1e-5}}
+    >>> machine = rh.paper_hopper()
+    >>> real = rh.simulate(machine.with_values({"linear_spring.stiffness": 190.0}), run).record
+    >>> found = rh.compare(rh.simulate(machine, run).record, real)
+    >>> found.parted
+    True
     """
+    recordings = [recordings] if isinstance(recordings, Record) else recordings
     for one in recordings:
         if one.output_kind != simulation.output_kind:
             raise InputError(

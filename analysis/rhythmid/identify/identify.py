@@ -116,9 +116,31 @@ def identify(
     htf : how the harmonic transfer functions of the first record are found; see `harmonic_transfer_functions`. The paper's
         method brings its own, equation (5), where this is `auto`.
 
-    A fit that leaves more than a fifth of the motion is returned as not `usable`. Raises InputError when a channel seems to be in
-    another unit, to have its sign turned round or to be exchanged with another, and by the paper's method when a record has no
-    input, is shorter than a period, or the model has no limit cycle.
+    Returns
+    -------
+    Identification
+        A fit that leaves more than a fifth of the motion is not `usable`.
+
+    Raises
+    ------
+    InputError
+        When a channel seems to be in another unit, to have its sign turned round or to be exchanged with another, and by the
+        paper's method when a record has no input, is shorter than a period, or the model has no limit cycle.
+
+    Examples
+    --------
+    >>> import rhythmid as rh
+    >>> run = {
+    ...     "excitation": {"type": "chirp", "amplitude": 0.02, "sweep": 6.0},
+    ...     "delays": {"input": 0.04, "measurement": 0.05},
+    ...     "noise": {"measurement_std": 1e-5},
+    ... }
+    >>> found = rh.identify(rh.simulate(rh.paper_hopper(), run).record, rh.paper_hopper())
+    >>> delay = found.delays.input
+    >>> abs(delay.value - 0.04) < 5 * delay.std < 1e-3
+    True
+    >>> found.covariance.correlation.shape == (len(found.covariance.names),) * 2
+    True
     """
     given = (records,) if isinstance(records, Record) else tuple(records)
     if not given:
