@@ -1,14 +1,17 @@
 """`rhythmid design`: a signal to play, and what it will tell, before the run."""
 
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, cast
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from rhythmid.commands.options import Elements, JsonFile
+from rhythmid.commands.options import Elements, JsonFile, Quiet
+from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new, write_json
+
+EXAMPLES = (
+    "rhythmid design model.yaml --duration 60 --band 0 7 --max-effort 0.02 --envelope 0.13 0.17 --noise-std 1e-5 --output plan",
+)
 
 
 def design(
@@ -96,6 +99,7 @@ def design(
     ] = 0,
     elements: Elements = None,
     json: JsonFile = None,
+    quiet: Quiet = False,
 ) -> None:
     """Design an experiment: the signal to play, as large as the machine bears, and every parameter's predicted uncertainty."""
     from rhythmid.design.design_folder import save_design
@@ -103,9 +107,11 @@ def design(
     from rhythmid.design.requirements import Kind, Requirements
     from rhythmid.elements.catalogue import load_catalogue
     from rhythmid.model import Model
+    from rhythmid.progress_bar import progress
     from rhythmid.settings import Forcing
 
     require_new(output, json)
+    terminal = Terminal(quiet, json)
     catalogue = load_catalogue(elements or ())
     known = Model.load(model, catalogue)
     wanted = Requirements.of(
@@ -113,12 +119,11 @@ def design(
         forcing=None if forcing is None else Forcing(*forcing), delays=delays, longest_delay=longest_delay,
         max_distortion=max_distortion, shifts=shifts, period=period, spacing=spacing, seed=seed,
     )  # fmt: skip
-    with Console(stderr=True).status("designing") as status:
-        found = make(known, wanted, catalogue, status.update)
-        status.update("writing")
+    with progress(terminal.progress, log=False) as tell:
+        found = make(known, wanted, catalogue, tell)
+        tell("writing")
         save_design(found, model, output, elements or ())
-    result = found.to_dict()
-    show(result)
+    found.show(terminal.answer)
     if json is not None:
-        write_json(json, result)
-    typer.echo(f"{output}: play it with `rhythmid run {output / 'experiment.yaml'}`")
+        write_json(json, found.to_dict())
+    terminal.say(f"{output}: play it with `rhythmid run {output / 'experiment.yaml'}`")

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
-from rhythmid.commands.options import Bags, Elements, JsonFile, ReportFile, SignalsFile, command_line
+from rhythmid.commands.options import Bags, Elements, JsonFile, Quiet, ReportFile, SignalsFile, command_line
+from rhythmid.commands.terminal import Terminal
 from rhythmid.errors import InputError
 from rhythmid.output import require_new, write_json
 
@@ -17,6 +17,12 @@ if TYPE_CHECKING:
 Model_ = Annotated[
     Path | None, typer.Option("--model", help="Nominal model, the one that may lack something.")
 ]
+
+EXAMPLES = (
+    "rhythmid diagnose bag --model model.yaml",
+    "rhythmid diagnose a b --signals signals.yaml --model model.yaml --holdout c --report page.html --save-model better.yaml",
+    "rhythmid diagnose real --sim simulated",
+)
 
 
 def diagnose(
@@ -53,6 +59,7 @@ def diagnose(
             help="Begin no further round of the search after so many seconds; the answer says what was not tried.",
         ),
     ] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Say where records and model part, which physics the model lacks, and how much better it fits with it.
 
@@ -77,23 +84,22 @@ def diagnose(
     records = load_records(bags, signals)
     unseen = load_records(holdout or (), signals)
     simulation = None if sim is None else _simulation(sim, signals, sim_signals)
-    console = Console(stderr=True)
+    terminal = Terminal(quiet, json)
     result, answer, comparison = {}, None, None
     if simulation is not None:
         from rhythmid.compare.compare import compare
 
-        with progress(console) as tell:
+        with progress(terminal.progress) as tell:
             comparison = compare(simulation, records, nominal, tell)
         result["comparison"] = comparison.to_dict()
-        show_comparison(result["comparison"])
+        comparison.show(terminal.answer)
     if nominal is not None:
-        from rhythmid.diagnose.answer.printed import show
         from rhythmid.diagnose.diagnosis import diagnose as find
 
-        with progress(console, budget) as tell:
+        with progress(terminal.progress, budget) as tell:
             answer = find(records, nominal, unseen, catalogue, tell, budget)
-        result = answer.diagnosis.to_dict() | result
-        show(answer.diagnosis, Console())
+        result = answer.to_dict() | result
+        answer.show(terminal.answer)
     if json is not None:
         write_json(json, result)
     if save_model is not None and answer is not None:
@@ -108,7 +114,7 @@ def diagnose(
             assert comparison is not None and simulation is not None
             page = present_comparison(comparison, simulation, records, command_line())
         write_page(report, page)
-        typer.echo(f"report: {report}")
+        terminal.say(f"report: {report}")
 
 
 def _simulation(path: Path, signals: Path | None, own: Path | None) -> "Record":

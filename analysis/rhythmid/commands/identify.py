@@ -1,16 +1,19 @@
 """`rhythmid identify`: parameters, delays and harmonic transfer functions from records."""
 
 from pathlib import Path
-from typing import Annotated, Any, cast, get_args
+from typing import Annotated, cast, get_args
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
-from rhythmid.commands.options import Bags, Elements, JsonFile, ReportFile, SignalsFile, command_line
+from rhythmid.commands.options import Bags, Elements, JsonFile, Quiet, ReportFile, SignalsFile, command_line
+from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new, write_json
-from rhythmid.report.quantity import rounded
+
+EXAMPLES = (
+    "rhythmid identify bag --model model.yaml",
+    "rhythmid identify a b --signals signals.yaml --model model.yaml --report page.html",
+    "rhythmid identify bag --quiet --json -",
+)
 
 
 def identify(
@@ -56,6 +59,7 @@ def identify(
         float | None,
         typer.Option("--clock-offset-std", help="Or its standard deviation, in s, about zero.", min=0.0),
     ] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Find a model's parameters, the command and measurement delays, and the harmonic transfer functions."""
     from rhythmid.elements.catalogue import load_catalogue
@@ -66,6 +70,7 @@ def identify(
     from rhythmid.identify.latency import save_latency
     from rhythmid.ltp.nonparametric import HtfMethod
     from rhythmid.model import Model
+    from rhythmid.progress_bar import progress
     from rhythmid.record.read import load_records
 
     require_new(json, report, save_model, save)
@@ -81,23 +86,24 @@ def identify(
             f"--clock-offset says that the forcing's clock is unknown, --forcing {forcing} that it is known"
         )
     known = None if model is None else Model.load(model, load_catalogue(elements or ()))
-    with Console(stderr=True).status("reading") as status:
+    terminal = Terminal(quiet, json)
+    with progress(terminal.progress, log=False) as tell:
+        tell("reading the records")
         records = load_records(bags, signals)
-        status.update("identifying")
         path = "clock_unknown" if offset is not None else cast(Forcing | None, forcing)
         found = find(
-            records, known, method=cast(Method, method), forcing=path, offset=offset, htf=cast(HtfMethod, htf)
-        )
-    result = found.to_dict()
-    show(result)
+            records, known, method=cast(Method, method), forcing=path, offset=offset, htf=cast(HtfMethod, htf),
+            tell=tell,
+        )  # fmt: skip
+    found.show(terminal.answer)
     if json is not None:
-        write_json(json, result)
+        write_json(json, found.to_dict())
     if save_model is not None:
         found.model.save(save_model)
     if save is not None and found.usable:
         save_latency(found, save)
     elif save is not None:
-        typer.echo(f"{save}: not written, for no controller should use this fit")
+        terminal.say(f"{save}: not written, for no controller should use this fit")
     if report is not None:
         from rhythmid.identify.present import present
         from rhythmid.report.page import write_page
@@ -105,4 +111,4 @@ def identify(
         write_page(
             report, present(found, command_line(), "the paper's hopper" if model is None else model.name)
         )
-        typer.echo(f"report: {report}")
+        terminal.say(f"report: {report}")

@@ -29,6 +29,7 @@ from rhythmid.ltp.harmonic_estimate import HarmonicEstimates
 from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, smoothed
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
+from rhythmid.progress import Step, Tell
 from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.outlier import without_stray
 from rhythmid.record.record import Record
@@ -103,6 +104,7 @@ def identify(
     forcing: Forcing | None = None,
     offset: Offset | None = None,
     htf: HtfMethod = "auto",
+    tell: Tell = lambda _: None,
 ) -> Identification:
     """Identify a model's free parameters and its delays from records.
 
@@ -115,6 +117,7 @@ def identify(
     forcing, offset : how the forcing reaches the machine, and what is known of its clock; see `delays_of`.
     htf : how the harmonic transfer functions of the first record are found; see `harmonic_transfer_functions`. The paper's
         method brings its own, equation (5), where this is `auto`.
+    tell : is told what begins.
 
     Returns
     -------
@@ -130,14 +133,23 @@ def identify(
     Examples
     --------
     >>> import rhythmid as rh
+    >>> machine = rh.Model.from_text(
+    ...     '''
+    ... inertia: {mass: {value: 1.0, unit: kg, fixed: true}}
+    ... force:
+    ...   - linear_spring: {stiffness: {value: 200.0, unit: N/m}, rest_length: {value: 0.0, unit: m, fixed: true}}
+    ...   - viscous_damper: {damping: {value: 1.0, unit: N*s/m}}
+    ... '''
+    ... )
     >>> run = {
-    ...     "excitation": {"type": "chirp", "amplitude": 0.02, "sweep": 6.0},
-    ...     "delays": {"input": 0.04, "measurement": 0.05},
+    ...     "excitation": {"type": "chirp", "amplitude": 1.0, "sweep": 6.0},
+    ...     "forcing": {"amplitude": 0.0},
     ...     "noise": {"measurement_std": 1e-5},
     ... }
-    >>> found = rh.identify(rh.simulate(rh.paper_hopper(), run).record, rh.paper_hopper())
-    >>> delay = found.delays.input
-    >>> abs(delay.value - 0.04) < 5 * delay.std < 1e-3
+    >>> guess = machine.with_values({"linear_spring.stiffness": 180.0})
+    >>> found = rh.identify(rh.simulate(machine, run).record, guess)
+    >>> stiffness = found.parameters["linear_spring.stiffness"]
+    >>> abs(stiffness.value - 200.0) < 5 * stiffness.std < 0.01
     True
     >>> found.covariance.correlation.shape == (len(found.covariance.names),) * 2
     True
@@ -147,7 +159,7 @@ def identify(
         raise InputError("nothing to identify from: give at least one record")
     tidy = [without_stray(record) for record in given]
     cut = [note for record, _ in tidy for note in cut_at_gaps(record).notes]
-    found = _identified(tuple(record for record, _ in tidy), model, harmonics, method, forcing, offset, htf)
+    found = _identified(tuple(record for record, _ in tidy), model, harmonics, method, forcing, offset, htf, tell)
     return replace(found, notes=(*(note for _, said in tidy for note in said), *cut, *found.notes))
 
 
@@ -159,11 +171,13 @@ def _identified(
     forcing: Forcing | None,
     offset: Offset | None,
     htf: HtfMethod,
+    tell: Tell,
 ) -> Identification:
     nominal = with_declared(model or paper_hopper(), given)
     pumpings: list[Pumping] = []
     results: list[PaperResult | str] = []
-    for record in given:
+    for number, record in enumerate(given):
+        tell(Step("transfer functions of the records", number, len(given)))
         own, pumping = forced_by(own_model(nominal, record), record)
         pumpings.append(pumping)
         try:
@@ -173,6 +187,7 @@ def _identified(
                 raise
             results.append(str(error))
     seen = _Seen(given, nominal, tuple(pumpings), tuple(results))
+    tell("joint maximum likelihood")
     found = _by_likelihood(seen, forcing, offset, htf) if method == "joint" else None
     return found or _by_paper(
         seen, htf if method == "joint" or htf != "auto" else "regularised_least_squares", method

@@ -6,7 +6,6 @@ from typing import Any
 from rich.cells import cell_len
 from rich.console import Console
 from rich.markup import escape
-from rich.padding import Padding
 from rich.table import Table
 
 from rhythmid.report.quantity import rounded
@@ -14,6 +13,7 @@ from rhythmid.report.quantity import rounded
 NONE = "—"
 NOT_IDENTIFIABLE = "not identifiable"
 BORDER = 3  # characters that a column needs beside its cells: a line and two spaces
+NAME = 24  # characters of the first column below which its names are not folded
 
 
 def print_table(
@@ -23,14 +23,14 @@ def print_table(
 
     Where the terminal is too narrow, each row is a paragraph: its first cell, then a line for each further one.
     """
-    columns = zip(heads, *rows, strict=True)
-    width = 1 + sum(max(map(cell_len, column)) + BORDER for column in columns)
-    if width > console.width:
+    first, *rest = (max(map(cell_len, column)) for column in zip(heads, *rows, strict=True))
+    if 1 + min(first, NAME) + sum(rest) + BORDER * len(heads) > console.width:
         _print_paragraphs(console, title, heads, rows)
         return
     table = Table(title=escape(title) if title else None)
-    for head in heads:
-        table.add_column(escape(head), justify="right" if head in right else "left")
+    table.add_column(escape(heads[0]), overflow="fold")
+    for head in heads[1:]:
+        table.add_column(escape(head), justify="right" if head in right else "left", no_wrap=True)
     for row in rows:
         table.add_row(*map(escape, row))
     console.print(table)
@@ -43,7 +43,7 @@ def _print_paragraphs(console: Console, title: str, heads: Sequence[str], rows: 
         console.print(f"[bold]{escape(first)}[/]")
         for head, cell in zip(heads[1:], rest, strict=True):
             if cell:
-                console.print(Padding(f"{escape(head)}: {escape(cell)}", (0, 0, 0, 2)), highlight=False)
+                console.print(f"  {escape(head)}: {escape(cell)}", highlight=False)
 
 
 def print_estimates(console: Console, title: str, estimates: Mapping[str, Mapping[str, Any]], heading: str) -> None:

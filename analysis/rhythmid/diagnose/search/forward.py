@@ -181,9 +181,8 @@ def search(
             break
         count = REFITTED if not best.added else REFITTED - 1
         proposals, enough = _proposals(here.model, replace(now, added=here.added), count, here.chi2)
-        tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
         found, failed = run_trials(
-            proposals, series, here.starts, current.run.compiled.layout.states, here.noise, step, enough
+            proposals, series, here.starts, current.run.compiled.layout.states, here.noise, step, enough, tell
         )
         if not best.added and nominal.nrmse() > FOLLOWS:
             proposals = _from_given(nominal, given, catalogue, here.chi2, pool)

@@ -23,6 +23,7 @@ from rhythmid.identify.sample_clock.tick_scan import scanned
 from rhythmid.identify.series import Series, scales
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
+from rhythmid.progress import Step, Tell
 
 Array = NDArray[np.float64]
 SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
@@ -200,6 +201,7 @@ def run_trials(
     noise: NoiseModel,
     max_step: float,
     enough: Sequence[float] | None = None,
+    tell: Tell = lambda _: None,
 ) -> tuple[list[Trial], list[tuple[tuple[str, ...], str]]]:
     """Fit all proposals in parallel. Returns the trials, best first, and those excluded with the reason.
 
@@ -212,7 +214,10 @@ def run_trials(
 
     trials: list[Trial] = []
     excluded: list[tuple[tuple[str, ...], str]] = []
+    what = f"refitting with {', '.join(p.added[-1] for p in proposals if p.added)}"
+    tell(Step(what, 0, len(proposals)))
     for index, result in fork_map(one, list(zip(proposals, goals))):
+        tell(Step(what, len(trials) + len(excluded) + 1, len(proposals)))
         if isinstance(result, Exception):
             excluded.append((proposals[index].added, str(result)))
         else:

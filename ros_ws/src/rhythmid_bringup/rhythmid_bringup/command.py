@@ -7,13 +7,17 @@ from typing import Annotated
 
 import typer
 
+from rhythmid.commands.examples import epilog
+from rhythmid.commands.options import Quiet
 from rhythmid.errors import InputError
+
+EXAMPLES = ("rhythmid run experiment.yaml --out bag", "rhythmid run experiment.yaml --node plant")
 
 
 def add(app: typer.Typer) -> None:
     """Add `run` to the command."""
 
-    @app.command()
+    @app.command(epilog=epilog(EXAMPLES))
     def run(
         experiment: Annotated[Path, typer.Argument(help="Experiment file.")],
         out: Annotated[
@@ -23,12 +27,14 @@ def add(app: typer.Typer) -> None:
             str | None,
             typer.Option("--node", help="Run only this node, here and unattended (one container per node)."),
         ] = None,
+        quiet: Quiet = False,
     ) -> None:
         """Run the graph of an experiment: starts, watches and stops its nodes and leaves a bag."""
         try:  # ROS is slow to load, and the other commands need none
-            from rhythmid_bringup.run import run_alone, run_graph
+            from rhythmid_bringup.run import console, run_alone, run_graph
         except ModuleNotFoundError as missing:
             raise InputError(
                 f"`rhythmid run` needs ROS 2: {missing}; see the README for both ways to get it"
             ) from None
+        console.quiet = quiet
         raise typer.Exit(run_graph(experiment, out) if node is None else run_alone(experiment, out, node))
