@@ -85,7 +85,9 @@ class OfflineRun(Result):
             {
                 "topic": f"{self.experiment.namespace}/{topic}",
                 "messages": len(sent),
-                "fields": ", ".join(n for n in ("position", "velocity", "effort") if getattr(sent, n) is not None),
+                "fields": ", ".join(
+                    n for n in ("position", "velocity", "effort") if getattr(sent, n) is not None
+                ),
             }
             for topic, sent in self.messages.items()
         ]
@@ -93,7 +95,10 @@ class OfflineRun(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """The experiment's description and the topics; the samples are in `messages`."""
-        return {"experiment": self.experiment.description(), "topics": [dict(row) for row in self.tables()["topics"]]}
+        return {
+            "experiment": self.experiment.description(),
+            "topics": [dict(row) for row in self.tables()["topics"]],
+        }
 
     def show(self, console: "Console") -> None:
         """Print length, rate and topics."""

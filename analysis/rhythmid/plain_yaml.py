@@ -21,6 +21,8 @@ def plain_yaml(content: Mapping[str, Any], name: str) -> str:
             return value.tolist()
         if isinstance(value, Path):
             return str(value)
-        raise InputError(f"{name}: {value!r} is no plain value; numbers, text, lists and mappings are expected")
+        raise InputError(
+            f"{name}: {value!r} is no plain value; numbers, text, lists and mappings are expected"
+        )
 
     return yaml.safe_dump(json.loads(json.dumps(content, default=plain)), sort_keys=False)

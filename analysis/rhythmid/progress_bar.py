@@ -97,6 +97,7 @@ def progress(console: Console, budget: float | None = None, log: bool = True) ->
             console.print(f"[dim]{time.monotonic() - began:6.1f} s  {escape(what)}[/]")
 
     if not console.is_interactive:  # a bar would leave an empty line there
+
         def told(what: str) -> None:
             printed(what)
             pace.words(what)

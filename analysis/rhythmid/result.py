@@ -88,7 +88,9 @@ def _html_table(name: str, rows: Sequence[Row]) -> str:
         if joined and key == "value":
             return html.escape(estimate(row["value"], row["std"], row["unit"]))
         value = row[key]
-        return html.escape(number(value) if isinstance(value, float) else "—" if value is None else str(value))
+        return html.escape(
+            number(value) if isinstance(value, float) else "—" if value is None else str(value)
+        )
 
     head = "".join(f"<th>{html.escape(key.replace('_', ' '))}</th>" for key in heads)
     body = "\n".join(f"<tr>{''.join(f'<td>{cell(row, key)}</td>' for key in heads)}</tr>" for row in rows)
@@ -102,7 +104,9 @@ def optional(package: str, method: str) -> Any:
     except ModuleNotFoundError as missing:
         if missing.name != package:
             raise
-        raise InputError(f"{method} needs {package}; install it with: pip install 'rhythmid[notebook]'") from None
+        raise InputError(
+            f"{method} needs {package}; install it with: pip install 'rhythmid[notebook]'"
+        ) from None
 
 
 def axis_or_new(axis: "Axes | None") -> "Axes":

@@ -185,9 +185,7 @@ def _show_paper(rows: Sequence[Row], console: Console) -> None:
             )
         )  # fmt: skip
     heads = ("case", "τu", "τy", "G0 τu+τy", "G-1 τu", "G-1 τy", "G+1 τu", "G+1 τy", "k", "c")
-    title = (
-        "The paper's method: delays [ms], ours and in brackets the paper's; k [N/m], c [N s/m] (the paper: 200 and 2.12)"
-    )
+    title = "The paper's method: delays [ms], ours and in brackets the paper's; k [N/m], c [N s/m] (the paper: 200 and 2.12)"
     print_table(console, title, heads, body, right=heads[1:])
     worst = f"ours {1e3 * worst_error(rows):.2f} ms, the paper's {1e3 * _paper_worst(rows):.2f} ms"
     console.print(f"largest error of a delay: {worst}", highlight=False)
@@ -202,9 +200,24 @@ def _show_joint(rows: Sequence[Row], console: Console) -> None:
             (delays["input"], 1e3), (delays["measurement"], 1e3),
             (values["linear_spring.stiffness"], 1.0), (values["switched_damper.stance"], 1.0),
         ):  # fmt: skip
-            cells += (rounded(scale * estimate["value"], scale * estimate["std"]), f"{scale * estimate['std']:.0e}")
+            cells += (
+                rounded(scale * estimate["value"], scale * estimate["std"]),
+                f"{scale * estimate['std']:.0e}",
+            )
         body.append(cells)
-    heads = ("case", "τu", "τy", "joint τu", "bound", "joint τy", "bound", "joint k", "bound", "joint c", "bound")
+    heads = (
+        "case",
+        "τu",
+        "τy",
+        "joint τu",
+        "bound",
+        "joint τy",
+        "bound",
+        "joint k",
+        "bound",
+        "joint c",
+        "bound",
+    )
     title = "Joint maximum likelihood: delays [ms], k, c, and the bound for the noise that each record shows"
     print_table(console, title, heads, body, right=heads[1:])
 

@@ -11,7 +11,9 @@ Bags = Annotated[
     list[Path], typer.Argument(help="Bag directories, .mcap/.db3 files, or signals.yaml files of tables.")
 ]
 SignalsFile = Annotated[Path | None, typer.Option("--signals", help="Which recorded channel is what.")]
-JsonFile = Annotated[Path | None, typer.Option("--json", help="Write the result as JSON; - is standard output.")]
+JsonFile = Annotated[
+    Path | None, typer.Option("--json", help="Write the result as JSON; - is standard output.")
+]
 ReportFile = Annotated[Path | None, typer.Option("--report", help="Write a self-contained HTML page.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Elements = Annotated[

@@ -94,7 +94,8 @@ class Answer(Result):
         found = self.to_dict()
         return {
             "hypotheses": [
-                one | {"elements": " + ".join(one["elements"]) or "nominal model"} for one in found["hypotheses"]
+                one | {"elements": " + ".join(one["elements"]) or "nominal model"}
+                for one in found["hypotheses"]
             ],
             "parameters": [{"name": name} | one for name, one in found["parameters"].items()],
             "missing": [
@@ -102,7 +103,9 @@ class Answer(Result):
                 for one in found["missing"]
                 for name, value in one["parameters"].items()
             ],
-            "rejections": [one | {"hypothesis": " + ".join(one["hypothesis"])} for one in found["rejections"]],
+            "rejections": [
+                one | {"hypothesis": " + ".join(one["hypothesis"])} for one in found["rejections"]
+            ],
         }
 
     def show(self, console: "Console") -> None:
@@ -121,7 +124,12 @@ class Answer(Result):
         """
         axis, shown = axis_or_new(axis), self.diagnosis.hypotheses[:most]
         places = range(len(shown))
-        axis.barh(places, [one.score_difference for one in shown], xerr=[one.standard_error for one in shown], height=0.6)
+        axis.barh(
+            places,
+            [one.score_difference for one in shown],
+            xerr=[one.standard_error for one in shown],
+            height=0.6,
+        )
         axis.set_yticks(places, [" + ".join(one.elements) or "nominal model" for one in shown])
         axis.invert_yaxis()
         axis.set_xlabel("log density of unseen data, less than the best hypothesis")

@@ -234,7 +234,9 @@ class Identification(Result):
         axis, fit = axis_or_new(axis), self.joint.fit
         series = fit.run.series[record]
         axis.plot(series.centres, series.averaged, color="black", linewidth=1.0, label="measured")
-        axis.plot(series.centres, series.averaged + fit.residuals[record], linestyle="--", label="identified model")
+        axis.plot(
+            series.centres, series.averaged + fit.residuals[record], linestyle="--", label="identified model"
+        )
         axis.set(xlabel="time [s]", ylabel=f"output [{self.records[0].output.unit}]")
         axis.legend(loc="upper right")
         return axis
@@ -247,10 +249,14 @@ class Identification(Result):
         one = self._functions().of(m)
         axis = axis_or_new(axis)
         size = np.abs(one.value)
-        axis.fill_between(one.frequency, np.maximum(size - one.radius, 0.0), size + one.radius, alpha=0.3, label="95 %")
+        axis.fill_between(
+            one.frequency, np.maximum(size - one.radius, 0.0), size + one.radius, alpha=0.3, label="95 %"
+        )
         axis.plot(one.frequency, size, ".", markersize=3, color="black", label="estimate")
         units = self.model.units
-        axis.set(xlabel="output frequency [Hz]", ylabel=f"|{harmonic_name(m)}| [{units.position}/{units.force}]")
+        axis.set(
+            xlabel="output frequency [Hz]", ylabel=f"|{harmonic_name(m)}| [{units.position}/{units.force}]"
+        )
         axis.legend(loc="upper right")
         return axis
 

@@ -159,7 +159,9 @@ def identify(
         raise InputError("nothing to identify from: give at least one record")
     tidy = [without_stray(record) for record in given]
     cut = [note for record, _ in tidy for note in cut_at_gaps(record).notes]
-    found = _identified(tuple(record for record, _ in tidy), model, harmonics, method, forcing, offset, htf, tell)
+    found = _identified(
+        tuple(record for record, _ in tidy), model, harmonics, method, forcing, offset, htf, tell
+    )
     return replace(found, notes=(*(note for _, said in tidy for note in said), *cut, *found.notes))
 
 

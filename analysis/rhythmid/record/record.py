@@ -124,13 +124,21 @@ class Record(Result):
     @property
     def headline(self) -> str:
         """Name, duration and what was measured."""
-        return f"{self.name}: {self.duration:.4g} s of {self.output_kind} at {1.0 / self.output.period:.4g} Hz"
+        return (
+            f"{self.name}: {self.duration:.4g} s of {self.output_kind} at {1.0 / self.output.period:.4g} Hz"
+        )
 
     def tables(self) -> Mapping[str, Sequence[Row]]:
         """`channels`: how many samples each has, at which rate, and where they come from."""
         return {
             "channels": [
-                {"channel": role, "samples": len(c), "rate": 1.0 / c.period, "unit": c.unit, "source": c.source}
+                {
+                    "channel": role,
+                    "samples": len(c),
+                    "rate": 1.0 / c.period,
+                    "unit": c.unit,
+                    "source": c.source,
+                }
                 for role, c in self.channels.items()
             ]
         }
@@ -160,7 +168,10 @@ class Record(Result):
         """Print the channels and what is to be known of their quality."""
         from rhythmid.report.terminal_table import print_table
 
-        rows = [tuple(f"{v:.6g}" if isinstance(v, float) else str(v) for v in row.values()) for row in self.tables()["channels"]]
+        rows = [
+            tuple(f"{v:.6g}" if isinstance(v, float) else str(v) for v in row.values())
+            for row in self.tables()["channels"]
+        ]
         print_table(console, self.headline, ("channel", "samples", "rate [Hz]", "unit", "source"), rows)
         for note in self.quality.notes:
             console.print(f"note: {note}", markup=False)

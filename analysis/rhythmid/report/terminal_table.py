@@ -17,7 +17,11 @@ NAME = 24  # characters of the first column below which its names are not folded
 
 
 def print_table(
-    console: Console, title: str, heads: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[str] = ()
+    console: Console,
+    title: str,
+    heads: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    right: Sequence[str] = (),
 ) -> None:
     """Print rows of plain text below their heads; the columns named in `right` are set to the right.
 
@@ -36,7 +40,9 @@ def print_table(
     console.print(table)
 
 
-def _print_paragraphs(console: Console, title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+def _print_paragraphs(
+    console: Console, title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]
+) -> None:
     if title:
         console.print(f"[italic]{escape(title)}[/]")
     for first, *rest in rows:
@@ -46,11 +52,11 @@ def _print_paragraphs(console: Console, title: str, heads: Sequence[str], rows: 
                 console.print(f"  {escape(head)}: {escape(cell)}", highlight=False)
 
 
-def print_estimates(console: Console, title: str, estimates: Mapping[str, Mapping[str, Any]], heading: str) -> None:
+def print_estimates(
+    console: Console, title: str, estimates: Mapping[str, Mapping[str, Any]], heading: str
+) -> None:
     """Print estimates, each with `value`, `std` and `unit`, to the digits that their standard deviations bear."""
-    rows = [
-        (name, *estimate_cells(one["value"], one["std"]), one["unit"]) for name, one in estimates.items()
-    ]
+    rows = [(name, *estimate_cells(one["value"], one["std"]), one["unit"]) for name, one in estimates.items()]
     print_table(console, title, (heading, "value", "± std", "unit"), rows)
 
 

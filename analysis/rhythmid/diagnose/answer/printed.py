@@ -29,7 +29,9 @@ def show(found: Diagnosis, console: Console) -> None:
         if found.verdict == "missing_physics":  # else the verdict does not stand by the name
             sizes = f"probability {_probability(effect.probability)}, {sizes}"
         lines.told(effect.element, f"{effect.equation}   ({sizes})")
-        print_estimates(console, "", {name: asdict(one) for name, one in effect.parameters.items()}, "parameter")
+        print_estimates(
+            console, "", {name: asdict(one) for name, one in effect.parameters.items()}, "parameter"
+        )
     if len(found.missing) > 1 and found.verdict == "missing_physics":
         lines.said("all of these names together", _probability(found.joint_probability))
     for group in found.indistinguishable:
