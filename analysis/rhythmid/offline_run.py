@@ -6,10 +6,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from rhythmid.plain_yaml import plain_yaml
 from rhythmid.experiment import Experiment, perform
 from rhythmid.model import Model
 from rhythmid.output import require_new
+from rhythmid.plain_yaml import plain_yaml
 from rhythmid.record.bag_writer import write_bag
 from rhythmid.record.messages import Messages
 from rhythmid.record.record import Channel, Record

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from rhythmid.output import STANDARD_OUTPUT
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    pass
 
 
 class Terminal:
