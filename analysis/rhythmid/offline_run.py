@@ -6,6 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rhythmid.experiment import Experiment, perform
 from rhythmid.model import Model
 from rhythmid.output import require_new
@@ -45,7 +47,9 @@ class OfflineRun(Result):
             sent = self.messages[topic]
             value = sent.position if role == "output" else sent.effort
             assert value is not None
-            channels[role] = Channel(sent.stamp_ns * 1e-9, value, sources[role].unit, str(sources[role]))
+            channels[role] = Channel(
+                (sent.stamp_ns * 1e-9).astype(np.float64), value, sources[role].unit, str(sources[role])
+            )
         return Record(known.model_path.stem, run=known.description(), **channels)
 
     @property
