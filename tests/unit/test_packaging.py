@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 ANALYSIS = ROOT / "analysis"
 PROJECT = tomllib.loads((ANALYSIS / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 # with pip, for rosdep has no key for them or one for older versions
-BY_PIP = {"mcap", "numba", "pint", "pydantic", "rich", "rosbags", "threadpoolctl", "typer"}
+BY_PIP = {"backports", "lz4", "numba", "pint", "pydantic", "rich", "rosbags", "threadpoolctl", "typer"}
 ROSDEP = {
     "matplotlib": "python3-matplotlib",
     "numpy": "python3-numpy",
@@ -141,11 +141,12 @@ def imported(folder: Path) -> set[str]:
 
 def distributions(names: set[str]) -> set[str]:
     known = packages_distributions()
-    return {known[name][0].lower() for name in names if name in known}
+    return {plain(known[name][0]) for name in names if name in known}
 
 
 def plain(requirement: str) -> str:
-    return re.split(r"[\[<>=!~ ;]", requirement, maxsplit=1)[0].lower()
+    """A requirement's normalised name, without extras, versions and markers."""
+    return re.sub(r"[-_.]+", "-", re.split(r"[\[<>=!~ ;]", requirement, maxsplit=1)[0]).lower()
 
 
 def test_every_requirement_is_used_and_everything_used_is_required():
