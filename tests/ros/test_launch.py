@@ -1,4 +1,4 @@
-"""The launch file says the same nodes as the experiment; ROS's launch itself is not to be had from PyPI: a stand-in."""
+"""The launch file says the same nodes as the experiment; ROS's launch itself is not available from PyPI: a substitute."""
 
 import importlib.util
 import sys
@@ -29,7 +29,7 @@ class Configuration(Action):
 
 @pytest.fixture
 def launch_file(monkeypatch):
-    """The launch file as a module, with stand-ins for `launch` and `launch_ros`."""
+    """The launch file as a module, with substitutes for `launch` and `launch_ros`."""
     names = {
         "launch": ("LaunchContext", "LaunchDescription"),
         "launch.actions": ("DeclareLaunchArgument", "OpaqueFunction", "Shutdown"),

@@ -132,6 +132,21 @@ def test_lockstep_equals_the_run_without_ros(rhythmid, tmp_path, offline, layout
     assert "0.0403" not in concealed and "0.0507" not in concealed and "stiffness" not in concealed
 
 
+def test_equal_lockstep_runs_give_equal_bytes(rhythmid, tmp_path):
+    """Whatever the layout and the window: what the middleware interleaves otherwise stands in the bag in one order."""
+    found = []
+    for layout, window in (("composed", 100), ("processes", 13)):
+        path = experiment_file(
+            tmp_path, time={"layout": layout, "window": window}, excitation={"sweep": 1.0}
+        )  # fmt: skip
+        done = rhythmid("run", path, "--out", tmp_path / layout / "bag")
+        assert done.returncode == 0, done.stderr
+        found.append({file.name: file.read_bytes() for file in (tmp_path / layout / "bag").iterdir()})
+    assert set(found[0]) == set(found[1])
+    for name, data in found[0].items():
+        assert data == found[1][name], name
+
+
 def test_lockstep_follows_a_delay_profile_as_the_run_without_ros_does(rhythmid, tmp_path):
     (tmp_path / "profile.csv").write_text("0,0.04\n1.5,0.06\n1.51,0.0\n3,0.2\n")
     path = experiment_file(tmp_path, delays={"input": {"profile": "profile.csv"}}, time={"window": 1})
@@ -232,6 +247,19 @@ def test_a_nodes_death_ends_the_run_with_a_valid_bag(no_shared_memory, started, 
     assert code == 1 and f"{victim} was killed by SIGKILL" in said
     rows, _ = content(tmp_path / "experiment_bag")
     assert rows["excitation"] and len(rows["joint_states"]) > 50
+    assert not any(Path(f"/proc/{pid}").exists() for pid in children.values())
+
+
+def test_a_node_that_lives_and_does_not_work_ends_the_run(no_shared_memory, started, tmp_path):
+    path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"}, duration=60.0)
+    run = started(path)
+    run.wait_for_samples(tmp_path / "experiment_bag")
+    children = run.children()
+    os.kill(children["recorder"], signal.SIGSTOP)
+    code, said = run.end()
+    assert code == 1 and "nothing was heard from recorder for 5 s" in said
+    rows, _ = content(tmp_path / "experiment_bag")
+    assert rows["excitation"]
     assert not any(Path(f"/proc/{pid}").exists() for pid in children.values())
 
 

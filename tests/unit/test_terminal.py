@@ -79,11 +79,14 @@ def test_help_on_a_narrow_terminal_cuts_nothing_off():
 def examples() -> Sequence[tuple[str, str]]:
     import importlib
 
-    modules = {name: f"rhythmid.commands.{name}" for name in COMMANDS if name != "run"}
-    modules["run"] = "rhythmid_bringup.command"
+    modules = {name: f"rhythmid.commands.{name}" for name in COMMANDS} | {"run": "rhythmid_bringup.command"}
     return [
         (name, line) for name, where in modules.items() for line in importlib.import_module(where).EXAMPLES
     ]
+
+
+def test_every_command_has_examples():
+    assert {name for name, _ in examples()} == set(COMMANDS)
 
 
 @pytest.mark.parametrize(("name", "line"), examples())

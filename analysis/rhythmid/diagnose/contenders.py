@@ -4,6 +4,7 @@ All are scored on the same rows: the whitened residuals of what the fit saw, pre
 not see, the hidden ends of the same records or separate ones.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -170,12 +171,21 @@ def measured_errors(error: Array, rows: Rows) -> Array:
 
 
 def contend(
-    trials: Sequence[tuple[Trial, Kind]], series: Sequence[Series], rows: Rows, step: float
+    trials: Sequence[tuple[Trial, Kind]],
+    series: Sequence[Series],
+    rows: Rows,
+    step: float,
+    reach: float = math.inf,
 ) -> list[Contender]:
-    """Contenders of these trials, in their order; those that diverge are left out."""
+    """Contenders of these trials, in their order; those that diverge are left out.
+
+    Chi2 of those that matter comes to `reach`; what does not is weighed as far as it has come. The nominal model is a measure for
+    all and always fitted whole.
+    """
 
     def one(case: tuple[Trial, Kind]) -> tuple[CrossValidated, Array]:
-        fit = whole_fit(case[0], series, rows.noise, step)
+        needed = math.inf if case[1] == "nominal" else reach
+        fit = whole_fit(case[0], series, rows.noise, step, reach=needed)
         found = cross_validate(linearised(fit, rows), rows.blocks)
         state_steps = fit.linearisation.state_steps
         free = start_freedom(

@@ -18,7 +18,7 @@ from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.identifiability import Forcing, Offset, delays_of
 from rhythmid.identify.identification import Delays, Estimate, Identification, Shown
 from rhythmid.identify.inner_delays import dead_times
-from rhythmid.identify.joint import POOR, JointFit, best_fit
+from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit
 from rhythmid.identify.large_shifts import large_shifts
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
 from rhythmid.identify.paper_conditions import LEAKAGE, lacks_paper_method, lacks_transfer_functions
@@ -31,7 +31,7 @@ from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
 from rhythmid.progress import Step, Tell
 from rhythmid.record.gaps import cut_at_gaps
-from rhythmid.record.outlier import without_stray
+from rhythmid.record.outlier import without_outliers
 from rhythmid.record.record import Record
 from rhythmid.simulation.signal import continuous, spline
 from rhythmid.simulation.simulate import simulate
@@ -157,7 +157,7 @@ def identify(
     given = (records,) if isinstance(records, Record) else tuple(records)
     if not given:
         raise InputError("nothing to identify from: give at least one record")
-    tidy = [without_stray(record) for record in given]
+    tidy = [without_outliers(record) for record in given]
     cut = [note for record, _ in tidy for note in cut_at_gaps(record).notes]
     found = _identified(
         tuple(record for record, _ in tidy), model, harmonics, method, forcing, offset, htf, tell
@@ -243,13 +243,13 @@ class _Seen:
         """What should keep a user from believing the estimates. Raises InputError where a channel is in another unit."""
         stuck = joint is not None and not joint.search.arrived
         cautions = large_shifts(self.nominal, parameters, delays, self.records[0].output.period)
-        if not stuck and nrmse <= POOR and shift(self.nominal, fitted) <= SHIFTED:
+        if not stuck and nrmse <= POOR_MOTION and shift(self.nominal, fitted) <= SHIFTED:
             return cautions
         mend = check_plausible(self.nominal, self.records)
         told = () if mend is None else (other_unit(mend),)
-        if not stuck and nrmse <= POOR:
+        if not stuck and nrmse <= POOR_MOTION:
             return (*told, *cautions)
-        response = joint.search.response if joint is not None and nrmse <= POOR else None
+        response = joint.search.response if joint is not None and nrmse <= POOR_MOTION else None
         return (not_identified(nrmse, response), *told, *cautions)
 
 

@@ -18,11 +18,11 @@ from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.simulation.generated_source import InputKind, OutputKind
-from rhythmid.simulation.signal import continuous, fast_length, spline
+from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, spline
 
 REACH = 2  # blocks on either side from which `of_block` takes differences
 REST_LENGTH = "linear_spring.rest_length"
-FAINT = 1e-4  # of the inertia's own stiffness m ω², below which a spring sets no scale
+NO_SPRING = 1e-4  # of the inertia's own stiffness m ω², below which a spring sets no scale
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -283,14 +283,14 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     velocity = max(float(np.std(v)) for _, v in motions)
     inertial = model.mass.value * (2 * np.pi * frequency) ** 2
     spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
-    stiffness = spring if spring > FAINT * inertial else inertial
+    stiffness = spring if spring > NO_SPRING * inertial else inertial
     effort, peak, pumping, reference = 0.0, 0.0, 0.0, 0.0
     fed = any(term.element.takes for term in model.terms)  # by a voltage, say: what is recorded is no force
     for one in series:
         total = np.zeros(len(one.time))
         for signal in (one.command, one.forcing):
             if signal is not None:
-                inside = (one.time >= signal.x[0]) & (one.time <= min(signal.x[-1], 1e200))
+                inside = (one.time >= signal.x[0]) & (one.time <= min(signal.x[-1], FOR_EVER))
                 total[inside] += signal(one.time[inside])
         if one.kind == "reference":
             reference = max(reference, float(np.std(total)))

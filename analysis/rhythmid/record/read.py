@@ -30,6 +30,7 @@ CALENDAR = (
     1e8  # seconds, three years: a clock that reads more counts from 1970, not from the start of a machine
 )
 SAMPLES_PER_CYCLE = 100  # of a forcing that is given by formula
+MOST_OF_FORMULA = 50_000_000  # samples of it, 400 MB: an hour at 100 Hz has 36 million
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,8 +309,13 @@ def _finish(record: Record, signals: Signals) -> Record:
         return record
     step = min(record.output.period, 1.0 / (SAMPLES_PER_CYCLE * frequency))
     ends = [(channel.time[0], channel.time[-1]) for channel in record.channels.values()]
-    start = min(first for first, _ in ends)
-    time = start + np.arange(np.ceil((max(last for _, last in ends) - start) / step) + 1) * step
+    start, end = min(first for first, _ in ends), max(last for _, last in ends)
+    count = np.ceil((end - start) / step) + 1
+    if not count <= MOST_OF_FORMULA:
+        raise InputError(
+            f"{record.name}: a forcing of {frequency:g} Hz cannot be followed over {end - start:g} s ({count:.3g} samples)"
+        )
+    time = start + np.arange(count) * step
     return replace(record, forcing=Channel(time, record.forcing_law(time), "N", "formula"))
 
 

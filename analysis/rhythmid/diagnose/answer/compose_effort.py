@@ -23,7 +23,6 @@ from rhythmid.identify.inverse_dynamics.estimate import size_of
 
 NO_SENSOR = "The measurement is taken for the motion: effects in the sensor and in the measurement's time are not among the candidates."
 FIXED_SCALE = "The recorded effort is taken to be true in scale."
-INPUT_DELAY = "input_delay.delay"
 
 
 def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Diagnosis:

@@ -11,7 +11,7 @@ from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.held_out import HeldOut
 from rhythmid.diagnose.effort.remainder import Remainder, remainder_of
-from rhythmid.diagnose.effort.search import GAP, MOST, EffortSearch, search_effort
+from rhythmid.diagnose.effort.search import GAP, MOST_EFFECTS, EffortSearch, search_effort
 from rhythmid.diagnose.evidence import (
     Blocks,
     CrossValidated,
@@ -88,7 +88,7 @@ def _rows(case: Case, found: EffortSearch) -> _Rows:
     return _Rows(whole, Blocks.of(whole, GAP, np.unique(others)), heldout)
 
 
-def effort_run(case: Case, applicability: Applicability, most: int = MOST) -> EffortResult:
+def effort_run(case: Case, applicability: Applicability, most: int = MOST_EFFECTS) -> EffortResult:
     """Search for up to `most` effects, weigh and decide. Raises InputError where the records hold too little."""
     found = search_effort(
         case.records, case.nominal, case.catalogue, applicability.balance, most, case.tell, case.budget

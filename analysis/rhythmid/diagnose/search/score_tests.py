@@ -30,7 +30,7 @@ from rhythmid.model import Model
 from rhythmid.simulation.effect import Path, effect_along
 from rhythmid.simulation.generated_source import DRIVES
 from rhythmid.simulation.signal import first_order_hold
-from rhythmid.simulation.simulate import delay_of_command, delayed_command, physical_times
+from rhythmid.simulation.transport import delayed_command, delays, physical_times
 
 Array = NDArray[np.float64]
 SMALL = 1e-3  # of the force that shakes the machine: a force that is tried is no larger, so that the answer is in proportion
@@ -211,7 +211,9 @@ def _change_of_reference(known: Trajectories, index: int, change: Array) -> Arra
     fit, run, one = known.fit, known.disturbed, known.disturbed.series[index]
     if not np.isfinite(change).all():
         return None
-    stamped = known.paths[index].time - float(np.mean(delay_of_command(fit.model, known.paths[index].time)))
+    time = known.paths[index].time
+    late = sum((late for _, late in delays(fit.model, time, "command")), np.zeros(len(time)))
+    stamped = time - float(np.mean(late))
     both = []
     for reference in (known.commands[index], known.commands[index] + change):
         moved = replace(one, command=first_order_hold(stamped, reference))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +12,8 @@ import typer
 from rhythmid.commands.examples import epilog
 from rhythmid.commands.options import Quiet
 from rhythmid.errors import InputError
+
+from . import isolation
 
 EXAMPLES = ("rhythmid run experiment.yaml --out bag", "rhythmid run experiment.yaml --node plant")
 
@@ -27,9 +31,19 @@ def add(app: typer.Typer) -> None:
             str | None,
             typer.Option("--node", help="Run only this node, here and unattended (one container per node)."),
         ] = None,
+        isolated: Annotated[
+            bool,
+            typer.Option(
+                "--isolated", help="Give the nodes a network of their own: nobody else reaches them."
+            ),
+        ] = False,
         quiet: Quiet = False,
     ) -> None:
         """Run the graph of an experiment: starts, watches and stops its nodes and leaves a bag."""
+        if isolated:
+            again = [argument for argument in sys.argv[1:] if argument != "--isolated"]
+            line = isolation.isolated([sys.executable, "-m", "rhythmid.cli", *again])
+            os.execvp(line[0], line)
         try:  # ROS is slow to load, and the other commands need none
             from rhythmid_bringup.run import console, run_alone, run_graph
         except ModuleNotFoundError as missing:

@@ -21,6 +21,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rhythmid.experiment import Delay, Experiment
 
 from .arguments import command, compose_command, ros_arguments
+from .liveness import SILENT_AFTER, Liveness, Relay
 from .observer import Observer
 from .processes import Supervised, end
 
@@ -67,6 +68,12 @@ class Supervisor:
         self._lockstep = experiment.time.mode == "lockstep"
         self._length = experiment.count * experiment.time.period_ns * 1e-9
         self._nodes = [spec.name for spec in experiment.nodes()]
+        self._liveness = Liveness(
+            {
+                "command_delay": Relay("excitation", "sent", longest(experiment.input_delay)),
+                "measurement_delay": Relay("plant", "samples", longest(experiment.measurement_delay)),
+            }
+        )
         self._streams = any(topic not in ("run", "diagnostics") for topic in experiment.record.topics)
 
     def run(self) -> Outcome:
@@ -78,7 +85,10 @@ class Supervisor:
         try:
             self._launch()
             outcome = self._wait_until_ready(observer) or self._play(observer)
-            self._tell_timing(observer)
+            silent = self._tell_timing(observer)
+            if outcome.code == 1 and silent:
+                told = f"nothing was heard from {', '.join(silent)} for {FIGURES_WITHIN:g} s"
+                outcome = Outcome(1, f"{outcome.sentence}; {told}")
             end([process for process in self._processes if process.name != "recorder"], self._listen)
             end(self._processes, self._listen)  # the recorder hears the others' last words
             for process in self._processes:
@@ -130,6 +140,19 @@ class Supervisor:
             return Outcome(1, f"{process.name} {how}")
         return Outcome(0, "stopped by the user") if self._interrupted() else None
 
+    def _stopped_working(self, observer: Observer) -> Outcome | None:
+        """A node that lives and does not work; a silent one is killed, lest it wakes up and acts after the run."""
+        heard = {name: count for name, count in observer.heard.items() if name in self._nodes}
+        silent = self._liveness.silent(time.monotonic(), heard)
+        for process in self._processes:
+            if process.name in silent or (silent and len(self._processes) == 1):
+                process.signal(signal.SIGKILL)
+        if silent:
+            said = f"nothing was heard from {', '.join(silent)} for {SILENT_AFTER:g} s: stopped working"
+        else:
+            said = self._liveness.stalled(observer.figures)
+        return Outcome(1, said) if said else None
+
     def _wait_until_ready(self, observer: Observer) -> Outcome | None:
         """Until every node says that it is ready and the excitation has started; why not, if it comes to nothing."""
         patience = time.monotonic() + READY_WITHIN
@@ -174,7 +197,7 @@ class Supervisor:
                     moved = now
                 self.observed.elapsed, self.observed.played = now, min(played, self._length)
                 progress.update(bar, completed=self.observed.played)
-                outcome = self._trouble() or self._ending(observer)
+                outcome = self._trouble() or self._stopped_working(observer) or self._ending(observer)
                 if outcome is None and now - moved > STALLED_AFTER:
                     outcome = Outcome(1, f"nothing has moved for {STALLED_AFTER:g} s")
         if self._interrupted():
@@ -215,17 +238,18 @@ class Supervisor:
             self._listen()
         self._record_tail()
 
-    def _tell_timing(self, observer: Observer) -> None:
-        """Let the bag say how punctual the run was; simulated time knows no lateness."""
+    def _tell_timing(self, observer: Observer) -> list[str]:
+        """Let the bag say how punctual the run was; simulated time knows no lateness. The nodes that told nothing more."""
         if self._lockstep or not observer.run:
-            return
-        before = dict(observer.heard)
+            return []
+        before = {name: count for name, count in observer.heard.items() if name in self._nodes}
         patience = time.monotonic() + FIGURES_WITHIN
-        while any(observer.heard[name] == before[name] for name in before):
-            if time.monotonic() > patience:
-                break
+        while (silent := [name for name in before if observer.heard[name] == before[name]]) and (
+            time.monotonic() < patience
+        ):
             self._listen()
         observer.tell_timing()
+        return silent
 
 
 def longest(delay: Delay) -> float:

@@ -11,13 +11,12 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter as RosParameter
 from std_msgs.msg import String
 
 from rhythmid.errors import InputError
-from rhythmid.experiment import Delay
+from rhythmid.settings import Delay, profile_delay
 
 from .clock import Clock, Worker, sleep_in_slices
 from .joint_state import restamped, stamp_of
@@ -85,6 +84,7 @@ class DelayInjector(GraphNode):
         applied = self._applied_ns / self._relayed * 1e-6 if self._relayed else 0.0
         figures = {
             "relayed": str(self._relayed),
+            "lost": str(self._input.lost),
             "delay_ms": f"{self._delay_ns * 1e-6:.6f}" if self._profile is None else "profile",
             "applied_delay_mean_ms": f"{applied:.6f}",
         }
@@ -126,7 +126,7 @@ class DelayInjector(GraphNode):
         if self._profile is None:
             return self._delay_ns
         since = 0 if self._start_ns is None else stamp_ns - self._start_ns
-        return int(np.rint(np.interp(since * 1e-9, *self._profile) * 1e9))
+        return int(profile_delay(since, *self._profile))
 
     def _on_lockstep(self, data: bytes, _received_ns: int) -> None:
         stamp_ns = stamp_of(data)
