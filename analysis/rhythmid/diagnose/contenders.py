@@ -151,12 +151,13 @@ def _long_enough(one: Series, noise: NoiseModel, hidden: bool = False) -> tuple[
 
 @dataclass(frozen=True)
 class Contender:
-    """A fitted model with the errors of its predictions, in units of the noise and in the measurement's."""
+    """A fitted model with the errors of its predictions, in units of the noise and in the measurement's, and its free parameters."""
 
     trial: Trial
     kind: Kind
     found: CrossValidated
     error: Array
+    values: Mapping[str, float]
 
 
 def measured_errors(error: Array, rows: Rows) -> Array:
@@ -183,7 +184,7 @@ def contend(
     all and always fitted whole.
     """
 
-    def one(case: tuple[Trial, Kind]) -> tuple[CrossValidated, Array]:
+    def one(case: tuple[Trial, Kind]) -> tuple[CrossValidated, Array, dict[str, float]]:
         needed = math.inf if case[1] == "nominal" else reach
         fit = whole_fit(case[0], series, rows.noise, step, reach=needed)
         found = cross_validate(linearised(fit, rows), rows.blocks)
@@ -193,7 +194,8 @@ def contend(
         )
         if free > 0.0:  # spread over what the fit saw
             found = replace(found, penalty=free / max(rows.fitted, 1))
-        return found, measured_errors(found.error, rows)
+        values = dict(zip(fit.names, fit.values.tolist(), strict=True))
+        return found, measured_errors(found.error, rows), values
 
     done = {i: r for i, r in fork_map(one, list(trials)) if not isinstance(r, Exception)}
     return [Contender(*trials[i], *done[i]) for i in sorted(done)]
@@ -212,6 +214,7 @@ def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> 
             heldout_error(one.error, rows),
             shape(one.trial) if one.kind == "effects" else {},
             richer_of(one.trial.model, one.trial.added),
+            one.values,
         )
         for one in contenders
     ]

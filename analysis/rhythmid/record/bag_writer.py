@@ -64,8 +64,9 @@ class BagWriter(Writer):
 
     def _open_file(self) -> None:
         name = f"{self.path.name}_{len(self.files)}" if self._numbered else self.path.name
-        self.storage = _FILES[self.storage_plugin](self.path, self.compression_mode, name)
-        self.files.append(FileContent(self.storage.path.name))
+        storage = _FILES[self.storage_plugin](self.path, self.compression_mode, name)
+        self.storage = storage
+        self.files.append(FileContent(storage.path.name))
 
     def split(self) -> None:
         """Close the present file and go on in another."""

@@ -120,6 +120,7 @@ def effort_run(case: Case, applicability: Applicability, most: int = MOST_EFFECT
             made(predicted[one.elements]),
             errors[tuple(sorted(one.elements))] / size,
             richer=richer_of(one.fit.model, one.elements),
+            values={name: one.fit.model.value(name) for name in one.fit.names},
         )
         for one in found.hypotheses
     ]
