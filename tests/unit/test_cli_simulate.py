@@ -130,7 +130,7 @@ def test_a_place_that_nobody_may_write_is_refused(folder, rhythmid):
 def test_square_brackets_in_a_message_are_printed_as_they_are(folder, rhythmid):
     (folder / "run.yaml").write_text(EXPERIMENT + "safety: {envelope: [1]}\n", encoding="utf-8")
     done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag")
-    assert "two positions [low, high] in m are expected" in done.stderr
+    assert "two numbers [low, high] are expected" in done.stderr
 
 
 def test_help_and_version_are_answers(rhythmid):
