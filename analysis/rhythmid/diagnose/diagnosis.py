@@ -75,7 +75,7 @@ class Answer(Result):
 
     @property
     def covariance(self) -> JointCovariance:
-        """Covariance of the chosen model's parameters.
+        """Covariance of the chosen model's parameters, given that model; what the choice of the model adds is in `diagnosis` only.
 
         Raises InputError where effort was scored: its standard deviations are those of each parameter alone.
         """
