@@ -168,6 +168,8 @@ class Experiment:
                     "seed": self.seed,
                     "initial": [] if self.initial is None else list(self.initial),
                     "consumers": sinks,
+                    "max_effort": self.safety.max_effort,
+                    "command_timeout": self.safety.command_timeout,
                 },
             ),
             injector("command_delay", "excitation", "command", self.input_delay),
@@ -183,6 +185,9 @@ class Experiment:
                     "ramp": self.safety.ramp,
                     "stale_after": self.safety.stale_after,
                     "envelope": [low, high],
+                    "max_speed": self.safety.max_speed,
+                    "frozen_after": self.safety.frozen_after,
+                    "max_gap": self.safety.max_gap,
                     "run": _json(self.description()),
                     "subscribers": 1 + ("excitation" in self.record.topics),
                     "consumers": ["plant", *sinks],
@@ -222,9 +227,9 @@ def perform(experiment: Experiment) -> dict[str, Messages]:
 
     Equals the graph's lockstep run, sample by sample and stamp by stamp. Raises InputError for a run too long to keep.
     """
-    from rhythmid.simulation.plant import (
-        Plant,  # the compiler behind it is slow to load, and most nodes need no plant
-    )
+    # the compiler behind the plant is slow to load, and most nodes need no plant
+    from rhythmid.simulation.command_hold import RAMP, CommandHold
+    from rhythmid.simulation.plant import Plant
 
     if experiment.count > LONGEST_RUN:
         raise InputError(
@@ -236,7 +241,7 @@ def perform(experiment: Experiment) -> dict[str, Messages]:
     effort = ramped(experiment.excitation, experiment.safety, time, experiment.count * period * 1e-9)
     arrival = experiment.input_delay.release(stamps)
     plant = Plant(experiment.plant_model, period, experiment.seed, experiment.initial)
-    plant.push_many(arrival, effort)
+    plant.push_many(*CommandHold(experiment.safety.command_timeout, RAMP, period).fill(arrival, effort))
     samples = plant.advance(int(stamps[-1]))
     seen = experiment.measurement_delay.release(stamps)
     return {

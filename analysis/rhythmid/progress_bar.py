@@ -1,8 +1,7 @@
-"""Progress on the terminal: what is under way and for how long, what is left of work in equal parts, and of a given time.
+"""Progress on the terminal: what is under way and for how long, and how much of a given time is spent.
 
-How long a search will take is not known beforehand, so no bar pretends to know. Work that consists of countable parts, such as the
-refits of one round, shows how many are done and how long the rest will take at the same pace; where a time is given, a bar shows how
-much of it is spent.
+How long a search will take is not known beforehand, so no bar pretends to know: there is one only where a time is given, and it
+shows how much of that is spent.
 """
 
 import time
@@ -16,10 +15,9 @@ from rich.progress_bar import ProgressBar
 from rich.table import Column
 from rich.text import Text
 
-from rhythmid.progress import Step, Tell
+from rhythmid.progress import Tell
 
 BAR = 20  # characters
-MINUTE = 60.0  # s
 
 
 class SpentColumn(ProgressColumn):
@@ -53,30 +51,6 @@ def spent_words(elapsed: float, seconds: float) -> str:
     return f"{100.0 * elapsed / seconds:.0f} % of {seconds:g} s spent"
 
 
-def left_words(done: int, total: int, elapsed: float) -> str:
-    """How many parts are done, and how long the rest will take when `done` of them took `elapsed` [s]."""
-    if done <= 0 or done >= total:
-        return f"{done} of {total}"
-    left = elapsed * (total - done) / done
-    words = f"{left:.0f} s" if left < MINUTE else f"{left / MINUTE:.0f} min"
-    return f"{done} of {total}, about {words} left"
-
-
-class _Pace:
-    """Since when the work that is under way has been."""
-
-    def __init__(self) -> None:
-        self.what, self.began = "", time.monotonic()
-
-    def words(self, what: str) -> str:
-        """What is told, with what is left of it where that can be counted."""
-        if what != self.what:
-            self.what, self.began = str(what), time.monotonic()
-        if not isinstance(what, Step):
-            return what
-        return f"{what}: {left_words(what.done, what.total, time.monotonic() - self.began)}"
-
-
 @contextmanager
 def progress(console: Console, budget: float | None = None, log: bool = True) -> Iterator[Tell]:
     """While this is open, what is told stands in a line with the time since it was opened, and with a `budget` [s] the share of
@@ -90,25 +64,20 @@ def progress(console: Console, budget: float | None = None, log: bool = True) ->
     columns.append(
         TextColumn("{task.description}", table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1))
     )
-    began, pace = time.monotonic(), _Pace()
+    began = time.monotonic()
 
     def printed(what: str) -> None:
-        if log and what != pace.what:
+        if log:
             console.print(f"[dim]{time.monotonic() - began:6.1f} s  {escape(what)}[/]")
 
     if not console.is_interactive:  # a bar would leave an empty line there
-
-        def told(what: str) -> None:
-            printed(what)
-            pace.words(what)
-
-        yield told
+        yield printed
         return
     with Progress(*columns, console=console, transient=True, expand=True) as bar:
         task = bar.add_task("", total=None)
 
         def tell(what: str) -> None:
+            bar.update(task, description=escape(what))
             printed(what)
-            bar.update(task, description=escape(pace.words(what)))
 
         yield tell

@@ -89,8 +89,12 @@ class TimeMode:
 
 @dataclass(frozen=True)
 class Safety:
-    """Limits of the excitation: largest effort [N], ramps in and out [s], age of the newest measurement [s] and
-    range of positions [m] beyond which it stops by itself."""
+    """Limits of a run. The effort never exceeds `max_effort` [N]; it fades in and out over `ramp` [s].
+
+    The excitation stops by itself when the newest measurement is older than `stale_after` [s], two successive ones lie further apart
+    than `max_gap` [s] (0: as `stale_after`), the position leaves `envelope` [m] or does not change for `frozen_after` [s]
+    (0: never looked at), or the speed exceeds `max_speed` [m/s]. A command that nobody renews ends after `command_timeout` [s] (0: never).
+    """
 
     __pydantic_config__ = KEYS
 
@@ -98,6 +102,10 @@ class Safety:
     ramp: Annotated[Number, Field(ge=0)] = 0.0
     stale_after: Annotated[Number, Field(ge=1e-3)] = 0.5
     envelope: Range = (-math.inf, math.inf)
+    max_speed: Annotated[float, Field(ge=0)] = math.inf
+    frozen_after: Annotated[Number, Field(ge=0)] = 0.0
+    max_gap: Annotated[Number, Field(ge=0)] = 0.0
+    command_timeout: Annotated[Number, Field(ge=0)] = 0.1
 
 
 @dataclass(frozen=True)

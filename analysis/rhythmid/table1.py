@@ -16,7 +16,7 @@ from rhythmid.identify.identification import Identification
 from rhythmid.identify.identify import identify, paper_hopper
 from rhythmid.ltp.htf import theoretical_htf
 from rhythmid.parallel import fork_map
-from rhythmid.progress import Step, Tell
+from rhythmid.progress import Tell, counted, silent
 from rhythmid.record.bag_writer import write_bag
 from rhythmid.record.read import read_record
 from rhythmid.report.figures import Curve, magnitude_figure, phase_figure, save_figure
@@ -34,7 +34,6 @@ delays: {{input: {input}, measurement: {measurement}}}
 """
 DRAWN = 5  # experiment whose HTFs are drawn, as in the paper's Figures 2 and 3
 HIGHEST = 7.0  # [Hz] drawn
-SIMULATING = "simulating and identifying"
 
 
 @dataclass(frozen=True)
@@ -141,17 +140,17 @@ def table1(
     folder: Path,
     cases: Sequence[Case] = CASES,
     workers: int | None = None,
-    tell: Tell = lambda _: None,
+    tell: Tell = silent,
 ) -> list[Row]:
     """All experiments, on all cores; bags and figures go to `folder`. Raises InputError when one of them fails."""
     folder.mkdir(parents=True, exist_ok=True)
     rows: dict[int, Row] = {}
-    tell(Step(SIMULATING, 0, len(cases)))
-    for index, row in fork_map(lambda case: run_case(case, folder), cases, workers):
+    tell("simulating and identifying")
+    done = fork_map(lambda case: run_case(case, folder), cases, workers)
+    for index, row in counted(done, len(cases), "experiments", tell):
         if isinstance(row, Exception):
             raise InputError(f"experiment {cases[index].number}: {row}")
         rows[index] = row
-        tell(Step(SIMULATING, len(rows), len(cases)))
         if row.magnitude is not None and row.phase is not None:
             save_figure(magnitude_figure(row.magnitude), folder / "figure2_magnitude.png")
             save_figure(phase_figure(row.phase), folder / "figure3_phase.png")

@@ -11,8 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rclpy
 import yaml
+from rclpy.node import Node
+from rclpy.utilities import try_shutdown
 from rosbags.rosbag2 import Reader
+from sensor_msgs.msg import JointState
 
 from rhythmid.experiment import Experiment, perform
 from rhythmid_nodes.joint_state import JointStateReader
@@ -250,6 +254,37 @@ def test_a_nodes_death_ends_the_run_with_a_valid_bag(no_shared_memory, started, 
     assert not any(Path(f"/proc/{pid}").exists() for pid in children.values())
 
 
+def test_a_stranger_who_commands_ends_the_run_with_code_1_and_is_named(
+    domain, monkeypatch, started, tmp_path
+):
+    monkeypatch.delenv("RHYTHMID_SUPERVISOR")  # of nodes that this process starts
+    path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"}, duration=60.0)
+    run = started(path)
+    run.wait_for_samples(tmp_path / "experiment_bag")
+    rclpy.init(args=[])
+    try:
+        stranger = Node("stranger", namespace="/elsewhere")
+        publisher = stranger.create_publisher(JointState, "/hopper/command", 10)
+        patience = time.monotonic() + 20
+        while publisher.get_subscription_count() == 0 and time.monotonic() < patience:
+            time.sleep(0.01)
+        for _ in range(20):
+            publisher.publish(JointState(name=["leg"], effort=[5.0]))
+        code, said = run.end()
+        stranger.destroy_node()
+    finally:
+        try_shutdown()
+    assert code == 1
+    assert "2 publishers of /hopper/command: /elsewhere/stranger, /hopper/command_delay" in said, said
+    rows, states = content(tmp_path / "experiment_bag")
+    assert max(abs(row.effort) for row in rows["command"] if row.stamp_ns > 0) <= 0.05
+    assert (
+        max(abs(state.effort) for state in rows["plant/joint_states"]) < 1.1
+    )  # forcing and excitation, not 5 N
+    assert "/elsewhere/stranger" in states[-1]["failure"]
+    assert "/elsewhere/stranger" in states[-1]["foreign"]["plant"]["conflict"]
+
+
 def test_a_node_that_lives_and_does_not_work_ends_the_run(no_shared_memory, started, tmp_path):
     path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"}, duration=60.0)
     run = started(path)
@@ -281,7 +316,7 @@ def test_a_machine_that_leaves_its_envelope_ends_the_run_with_code_1(rhythmid, t
         tmp_path,
         time={"mode": "realtime"},
         excitation={"type": "profile", "points": [[0.0, 0.0], [0.5, 20.0]], "length": 20.0},
-        safety={"envelope": [0.0, 0.25], "max_effort": 30.0},
+        safety={"envelope": [0.0, 0.25], "max_effort": 30.0, "stale_after": 5.0},
     )
     done = rhythmid("run", path)
     assert done.returncode == 1 and "outside the envelope" in done.stderr

@@ -6,8 +6,8 @@ import pytest
 from rich.console import Console
 from rich.progress import Progress
 
-from rhythmid.progress import Step
-from rhythmid.progress_bar import SpentColumn, left_words, progress, spent_words
+from rhythmid.progress import counted
+from rhythmid.progress_bar import SpentColumn, progress, spent_words
 
 
 def test_what_begins_is_printed_with_its_time_and_markup_in_it_stays_text():
@@ -49,38 +49,17 @@ def test_a_line_with_a_budget_shows_it():
     assert "0 % of 1000 s spent" in console.file.getvalue()
 
 
-@pytest.mark.parametrize(
-    ("done", "total", "elapsed", "words"),
-    [
-        (0, 9, 4.0, "0 of 9"),
-        (3, 9, 12.0, "3 of 9, about 24 s left"),
-        (1, 9, 60.0, "1 of 9, about 8 min left"),
-        (9, 9, 36.0, "9 of 9"),
-    ],
-)
-def test_countable_work_says_how_long_the_rest_will_take(done, total, elapsed, words):
-    assert left_words(done, total, elapsed) == words
+def test_work_of_many_parts_tells_now_and_then_how_long_the_rest_takes():
+    clock, told = [0.0], []
 
+    def parts():
+        for part in range(20):
+            clock[0] += 3.0
+            yield part
 
-def test_the_line_shows_what_is_left_of_countable_work():
-    console = Console(file=io.StringIO(), width=160, force_terminal=True)
-    with progress(console, log=False) as tell:
-        tell(Step("refitting", 1, 4))
-    assert isinstance(console.file, io.StringIO)
-    assert "refitting: 1 of 4" in console.file.getvalue()
-
-
-@pytest.mark.parametrize("interactive", [True, False])
-def test_parts_of_one_work_are_printed_once(interactive):
-    console = Console(file=io.StringIO(), width=160, force_terminal=interactive)
-    with progress(console) as tell:
-        for done in range(4):
-            tell(Step("refitting", done, 4))
-        tell("weighing")
-    assert isinstance(console.file, io.StringIO)
-    printed = [line for line in console.file.getvalue().splitlines() if " s  " in line]
-    assert sum("s  refitting" in line for line in printed) == 1
-    assert sum("s  weighing" in line for line in printed) == 1
+    assert list(counted(parts(), 20, "records", told.append, lambda: clock[0])) == list(range(20))
+    assert told[:2] == ["records: 2 of 20 done, about 54 s left", "records: 4 of 20 done, about 48 s left"]
+    assert len(told) == 9
 
 
 def test_nothing_is_printed_where_there_is_no_log_and_no_terminal():

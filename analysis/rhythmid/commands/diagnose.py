@@ -81,10 +81,11 @@ def diagnose(
         )
     catalogue = load_catalogue(elements or ())
     nominal = None if model is None else Model.load(model, catalogue)
-    records = load_records(bags, signals)
-    unseen = load_records(holdout or (), signals)
-    simulation = None if sim is None else _simulation(sim, signals, sim_signals)
     terminal = Terminal(quiet, json)
+    with progress(terminal.progress) as tell:
+        records = load_records(bags, signals, tell)
+        unseen = load_records(holdout or (), signals, tell)
+    simulation = None if sim is None else _simulation(sim, signals, sim_signals)
     result, answer, comparison = {}, None, None
     if simulation is not None:
         from rhythmid.compare.compare import compare

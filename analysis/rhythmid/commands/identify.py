@@ -87,14 +87,19 @@ def identify(
         )
     known = None if model is None else Model.load(model, load_catalogue(elements or ()))
     terminal = Terminal(quiet, json)
-    with progress(terminal.progress, log=False) as tell:
-        tell("reading the records")
-        records = load_records(bags, signals)
+    with progress(terminal.progress) as tell:
+        tell("reading")
+        records = load_records(bags, signals, tell)
         path = "clock_unknown" if offset is not None else cast(Forcing | None, forcing)
         found = find(
-            records, known, method=cast(Method, method), forcing=path, offset=offset, htf=cast(HtfMethod, htf),
+            records,
+            known,
+            method=cast(Method, method),
+            forcing=path,
+            offset=offset,
+            htf=cast(HtfMethod, htf),
             tell=tell,
-        )  # fmt: skip
+        )
     found.show(terminal.answer)
     if json is not None:
         write_json(json, found.to_dict())

@@ -74,7 +74,7 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     rows = rows_of(seen, unseen, found.noise)
     kinds: list[tuple[Trial, Kind]] = [(t, "effects" if t.added else "nominal") for t in found.trials]
     reach = reach_of(found.fit.chi2, found.fit.samples)
-    contenders = contend(kinds, seen, rows, step, reach)
+    contenders = contend(kinds, seen, rows, step, reach, case.tell)
     run = trajectories(found.fit)
     sizes = scales(seen, found.fit.model)
     chosen = select(_contest(contenders, {}, rows, found, run, sizes)).chosen
@@ -87,7 +87,7 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         others = alternatives(
             nominal, trial, seen, known, found.noise, step, run, found.rounds, weighed, reach
         )
-        contenders += contend(others, seen, rows, step, reach)
+        contenders += contend(others, seen, rows, step, reach, case.tell)
     case.tell("locating what is left")
     after = dependences(run, rows, case.pool)
     contest = _contest(contenders, _maps(after, contenders, rows), rows, found, run, sizes)

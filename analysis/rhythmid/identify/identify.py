@@ -29,7 +29,7 @@ from rhythmid.ltp.harmonic_estimate import HarmonicEstimates
 from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, smoothed
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
-from rhythmid.progress import Step, Tell
+from rhythmid.progress import Tell, counted, silent
 from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.outlier import without_outliers
 from rhythmid.record.record import Record
@@ -104,7 +104,7 @@ def identify(
     forcing: Forcing | None = None,
     offset: Offset | None = None,
     htf: HtfMethod = "auto",
-    tell: Tell = lambda _: None,
+    tell: Tell = silent,
 ) -> Identification:
     """Identify a model's free parameters and its delays from records.
 
@@ -178,8 +178,8 @@ def _identified(
     nominal = with_declared(model or paper_hopper(), given)
     pumpings: list[Pumping] = []
     results: list[PaperResult | str] = []
-    for number, record in enumerate(given):
-        tell(Step("transfer functions of the records", number, len(given)))
+    tell("transfer functions, record by record")
+    for record in counted(given, len(given), "records", tell):
         own, pumping = forced_by(own_model(nominal, record), record)
         pumpings.append(pumping)
         try:
@@ -189,8 +189,7 @@ def _identified(
                 raise
             results.append(str(error))
     seen = _Seen(given, nominal, tuple(pumpings), tuple(results))
-    tell("joint maximum likelihood")
-    found = _by_likelihood(seen, forcing, offset, htf) if method == "joint" else None
+    found = _by_likelihood(seen, forcing, offset, htf, tell) if method == "joint" else None
     return found or _by_paper(
         seen, htf if method == "joint" or htf != "auto" else "regularised_least_squares", method
     )
@@ -279,7 +278,7 @@ def _by_paper(seen: _Seen, htf: HtfMethod, method: Method) -> Identification:
 
 
 def _by_likelihood(
-    seen: _Seen, forcing: Forcing | None, offset: Offset | None, htf: HtfMethod
+    seen: _Seen, forcing: Forcing | None, offset: Offset | None, htf: HtfMethod, tell: Tell
 ) -> Identification | None:
     """Parameters and delays by joint maximum likelihood; HTFs without a model.
 
@@ -287,6 +286,7 @@ def _by_likelihood(
     """
     records, paper = seen.records, seen.paper
     unforced = paper and not any(pumping.active for pumping in seen.pumpings)
+    tell("fitting the model to all records at once")
     try:
         found = best_fit(records, seen.nominal)
     except InputError:
@@ -296,6 +296,7 @@ def _by_likelihood(
         raise
     if unforced and not found.search.arrived and paper[0].fit.misfit < MISFIT:
         return None
+    tell("looking for clocks that drift and commands that are held")
     joint, notes = compensated(found) if found.search.arrived else (found, ())
     joint = replace(joint, fit=with_discretisation_error(joint.fit))
     fit = joint.fit

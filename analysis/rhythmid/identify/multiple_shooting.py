@@ -47,7 +47,8 @@ def split(series: Series, length: float) -> list[Series]:
             replace(
                 series, name=f"{record_of(series)}@{time[0]:.2f}s", record=record_of(series), time=time,
                 value=series.value[window],
-                used=series.used[blocks], ignored=None if series.ignored is None else series.ignored[blocks],
+                used=series.used[blocks], spread=None if series.spread is None else series.spread[blocks],
+                ignored=None if series.ignored is None else series.ignored[blocks],
                 command=_around(series.command, time[0], time[-1]), forcing=_around(series.forcing, time[0], time[-1]),
             )
         )  # fmt: skip

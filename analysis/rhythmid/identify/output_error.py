@@ -165,7 +165,7 @@ def noise_of(residuals: Sequence[Array], series: Sequence[Series], floor: float 
         if one.ignored is not None:
             columns = one.ignored[one.used]
             residual = residual - one.ignored @ np.linalg.lstsq(columns, residual[one.used], rcond=1e-12)[0]
-        stretches += [residual[s] for s in runs(one.used)]
+        stretches += [one.levelled(residual[s], s) for s in runs(one.used)]
     return estimate_noise(stretches, floor=floor)
 
 

@@ -32,6 +32,9 @@ DRIFT_PARAMETER = {"clock_skew": "skew", "input_delay_drift": "rate"}
 ALIKE = {"clock_skew": ("delay_drift",)}  # the same to first order
 EVIDENT_BY = 5.0  # standard deviations from which a timing effect becomes part of the model
 SMEARS = 3  # widths of command jitter that are tried
+ROLL_OFF_SAMPLES = (
+    1_000_000  # samples that tell of a roll-off what there is to be told: further records are not asked
+)
 UNEXPLAINED = 1.5  # times the noise floor, beyond which a hold is looked for
 HOLD_GAIN = 25.0  # in chi2 that a hold must bring
 SLOWER = 3.0  # sample periods from which a hold can be told from the commands' own
@@ -185,25 +188,37 @@ def smeared(command: PPoly, width: float, period: float) -> PPoly:
     return PPoly(fitted.c, fitted.x, extrapolate=True)
 
 
+def _received(fit: Fit, width: float) -> tuple[Fit, list[Series]]:
+    """The fit with a delay that is shorter by half of `width` [s], and its series, whose commands are smeared over it."""
+    step = fit.run.series[0].period
+    series = [
+        one if one.command is None else replace(one, command=smeared(one.command, width, step))
+        for one in fit.run.series
+    ]
+    start = fit.model.value(INPUT_DELAY) - 0.5 * width
+    return replace(fit, model=fit.model.with_values({INPUT_DELAY: start})), series
+
+
+def _first_samples(fit: Fit, enough: int) -> Fit:
+    """The fit as it stands on its first series, with `enough` samples or more; all of it where there are not so many."""
+    ends = np.cumsum([len(one.time) for one in fit.run.series])
+    count = int(np.searchsorted(ends, enough)) + 1
+    if count >= len(ends):
+        return fit
+    run = replace(fit.run, series=fit.run.series[:count], inputs=fit.run.inputs[:count])
+    return replace(fit, run=run, starts=fit.starts[:count], residuals=fit.residuals[:count])
+
+
 def _smear(fit: Fit, largest: float, pool: ThreadPoolExecutor | None) -> tuple[float, float] | None:
     """Variance [s²] of a delay that is uniform over an interval and smears the command; and its standard deviation.
 
     The profile likelihood over the variance is a parabola. None where the response does not roll off at all.
     """
-    step = fit.run.series[0].period
+    fit = _first_samples(fit, ROLL_OFF_SAMPLES)
     at = np.linspace(0.0, largest, SMEARS + 1) ** 2
     best = spread = 0.0
     for _ in range(3):
-        chi2 = []
-        for variance in at:
-            width = math.sqrt(12.0 * variance)
-            series = [
-                one if one.command is None else replace(one, command=smeared(one.command, width, step))
-                for one in fit.run.series
-            ]
-            start = fit.model.value(INPUT_DELAY) - 0.5 * width
-            moved = replace(fit, model=fit.model.with_values({INPUT_DELAY: start}))
-            chi2.append(_refitted(moved, series, pool).chi2)
+        chi2 = [_refitted(*_received(fit, math.sqrt(12.0 * variance)), pool).chi2 for variance in at]
         curve = np.polyfit(at / at[-1], chi2, 2)
         if curve[0] <= 0.0:
             return None
@@ -260,12 +275,7 @@ def command_hold(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tup
     if rough < SLOWER * step:
         return joint, none
     spread = 6.0 * smear[1] / rough
-    series = [
-        one if one.command is None else replace(one, command=smeared(one.command, rough, step))
-        for one in fit.run.series
-    ]
-    start = fit.model.with_values({name: fit.model.value(name) - 0.5 * rough})
-    best, period = _refitted(replace(fit, model=start), series, pool), Estimate(rough, spread, "s")
+    best, period = _refitted(*_received(fit, rough), pool), Estimate(rough, spread, "s")
     if best.chi2 > fit.chi2 - HOLD_GAIN:
         return joint, none
     own = step / math.sqrt(12.0)  # a tick cannot tell the age of a command that is itself held

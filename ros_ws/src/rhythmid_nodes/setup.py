@@ -24,6 +24,7 @@ setup(
             "excitation = rhythmid_nodes.excitation:main",
             "delay_injector = rhythmid_nodes.delay_injector:main",
             "recorder = rhythmid_nodes.recorder:main",
+            "command_guard = rhythmid_nodes.command_guard:main",
         ],
     },
 )

@@ -34,6 +34,7 @@ from rhythmid.identify.series import Series
 from rhythmid.model import Model
 
 SHOWN = 8  # alternatives listed
+ONE_CLOCK = "The clocks of command and measurement agree: an offset between them counts as delay."
 WORTH = 10.0  # difference of the information criterion within which a rival is worth an experiment
 
 
@@ -113,6 +114,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         excluded=tuple(f"{' + '.join(added)}: {why}" for added, why in found.excluded),
         heldout=held,
         notes=tuple(notes),
+        assumptions=(ONE_CLOCK,) if any(one.command is not None for one in series) else (),
     )
 
 

@@ -43,7 +43,9 @@ def eliminate(
             return []
         tell(f"testing {', '.join(' + '.join(p.added) for p in fresh)}")
         reach = reach_of(known.chi2, known.samples) + margin
-        found, _ = run_trials(fresh, series, known.starts, _states(known), noise, step, reach=reach)
+        found, _ = run_trials(
+            fresh, series, known.starts, _states(known), noise, step, reach=reach, tell=tell
+        )
         tried.update({tuple(sorted(t.added)): t for t in found})
         return found
 

@@ -188,6 +188,7 @@ def search(
             break
         count = REFITTED if not best.added else REFITTED - 1
         proposals, enough = _proposals(here.model, replace(now, added=here.added), count, here.chi2)
+        tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
         found, failed = run_trials(
             proposals,
             series,
@@ -201,7 +202,13 @@ def search(
         if not best.added and nominal.nrmse() > FOLLOWS:
             proposals = _from_given(nominal, given, catalogue, here.chi2, pool)
             others, failed_too = run_trials(
-                proposals, series, here.starts, current.run.compiled.layout.states, here.noise, step
+                proposals,
+                series,
+                here.starts,
+                current.run.compiled.layout.states,
+                here.noise,
+                step,
+                tell=tell,
             )
             found, failed = _better_of([*found, *others]), failed + failed_too
         excluded += failed

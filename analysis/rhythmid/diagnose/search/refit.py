@@ -23,7 +23,7 @@ from rhythmid.identify.sample_clock.tick_scan import scanned
 from rhythmid.identify.series import Series, scales
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
-from rhythmid.progress import Step, Tell
+from rhythmid.progress import Tell, counted, silent
 
 Array = NDArray[np.float64]
 SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
@@ -214,7 +214,7 @@ def run_trials(
     max_step: float,
     enough: Sequence[float] | None = None,
     reach: float = math.inf,
-    tell: Tell = lambda _: None,
+    tell: Tell = silent,
 ) -> tuple[list[Trial], list[tuple[tuple[str, ...], str]]]:
     """Fit all proposals in parallel. Returns the trials, best first, and those excluded with the reason.
 
@@ -228,10 +228,8 @@ def run_trials(
 
     trials: list[Trial] = []
     excluded: list[tuple[tuple[str, ...], str]] = []
-    what = f"refitting with {', '.join(p.added[-1] for p in proposals if p.added)}"
-    tell(Step(what, 0, len(proposals)))
-    for index, result in fork_map(one, list(zip(proposals, goals))):
-        tell(Step(what, len(trials) + len(excluded) + 1, len(proposals)))
+    done = fork_map(one, list(zip(proposals, goals)))
+    for index, result in counted(done, len(proposals), "fits", tell):
         if isinstance(result, Exception):
             excluded.append((proposals[index].added, str(result)))
         else:
@@ -254,8 +252,10 @@ def run_trials(
             trials[hopping[place]] = trial_of(before.added, before.model, result, noise)
     open_ones = [t for t in trials if not t.converged and _promising(t, trials)]
     finished = under_noise(open_ones, series, noise, max_step, THOROUGH, reach)
-    done = {t.added for t in finished}
-    return sorted([*finished, *(t for t in trials if t.added not in done)], key=lambda t: t.bic()), excluded
+    settled = {t.added for t in finished}
+    return sorted(
+        [*finished, *(t for t in trials if t.added not in settled)], key=lambda t: t.bic()
+    ), excluded
 
 
 def _promising(trial: Trial, trials: Sequence[Trial]) -> bool:

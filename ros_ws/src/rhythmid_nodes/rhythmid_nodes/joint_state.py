@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from rclpy.serialization import deserialize_message
@@ -15,21 +15,14 @@ from sensor_msgs.msg import JointState
 
 from rhythmid.record.messages import Messages
 
+from .sample import Sample
+
 _FIELDS = ("position", "velocity", "effort")
 _CDR = 4  # encapsulation header; CDR aligns relative to its end
 _LITTLE_ENDIAN = b"\x00\x01"
 _stamp = struct.Struct("<iI")
 _count = struct.Struct("<I")
 _double = struct.Struct("<d")
-
-
-class Sample(NamedTuple):
-    """What a message says of one joint; NaN where it says nothing. SI: ns since the epoch, m, m/s, N."""
-
-    stamp_ns: int
-    position: float
-    velocity: float
-    effort: float
 
 
 def stamp_of(data: bytes) -> int:

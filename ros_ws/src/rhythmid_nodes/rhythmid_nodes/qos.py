@@ -72,13 +72,31 @@ def message_type(name: str) -> type:
         ) from None
 
 
+def subscribe_informed(
+    node: Node,
+    message: type,
+    topic: str,
+    callback: Callable[[bytes, dict[str, Any]], None],
+    profile: QoSProfile,
+) -> Subscription:
+    """A raw subscription whose `callback(data, about)` gets what the middleware says about each message, too: times and number."""
+
+    def receive(*taken: Any) -> None:
+        callback(*(taken[0] if len(taken) == 1 else taken))
+
+    subscription = node.create_subscription(message, topic, receive, profile, raw=True)
+    # the events executor hands over message and info as one pair; rclpy would not ask for the info of such a callback
+    subscription._callback_type = Subscription.CallbackType.WithMessageInfo
+    return subscription
+
+
 class AdaptiveSubscription:
     """A raw subscription made as soon as a publisher shows its type and quality of service, and made anew when a publisher
     comes that it would not hear.
 
     `callback(data, received_ns)` gets a message and when the middleware received it [ns since the epoch], which on a busy
     machine is long before the callback's turn; 0 if it does not say. `found(type_name, publishers)` is called once, before
-    the first message.
+    the first message. A message for which `admits(about)` is false is left out.
     """
 
     def __init__(
@@ -88,11 +106,13 @@ class AdaptiveSubscription:
         callback: Callable[[bytes, int], None],
         found: Callable[[str, Sequence[TopicEndpointInfo]], None] | None = None,
         depth: int = 2000,
+        admits: Callable[[dict[str, Any]], bool] = lambda _about: True,
     ) -> None:
         self.topic = node.resolve_topic_name(topic)
         self.subscription: Subscription | None = None
         self._gaps = SequenceGaps()
         self._node, self._callback, self._found, self._depth = node, callback, found, depth
+        self._admits = admits
         self._timer = node.create_timer(_DISCOVERY_PERIOD, self._look)
 
     @property
@@ -127,5 +147,6 @@ class AdaptiveSubscription:
 
     def _receive(self, *taken: Any) -> None:
         data, about = taken[0] if len(taken) == 1 else taken
-        self._gaps.add(about["publication_sequence_number"])
-        self._callback(data, about["received_timestamp"])
+        if self._admits(about):
+            self._gaps.add(about["publication_sequence_number"])
+            self._callback(data, about["received_timestamp"])
