@@ -56,7 +56,9 @@ def watch(
     """
     require_new(json, save_calibration)
     if bag is None and quiet:
-        raise InputError("--quiet belongs to a recording: give --bag, or leave it out to see the running machine")
+        raise InputError(
+            "--quiet belongs to a recording: give --bag, or leave it out to see the running machine"
+        )
     if bag is None:
         raise typer.Exit(
             _live(
