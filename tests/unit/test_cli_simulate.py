@@ -137,8 +137,6 @@ def test_help_and_version_are_answers(rhythmid):
     assert rhythmid("--help").returncode == 0
     version = rhythmid("--version")
     assert (version.returncode, version.stdout) == (0, f"rhythmid {package.__version__}\n")
-    nothing = rhythmid()
-    assert nothing.returncode == 2 and "simulate" in nothing.stdout + nothing.stderr
 
 
 def test_compiled_models_that_cannot_be_kept_are_refused_with_what_to_do(folder, rhythmid):

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
-from rhythmid.commands.options import Bags, Elements, JsonFile, ReportFile, SignalsFile, command_line
+from rhythmid.commands.options import Bags, Elements, JsonFile, Quiet, ReportFile, SignalsFile, command_line
+from rhythmid.commands.terminal import Terminal
 from rhythmid.errors import InputError
 from rhythmid.output import require_new, write_json
 
@@ -17,6 +17,12 @@ if TYPE_CHECKING:
 Model_ = Annotated[
     Path | None, typer.Option("--model", help="Nominal model, the one that may lack something.")
 ]
+
+EXAMPLES = (
+    "rhythmid diagnose bag --model model.yaml",
+    "rhythmid diagnose a b --signals signals.yaml --model model.yaml --holdout c --report page.html --save-model better.yaml",
+    "rhythmid diagnose real --sim simulated",
+)
 
 
 def diagnose(
@@ -53,6 +59,7 @@ def diagnose(
             help="Begin no further round of the search after so many seconds; the answer says what was not tried.",
         ),
     ] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Say where records and model part, which physics the model lacks, and how much better it fits with it.
 
@@ -74,8 +81,8 @@ def diagnose(
         )
     catalogue = load_catalogue(elements or ())
     nominal = None if model is None else Model.load(model, catalogue)
-    console = Console(stderr=True)
-    with progress(console) as tell:
+    terminal = Terminal(quiet, json)
+    with progress(terminal.progress) as tell:
         records = load_records(bags, signals, tell)
         unseen = load_records(holdout or (), signals, tell)
     simulation = None if sim is None else _simulation(sim, signals, sim_signals)
@@ -83,18 +90,17 @@ def diagnose(
     if simulation is not None:
         from rhythmid.compare.compare import compare
 
-        with progress(console) as tell:
+        with progress(terminal.progress) as tell:
             comparison = compare(simulation, records, nominal, tell)
         result["comparison"] = comparison.to_dict()
-        show_comparison(result["comparison"])
+        comparison.show(terminal.answer)
     if nominal is not None:
-        from rhythmid.diagnose.answer.printed import show
         from rhythmid.diagnose.diagnosis import diagnose as find
 
-        with progress(console, budget) as tell:
+        with progress(terminal.progress, budget) as tell:
             answer = find(records, nominal, unseen, catalogue, tell, budget)
-        result = answer.diagnosis.to_dict() | result
-        show(answer.diagnosis, Console())
+        result = answer.to_dict() | result
+        answer.show(terminal.answer)
     if json is not None:
         write_json(json, result)
     if save_model is not None and answer is not None:
@@ -109,7 +115,7 @@ def diagnose(
             assert comparison is not None and simulation is not None
             page = present_comparison(comparison, simulation, records, command_line())
         write_page(report, page)
-        typer.echo(f"report: {report}")
+        terminal.say(f"report: {report}")
 
 
 def _simulation(path: Path, signals: Path | None, own: Path | None) -> "Record":
@@ -125,17 +131,3 @@ def _simulation(path: Path, signals: Path | None, own: Path | None) -> "Record":
             return read_record(path)
         except InputError:
             raise error from None
-
-
-def show_comparison(result: dict) -> None:
-    """Print a comparison."""
-    console = Console()
-    alignment = result["alignment"]
-    offset = alignment["offset"]
-    console.print(
-        f"[bold]{result['simulation']}[/] against [bold]{result['recording']}[/]: aligned by the {alignment['by']}, the "
-        f"recording is {offset['value']:.6f} ± {2.0 * offset['std']:.2g} s later; {result['overlap']['value']:.4g} s in common"
-    )
-    console.print(result["summary"])
-    for note in result["notes"]:
-        console.print(f"note: {note}")

@@ -9,15 +9,19 @@ from typing import Annotated
 
 import typer
 
+from rhythmid.commands.examples import epilog
+from rhythmid.commands.options import Quiet
 from rhythmid.errors import InputError
 
 from . import isolation
+
+EXAMPLES = ("rhythmid run experiment.yaml --out bag", "rhythmid run experiment.yaml --node plant")
 
 
 def add(app: typer.Typer) -> None:
     """Add `run` to the command."""
 
-    @app.command()
+    @app.command(epilog=epilog(EXAMPLES))
     def run(
         experiment: Annotated[Path, typer.Argument(help="Experiment file.")],
         out: Annotated[
@@ -33,6 +37,7 @@ def add(app: typer.Typer) -> None:
                 "--isolated", help="Give the nodes a network of their own: nobody else reaches them."
             ),
         ] = False,
+        quiet: Quiet = False,
     ) -> None:
         """Run the graph of an experiment: starts, watches and stops its nodes and leaves a bag."""
         if isolated:
@@ -40,9 +45,10 @@ def add(app: typer.Typer) -> None:
             line = isolation.isolated([sys.executable, "-m", "rhythmid.cli", *again])
             os.execvp(line[0], line)
         try:  # ROS is slow to load, and the other commands need none
-            from rhythmid_bringup.run import run_alone, run_graph
+            from rhythmid_bringup.run import console, run_alone, run_graph
         except ModuleNotFoundError as missing:
             raise InputError(
                 f"`rhythmid run` needs ROS 2: {missing}; see the README for both ways to get it"
             ) from None
+        console.quiet = quiet
         raise typer.Exit(run_graph(experiment, out) if node is None else run_alone(experiment, out, node))
