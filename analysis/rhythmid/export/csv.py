@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Sequence
 
-from rhythmid.export.joint import Joint
+from rhythmid.export.joint import Joint, number
 
 HEADER = ("joint", "quantity", "value", "unit", "meaning")
 
@@ -18,7 +18,7 @@ def text(joints: Sequence[Joint], source: str) -> str:
         table.writerow((joint.name, "source", source, "", "model that was identified"))
         table.writerow((joint.name, "control", joint.control, "", "what the command is"))
         for one in joint.quantities:
-            table.writerow((joint.name, one.name, repr(one.value), one.unit, one.meaning))
+            table.writerow((joint.name, one.name, number(one.value), one.unit, one.meaning))
         for remark in joint.remarks:
             table.writerow((joint.name, "remark", "", "", remark))
     return written.getvalue()

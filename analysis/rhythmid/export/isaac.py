@@ -6,7 +6,7 @@ Friction and viscous friction are efforts from Isaac Sim 5.0 on; before, frictio
 import math
 from collections.abc import Sequence
 
-from rhythmid.export.joint import Joint
+from rhythmid.export.joint import Joint, number
 
 EXPRESSED = frozenset(
     (
@@ -19,7 +19,7 @@ PHYSICS_STEP = 0.005  # [s]; the step of most of Isaac Lab's own environments
 def text(joints: Sequence[Joint], source: str) -> str:
     """A Python module with ACTUATORS, by joint, for ArticulationCfg(actuators=ACTUATORS)."""
     lines = [
-        f'"""Actuators identified by rhythmid: {source}. Needs Isaac Sim 5.0 or later."""',
+        f"# Actuators identified by rhythmid: {source}. Friction as an effort needs Isaac Sim 5.0 or later.",
         "",
         "from isaaclab.actuators import DelayedPDActuatorCfg",
         "",
@@ -27,7 +27,7 @@ def text(joints: Sequence[Joint], source: str) -> str:
         "# Inertia of each link about its joint's axis as the robot's USD has it; until you set it, all that was identified",
         "LINK_INERTIA = {",
         *(
-            f'    "{joint.name}": {joint.inertia!r},  # {joint.unit("inertia")}, link and rotor together'
+            f'    "{joint.name}": {number(joint.inertia)},  # {joint.unit("inertia")}, link and rotor together'
             for joint in joints
         ),
         "}",
@@ -44,24 +44,21 @@ def _actuator(joint: Joint) -> list[str]:
     looped = joint.control != "force"
     expressed = EXPRESSED | ({"gain"} if looped else {"actuator_delay"})
     delay = joint.command_delay + (0.0 if looped else joint.actuator_delay)
-    steps = f"round({delay!r} / PHYSICS_STEP)"
+    steps = f"round({number(delay)} / PHYSICS_STEP)"
     arguments = {
         "joint_names_expr": f'["{joint.name}"]',
-        "stiffness": repr(joint.gain * joint.position_gain),
-        "damping": repr(joint.gain * joint.velocity_gain),
-        **({"effort_limit": repr(joint.effort_limit)} if joint.effort_limit < math.inf else {}),
-        "armature": f'{joint.inertia!r} - LINK_INERTIA["{joint.name}"]',
-        "friction": repr(max(joint.friction, joint.static_friction)),
-        "dynamic_friction": repr(joint.friction),
-        "viscous_friction": repr(joint.damping),
+        "stiffness": number(joint.gain * joint.position_gain),
+        "damping": number(joint.gain * joint.velocity_gain),
+        **({"effort_limit": number(joint.effort_limit)} if joint.effort_limit < math.inf else {}),
+        "armature": f'{number(joint.inertia)} - LINK_INERTIA["{joint.name}"]',
+        "friction": number(max(joint.friction, joint.static_friction)),
+        "dynamic_friction": number(joint.friction),
+        "viscous_friction": number(joint.damping),
         "min_delay": steps,
         "max_delay": steps,
     }
     return [
-        *(
-            f"    # {line}"
-            for line in joint.inexpressible("an actuator configuration of Isaac Lab", expressed)
-        ),
+        *(f"    # {line}" for line in joint.inexpressible(expressed)),
         f'    "{joint.name}": DelayedPDActuatorCfg(',
         *(f"        {name}={value}," for name, value in arguments.items()),
         "    ),",

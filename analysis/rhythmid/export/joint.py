@@ -7,12 +7,18 @@ from typing import Any, Literal
 
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
+DIGITS = 12  # of a number in a target's file: more than any parameter is known to
 Control = Literal["force", "position", "velocity"]
 
 
 def _quantity(unit: str, meaning: str, absent: float = 0.0) -> Any:
     """A field in `unit` (of a translational joint); at the value `absent` the joint behaves as without it."""
     return field(default=absent, metadata={"unit": unit, "meaning": meaning})
+
+
+def number(value: float) -> str:
+    """A number as text, to DIGITS digits: products of parameters end in no noise."""
+    return repr(float(f"{value:.{DIGITS}g}"))
 
 
 @dataclass(frozen=True)
@@ -83,7 +89,7 @@ class Joint:
             if "unit" in one.metadata and (value := getattr(self, one.name)) != one.default
         )
 
-    def inexpressible(self, target: str, expressed: Collection[str]) -> tuple[str, ...]:
-        """The remarks, and a sentence for every quantity that is not among the `expressed` ones of the target."""
-        missing = [one for one in self.quantities if one.name not in expressed]
-        return (*self.remarks, *(f"not expressed: {one}; {target} has no word for it" for one in missing))
+    def inexpressible(self, expressed: Collection[str]) -> tuple[str, ...]:
+        """The remarks, and a line for every quantity that is not among the `expressed` ones of a target."""
+        missing = (one for one in self.quantities if one.name not in expressed)
+        return (*self.remarks, *(f"not expressed: {one}" for one in missing))

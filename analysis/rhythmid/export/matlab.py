@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.export.joint import Joint
+from rhythmid.export.joint import Joint, number
 
 NONLINEAR = frozenset(
     (
@@ -96,18 +96,21 @@ def _struct(name: str, joint: Joint) -> list[str]:
         *(f"% {remark}" for remark in joint.remarks),
         f"{name}.name = '{joint.name}';",
         f"{name}.control = '{joint.control}';  % what the command is",
-        *(f"{name}.{one.name} = {one.value!r};  % {one.unit}, {one.meaning}" for one in joint.quantities),
+        *(
+            f"{name}.{one.name} = {number(one.value)};  % {one.unit}, {one.meaning}"
+            for one in joint.quantities
+        ),
         *([f"% not expressed in the state space, which is linear: {', '.join(beyond)}"] if beyond else []),
         *(["% the link's weight is linearised where it hangs at rest"] if joint.weight_moment else []),
-        f"{name}.equilibrium = {part.equilibrium!r};  % {joint.unit('spring_reference')}, position at rest without command",
+        f"{name}.equilibrium = {number(part.equilibrium)};  % {joint.unit('spring_reference')}, position at rest without command",
         f"{name}.A = {_matrix(part.a)};",
         f"{name}.B = {_matrix(part.b)};",
         f"{name}.C = {_matrix(np.eye(1, len(part.states)))};",
         f"{name}.D = 0;",
-        f"{name}.sys = ss({name}.A, {name}.B, {name}.C, {name}.D, 'InputDelay', {part.input_delay!r}, "
-        f"'OutputDelay', {part.output_delay!r}, 'StateName', {{{states}}}, 'InputName', 'command', 'OutputName', 'position');",
+        f"{name}.sys = ss({name}.A, {name}.B, {name}.C, {name}.D, 'InputDelay', {number(part.input_delay)}, "
+        f"'OutputDelay', {number(part.output_delay)}, 'StateName', {{{states}}}, 'InputName', 'command', 'OutputName', 'position');",
     ]
 
 
 def _matrix(values: Array) -> str:
-    return "[" + "; ".join(" ".join(repr(float(one)) for one in row) for row in values) + "]"
+    return "[" + "; ".join(" ".join(number(one) for one in row) for row in values) + "]"

@@ -8,9 +8,9 @@ import math
 import xml.etree.ElementTree as tree
 from collections.abc import Sequence
 
-from rhythmid.export.joint import Joint
+from rhythmid.export.joint import Joint, number
 from rhythmid.export.link import link_of, world_gravity
-from rhythmid.export.xml_text import add, comment, document, number, vector
+from rhythmid.export.xml_text import add, comment, document, vector
 
 TIMESTEP = 0.001  # [s]; the rate at which experiments are run unless they say otherwise
 EXPRESSED = frozenset(
@@ -51,7 +51,7 @@ def _body(world: tree.Element, joint: Joint) -> None:
         f"inertia {joint.inertia:.6g} {joint.unit('inertia')} is link and rotor together: in a robot whose link has an inertia of "
         "its own, write the difference as armature of the joint",
     )
-    for line in joint.inexpressible("MJCF", _expressed(joint)):
+    for line in joint.inexpressible(_expressed(joint)):
         comment(body, line)
     attributes = {
         "name": joint.name,

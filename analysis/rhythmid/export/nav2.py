@@ -7,7 +7,7 @@ The controller shifts its predicted speeds by a whole number of `model_dt`: a pu
 from collections.abc import Sequence
 
 from rhythmid.errors import InputError
-from rhythmid.export.joint import Joint
+from rhythmid.export.joint import Joint, number
 
 EXPRESSED = frozenset(("command_delay", "command_lag", "actuator_delay", "actuator_lag"))
 
@@ -33,7 +33,7 @@ def text(joints: Sequence[Joint], source: str) -> str:
             )
         if joint.control != "velocity":
             lines.append(f"# its command is a {joint.control}, Nav2's a speed: add what a speed loop takes")
-        lines += [f"# {line}" for line in joint.inexpressible("Nav2", EXPRESSED)]
+        lines += [f"# {line}" for line in joint.inexpressible(EXPRESSED)]
     lines += [
         "controller_server:",
         "  ros__parameters:",
@@ -41,7 +41,7 @@ def text(joints: Sequence[Joint], source: str) -> str:
         '      plugin: "nav2_mppi_controller::MPPIController"',
     ]
     for joint, axis in zip(joints, axes, strict=True):
-        lines.append(f"      model_delay_{axis}: {_delay(joint)!r}  # s")
+        lines.append(f"      model_delay_{axis}: {number(_delay(joint))}  # s")
     return "\n".join([*lines, ""])
 
 

@@ -4,9 +4,9 @@ import math
 import xml.etree.ElementTree as tree
 from collections.abc import Sequence
 
-from rhythmid.export.joint import Joint
+from rhythmid.export.joint import Joint, number
 from rhythmid.export.link import link_of, world_gravity
-from rhythmid.export.xml_text import add, comment, document, number, vector
+from rhythmid.export.xml_text import add, comment, document, vector
 
 VERSION = "1.9"  # of the format; what Gazebo Garden and later read
 EXPRESSED = frozenset(
@@ -48,7 +48,7 @@ def _link(model: tree.Element, joint: Joint) -> None:
 
 def _joint(model: tree.Element, joint: Joint) -> None:
     expressed = EXPRESSED if joint.control == "force" else EXPRESSED | CONTROLLED
-    for line in joint.inexpressible("SDF", expressed):
+    for line in joint.inexpressible(expressed):
         comment(model, line)
     element = add(model, "joint", name=joint.name, type="revolute" if joint.rotational else "prismatic")
     add(element, "parent", "world")

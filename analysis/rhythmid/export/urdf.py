@@ -4,9 +4,9 @@ import math
 import xml.etree.ElementTree as tree
 from collections.abc import Sequence
 
-from rhythmid.export.joint import Joint
+from rhythmid.export.joint import Joint, number
 from rhythmid.export.link import link_of, world_gravity
-from rhythmid.export.xml_text import add, comment, document, number, vector
+from rhythmid.export.xml_text import add, comment, document, vector
 
 EXPRESSED = frozenset(
     ("inertia", "gravity", "weight_moment", "hanging_position", "damping", "friction", "effort_limit")
@@ -36,7 +36,7 @@ def _link(root: tree.Element, joint: Joint) -> None:
 
 
 def _joint(root: tree.Element, joint: Joint) -> None:
-    for line in joint.inexpressible("URDF", EXPRESSED):
+    for line in joint.inexpressible(EXPRESSED):
         comment(root, line)
     kind = "continuous" if joint.rotational else "prismatic"
     element = add(root, "joint", name=joint.name, type=kind)

@@ -3,10 +3,7 @@
 import xml.etree.ElementTree as tree
 from collections.abc import Iterable
 
-
-def number(value: float) -> str:
-    """A number as text that reads back to the same bits."""
-    return repr(float(value))
+from rhythmid.export.joint import number
 
 
 def vector(values: Iterable[float]) -> str:
@@ -14,9 +11,9 @@ def vector(values: Iterable[float]) -> str:
     return " ".join(number(value) for value in values)
 
 
-def add(parent: tree.Element, name: str, text: str | None = None, **attributes: str) -> tree.Element:
+def add(parent: tree.Element, tag: str, text: str | None = None, /, **attributes: str) -> tree.Element:
     """A new last child of an element."""
-    child = tree.SubElement(parent, name, attributes)
+    child = tree.SubElement(parent, tag, attributes)
     child.text = text
     return child
 
