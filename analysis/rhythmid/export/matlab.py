@@ -42,7 +42,7 @@ def linear_part(joint: Joint) -> LinearPart:
     lags = {"command": joint.command_lag, "force": joint.actuator_lag}
     states = ("position", "velocity", *(name for name, lag in lags.items() if lag))
     signals = (*states, "input")
-    row = {name: np.eye(len(signals))[number] for number, name in enumerate(signals)}
+    row = {name: np.eye(len(signals))[place] for place, name in enumerate(signals)}
     nothing = np.zeros(len(signals))
     command = row.get("command", row["input"])
     law = {
@@ -81,8 +81,8 @@ def linear_part(joint: Joint) -> LinearPart:
 def text(joints: Sequence[Joint], source: str) -> str:
     """The script; `ss` needs the Control System Toolbox."""
     lines = [f"% identified by rhythmid: {source}"]
-    for number, joint in enumerate(joints, 1):
-        lines += ["", *_struct(f"joint({number})", joint)]
+    for place, joint in enumerate(joints, 1):
+        lines += ["", *_struct(f"joint({place})", joint)]
     return "\n".join([*lines, ""])
 
 

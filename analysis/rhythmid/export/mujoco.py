@@ -51,6 +51,11 @@ def _body(world: tree.Element, joint: Joint) -> None:
         f"inertia {joint.inertia:.6g} {joint.unit('inertia')} is link and rotor together: in a robot whose link has an inertia of "
         "its own, write the difference as armature of the joint",
     )
+    if joint.friction:
+        comment(
+            body,
+            "frictionloss is a soft constraint: at rest it creeps, where the identified friction holds or turns smoothly",
+        )
     for line in joint.inexpressible(_expressed(joint)):
         comment(body, line)
     attributes = {
