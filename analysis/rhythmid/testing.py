@@ -109,7 +109,9 @@ class GraphRun:
         bag = Bag(self.bag)
         found = read_columns(bag.blocks(), {name: [Field.parse(f"{field}[{self.joint}]")]})
         if name not in found:
-            raise InputError(f"no message of {name} in {self.bag}; its topics: {', '.join(sorted(bag.topics))}")
+            raise InputError(
+                f"no message of {name} in {self.bag}; its topics: {', '.join(sorted(bag.topics))}"
+            )
         stamps = found[name].stamp_ns
         if stamps is None:
             raise InputError(f"messages of {name} bear no stamps")

@@ -46,7 +46,9 @@ def replacements(given: Sequence[str]) -> dict[str, list[str]]:
         except ValueError as error:
             raise InputError(f"--replace {text}: {error}") from None
         if name not in REPLACEABLE or not words:
-            raise InputError(f"--replace {text}: NAME=COMMAND is expected, NAME one of {', '.join(REPLACEABLE)}")
+            raise InputError(
+                f"--replace {text}: NAME=COMMAND is expected, NAME one of {', '.join(REPLACEABLE)}"
+            )
         if name in found:
             raise InputError(f"--replace {text}: {name} is replaced twice")
         if shutil.which(words[0]) is None:
