@@ -29,6 +29,7 @@ from rosbags.typesys import Stores, get_typestore
 from safety import load
 
 from rhythmid.testing import PAPER_HOPPER
+from rhythmid_bringup.processes import Supervised
 from rhythmid_nodes.joint_state import stamp_of
 
 DELAYS = {"input": 0.040, "measurement": 0.050}  # s
@@ -138,16 +139,22 @@ def realtime(folder: Path, layout: str, busy: int, seconds: float) -> None:
     print(f"{layout}, {busy} busy processes beside, {os.getloadavg()[0]:.1f} ready to run at the start")
     print(f"  {'':34}{'rate Hz':>9}{''.join(f'{quantity:>9}' for quantity in QUANTITIES)}")
     bag, usage = folder / f"bag_{layout}_{busy}", Usage()
-    loops: dict[str, subprocess.Popen[str]] = {}
+    loops: list[Supervised] = []
+    said: dict[str, str] = {}
 
     def begin() -> None:
         for name in LOOPS:
             words = [sys.executable, str(SCRIPT), name, "1000", str(seconds)]
-            loops[name] = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+            loops.append(Supervised(name, words, os.environ, said.__setitem__))
+            loops[-1].hurry()  # as the nodes of a run are
 
     with load(busy):
         run(experiment(folder, "realtime", layout, seconds), bag, usage, begin)
-        told = {name: json.loads(process.communicate()[0]) for name, process in loops.items()}
+        while any(process.returncode is None for process in loops):
+            time.sleep(LOOK)
+    for process in loops:
+        process.join_output()
+    told = {name: json.loads(line) for name, line in said.items()}
     figures, times = reading(bag)
     for name in LOOPS:
         row(f"{name} loop, lateness", told[name], "lateness")

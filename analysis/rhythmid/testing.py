@@ -81,16 +81,19 @@ class GraphRun:
         assert len(sent) == len(received), f"{len(sent)} messages of {source}, {len(received)} of {target}"
         return (received - sent) * 1e-9
 
-    def identify(self, model: str | Path | None = None) -> Identification:
-        """Parameters and delays, by `model` or the paper's hopper: what `rhythmid identify` finds. Raises InputError."""
+    def identify(self, model: str | Path = PAPER_HOPPER) -> Identification:
+        """Parameters and delays by `model`, by default the paper's hopper: what `rhythmid identify` finds. Raises InputError."""
         from rhythmid.identify.identify import identify
         from rhythmid.model import Model
         from rhythmid.record.read import read_record
 
-        return identify(read_record(self.bag), None if model is None else Model.load(self.folder / model))
+        return identify(read_record(self.bag), Model.load(self.folder / model))
 
-    def diagnose(self, model: str | Path, budget: float | None = None) -> Diagnosis:
-        """Verdict about the nominal `model`: what `rhythmid diagnose` says; `budget` [s] bounds the search. Raises InputError."""
+    def diagnose(self, model: str | Path = PAPER_HOPPER, budget: float | None = None) -> Diagnosis:
+        """Verdict about the nominal `model`, by default the paper's hopper: what `rhythmid diagnose` says.
+
+        `budget` [s] bounds the search. Raises InputError.
+        """
         from rhythmid.diagnose.diagnosis import diagnose
         from rhythmid.model import Model
         from rhythmid.record.read import read_record
