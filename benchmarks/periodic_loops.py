@@ -55,6 +55,7 @@ def timer(period_ns: int, seconds: float) -> Grid:
     import rclpy
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.node import Node
+    from rclpy.utilities import try_shutdown
     from sensor_msgs.msg import JointState
 
     rclpy.init(args=[])
@@ -76,7 +77,7 @@ def timer(period_ns: int, seconds: float) -> Grid:
     while time.monotonic_ns() < end_ns:
         executor.spin_once(timeout_sec=0.1)
     node.destroy_node()
-    rclpy.try_shutdown()
+    try_shutdown()
     return grid
 
 

@@ -79,7 +79,7 @@ class GraphRun:
         """
         sent, received = self.stamps(source), self.stamps(target)
         assert len(sent) == len(received), f"{len(sent)} messages of {source}, {len(received)} of {target}"
-        return (received - sent) * 1e-9
+        return ((received - sent) * 1e-9).astype(np.float64)
 
     def identify(self, model: str | Path = PAPER_HOPPER) -> Identification:
         """Parameters and delays by `model`, by default the paper's hopper: what `rhythmid identify` finds. Raises InputError."""
