@@ -60,8 +60,10 @@ class Usage:
                 continue
             if numbers and int(numbers[1]) == parent:
                 names = [word.removeprefix("__node:=") for word in words if word.startswith("__node:=")]
+                names += ["graph"] * ("rhythmid_nodes.compose" in words)
                 used = (int(numbers[11]) + int(numbers[12])) / _TICK
-                self.looks.setdefault(names[0] if names else "graph", []).append((time.monotonic(), used))
+                for name in names:
+                    self.looks.setdefault(name, []).append((time.monotonic(), used))
 
     def percent(self, seconds: float) -> dict[str, float]:
         """Share of a core [%] in the last `seconds`, by node."""

@@ -136,7 +136,9 @@ def test_the_command_watches_until_it_is_interrupted(graph, tmp_path):
     heard = graph.listen("/diagnostics", DiagnosticArray, latched(1000))
     process = subprocess.Popen(line, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
     try:
-        graph.until(lambda: any(s.name == "rhythmid: hopper/twin" for m in heard for s in m.status), "the twin", 60.0)
+        graph.until(
+            lambda: any(s.name == "rhythmid: hopper/twin" for m in heard for s in m.status), "the twin", 60.0
+        )
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=40.0)
     finally:
