@@ -13,7 +13,7 @@ from rhythmid.errors import InputError
 from rhythmid_bringup.run import replacements
 
 ROOT = Path(__file__).parents[2]
-pytestmark = pytest.mark.timeout(200)
+pytestmark = pytest.mark.timeout(300)
 
 
 def run_tests(folder: Path, text: str, *options: str) -> subprocess.CompletedProcess[str]:
@@ -22,7 +22,7 @@ def run_tests(folder: Path, text: str, *options: str) -> subprocess.CompletedPro
     shutil.copy(ROOT / "docs" / "examples" / "command_filter.py", folder / "my_filter.py")
     words = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--rootdir", str(folder), *options]
     return subprocess.run(
-        [*words, str(folder)], capture_output=True, text=True, cwd=folder, timeout=180, check=False,
+        [*words, str(folder)], capture_output=True, text=True, cwd=folder, timeout=280, check=False,
         env={**os.environ, "ROS_DOMAIN_ID": "7"},  # which the run does not take over
     )  # fmt: skip
 
@@ -42,13 +42,13 @@ pytest_plugins = ["rhythmid.testing"]
 
 def test_it(run_graph):
     chirp = {"type": "chirp", "amplitude": 0.05, "band": [1, 7], "sweep": 1.0}
-    run_graph({"excitation": chirp}, replace={"measurement_delay": "python -c 'exit(\\"no sensor\\")'"})
+    run_graph({"excitation": chirp}, replace={"measurement_delay": "python -c 'print(\\"no sensor\\"); exit(2)'"})
 """
     done = run_tests(tmp_path, text)
     assert done.returncode == 1
     assert "rhythmid run ended with exit code 1" in done.stdout
     assert "measurement_delay] no sensor" in done.stdout
-    assert "measurement_delay ended with exit code 1" in done.stdout
+    assert "measurement_delay ended with exit code 2" in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -65,3 +65,9 @@ def test_a_replacement_that_cannot_be_is_refused_in_one_line(given, told):
     with pytest.raises(InputError, match=told) as refused:
         replacements(given)
     assert "\n" not in str(refused.value)
+
+
+def test_a_node_alone_replaces_none(rhythmid, tmp_path):
+    done = rhythmid("run", tmp_path / "absent.yaml", "--node", "plant", "--replace", "plant=true")
+    assert done.returncode == 2
+    assert done.stderr == "error: --node runs a node of ours, --replace one of yours: give one of the two\n"

@@ -83,3 +83,15 @@ def test_a_bag_names_the_distribution_whose_types_it_has(tmp_path):
         pass
     information = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())
     assert information["rosbag2_bagfile_information"]["ros_distro"] == "jazzy"
+
+
+def test_a_recorder_names_the_distribution_that_runs(tmp_path, monkeypatch):
+    pytest.importorskip("rclpy")
+    from rhythmid_nodes.bag import LiveBag, Storage
+
+    monkeypatch.setenv("ROS_DISTRO", "kilted")
+    bag = LiveBag(Storage(tmp_path / "bag"))
+    bag.open()
+    bag.stop()
+    text = (tmp_path / "bag" / "metadata.yaml").read_text()
+    assert yaml.safe_load(text)["rosbag2_bagfile_information"]["ros_distro"] == "kilted"
