@@ -112,7 +112,9 @@ class Supervisor:
     def _launch(self) -> None:
         specs = self._experiment.nodes()
         arguments = [
-            ros_arguments(spec, self._experiment.namespace, self._folder, {"autostart": spec.name != "excitation"})
+            ros_arguments(
+                spec, self._experiment.namespace, self._folder, {"autostart": spec.name != "excitation"}
+            )
             for spec in specs
         ]
         if self._experiment.time.layout == "composed":
