@@ -91,13 +91,13 @@ class ManagedNode(LifecycleNode):
         return self._attempt(self._deactivate)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._attempt(self._release)
+        return self._attempt(self._unconfigure)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         if state.label == ACTIVE:
             self._attempt(self._deactivate)
         if state.label != UNCONFIGURED:
-            self._attempt(self._release)
+            self._attempt(self._unconfigure)
         self.end()
         return TransitionCallbackReturn.SUCCESS
 
@@ -120,7 +120,7 @@ class ManagedNode(LifecycleNode):
         self.active = False
         self.deactivate()
 
-    def _release(self) -> None:
+    def _unconfigure(self) -> None:
         """Undo `configure`."""
         self.finish()
         for worker in self.workers:

@@ -77,7 +77,7 @@ class GraphNode(ManagedNode):
         self.add_on_set_parameters_callback(_refuse_sim_time)
         self.lockstep = self.values["time_mode"] == "lockstep"
         self.tripped = ""  # why the node stopped its work early, if it did; the process then ends with code 1
-        self.diagnostics = Diagnostics(self, self._told, self._hindrances, lambda: self.tripped)
+        self.diagnostics = Diagnostics(self, self._all_figures, self._all_obstacles, lambda: self.tripped)
         self.manage(self.values["autostart"])
 
     @property
@@ -93,10 +93,10 @@ class GraphNode(ManagedNode):
         """What keeps the node from its work; empty when it is ready."""
         return []
 
-    def _told(self) -> dict[str, str]:
+    def _all_figures(self) -> dict[str, str]:
         return {LIFECYCLE: self.managed_state, **(self.figures() if self.configured else {})}
 
-    def _hindrances(self) -> list[str]:
+    def _all_obstacles(self) -> list[str]:
         return self.obstacles() if self.active else [self.managed_state]
 
     def trip(self, reason: str) -> None:
