@@ -35,9 +35,9 @@ class FadingTransitions:
 
     def __init__(self, node: LifecycleNode, fade: Callable[[], None], fading: Callable[[], bool]) -> None:
         self._node, self._fade, self._fading = node, fade, fading
-        self._service = node._service_change_state  # rclpy has no public way to answer a transition later
-        self._make, self._answer = self._service.callback, self._service.send_response
-        self._service.callback, self._service.send_response = self._on_request, self._respond
+        service: Any = node._service_change_state  # rclpy has no public way to answer a transition later
+        self._make, self._answer = service.callback, service.send_response
+        service.callback, service.send_response = self._on_request, self._respond
         self._request: ChangeState.Request | None = None
         self._held: tuple[ChangeState.Response, Any] | None = (
             None  # the answer that waits, and to whom it goes
