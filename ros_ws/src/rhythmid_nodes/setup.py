@@ -25,6 +25,7 @@ setup(
             "delay_injector = rhythmid_nodes.delay_injector:main",
             "recorder = rhythmid_nodes.recorder:main",
             "command_guard = rhythmid_nodes.command_guard:main",
+            "twin = rhythmid_nodes.twin:main",
         ],
     },
 )
