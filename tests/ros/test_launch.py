@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
+from lifecycle_msgs.msg import Transition
 
 from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment
@@ -37,7 +38,7 @@ def launch_file(monkeypatch):
         "launch.events.process": ("ProcessExited",),
         "launch.substitutions": (),
         "launch_ros": (),
-        "launch_ros.actions": ("Node",),
+        "launch_ros.actions": ("LifecycleNode", "LifecycleTransition", "Node"),
     }
     for module, classes in names.items():
         made = types.ModuleType(module)
@@ -59,14 +60,24 @@ def launch_file(monkeypatch):
 def test_it_starts_the_experiments_nodes_with_their_parameters(launch_file, tmp_path, name):
     experiment = Experiment.load(BRINGUP / "config" / name).with_record(path=tmp_path / "bag")
     context = {"experiment": str(BRINGUP / "config" / name), "bag": str(tmp_path / "bag")}
-    nodes = [node.keywords for node in launch_file.graph(context)]
+    nodes = [made.keywords for made in launch_file.graph(context) if type(made).__name__ == "LifecycleNode"]
     specs = experiment.nodes()
     assert [node["name"] for node in nodes] == [spec.name for spec in specs]
     for node, spec in zip(nodes, specs, strict=True):
         assert (node["package"], node["executable"]) == (spec.package, spec.executable)
         assert node["namespace"] == "/hopper" and dict(node["remappings"]) == dict(spec.remappings)
-        unattended = {"unattended": True} if spec.executable == "excitation" else {}
+        unattended = {"unattended": True, "autostart": False} if spec.executable == "excitation" else {}
         assert node["parameters"] == [{**given_parameters(spec), **unattended}]
+
+
+def test_it_configures_and_activates_the_excitation(launch_file, tmp_path):
+    context = {"experiment": str(BRINGUP / "config" / "demo.yaml"), "bag": str(tmp_path / "bag")}
+    (made,) = [made for made in launch_file.graph(context) if type(made).__name__ == "LifecycleTransition"]
+    assert made.keywords["lifecycle_node_names"] == ["/hopper/excitation"]
+    assert made.keywords["transition_ids"] == [
+        Transition.TRANSITION_CONFIGURE,
+        Transition.TRANSITION_ACTIVATE,
+    ]
 
 
 @pytest.mark.parametrize(("returncode", "expected"), [(0, None), (1, 1), (2, 2), (-9, 137)])
@@ -76,7 +87,8 @@ def test_any_nodes_end_shuts_it_down_with_that_nodes_exit_code(
     exits = []
     monkeypatch.setattr(launch_file.atexit, "register", lambda _exit, code: exits.append(code))
     context = {"experiment": str(BRINGUP / "config" / "demo.yaml"), "bag": str(tmp_path / "bag")}
-    assert all(node.keywords["on_exit"] is launch_file.shut_down for node in launch_file.graph(context))
+    nodes = [made for made in launch_file.graph(context) if type(made).__name__ == "LifecycleNode"]
+    assert nodes and all(node.keywords["on_exit"] is launch_file.shut_down for node in nodes)
     event = types.SimpleNamespace(returncode=returncode, process_name="plant-1")
     (action,) = launch_file.shut_down(event, types.SimpleNamespace(is_shutdown=False))
     assert type(action).__name__ == "Shutdown" and "plant-1" in action.keywords["reason"]

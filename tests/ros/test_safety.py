@@ -55,7 +55,7 @@ def excited(graph, robot):
     guard = graph.spawn("command_guard", "command_guard", **GUARD)
     excitation = graph.spawn(
         "excitation", "excitation", {"excitation": "command"}, excitation=json.dumps(CONSTANT),
-        max_effort=1.0, unattended=True,
+        max_effort=1.0, unattended=True, recorder="",
     )  # fmt: skip
     graph.until(lambda: robot and robot[-1][1] == 0.5, "effort", timeout=40.0)
     return excitation, guard

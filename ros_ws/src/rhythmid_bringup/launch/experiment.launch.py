@@ -2,7 +2,8 @@
 
     ros2 launch rhythmid_bringup experiment.launch.py experiment:=demo.yaml [bag:=out]
 
-The excitation starts by itself when it is ready. When any node has ended everything is shut down, and the exit code is that
+The launch configures and activates the excitation, which starts by itself when all is ready and the recorder is active; the
+other nodes activate themselves. When any node has ended everything is shut down, and the exit code is that
 node's (128 and the signal's number if it was killed).
 """
 
@@ -15,10 +16,14 @@ from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
+from launch_ros.actions import LifecycleNode, LifecycleTransition, Node
+from lifecycle_msgs.msg import Transition
 
 from rhythmid_bringup.arguments import given_parameters
 from rhythmid_bringup.run import load
+
+LED = {"unattended": True, "autostart": False}
+"""Parameters of the excitation besides the experiment's."""
 
 
 def shut_down(event: ProcessExited, context: LaunchContext) -> list[Shutdown]:
@@ -38,26 +43,33 @@ def _exit(code: int) -> None:
     os._exit(code)
 
 
-def graph(context: LaunchContext) -> list[Node]:
-    """The experiment's nodes."""
+def graph(context: LaunchContext) -> list[Node | LifecycleTransition]:
+    """The experiment's nodes, and the transitions of the excitation."""
     bag = LaunchConfiguration("bag").perform(context)
     path = Path(LaunchConfiguration("experiment").perform(context))
     experiment = load(path, Path(bag) if bag else None)
-    nodes = []
+    nodes: list[Node | LifecycleTransition] = []
     for spec in experiment.nodes():
         leads = spec.executable == "excitation"
         nodes.append(
-            Node(
+            LifecycleNode(
                 package=spec.package,
                 executable=spec.executable,
                 name=spec.name,
                 namespace=experiment.namespace,
-                parameters=[{**given_parameters(spec), **({"unattended": True} if leads else {})}],
+                parameters=[{**given_parameters(spec), **(LED if leads else {})}],
                 remappings=list(spec.remappings.items()),
                 output="screen",
                 on_exit=shut_down,
             )
         )
+        if leads:
+            nodes.append(
+                LifecycleTransition(
+                    lifecycle_node_names=[f"{experiment.namespace.rstrip('/')}/{spec.name}"],
+                    transition_ids=[Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE],
+                )
+            )
     return nodes
 
 

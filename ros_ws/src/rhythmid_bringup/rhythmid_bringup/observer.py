@@ -1,4 +1,4 @@
-"""The supervisor's own node: hears /diagnostics, `run` and `lockstep/ack`, and tells the excitation to start or stop."""
+"""The supervisor's own node: hears /diagnostics, `run` and `lockstep/ack`, and tells the excitation to start."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 
 from rhythmid_nodes.diagnostics import NOT_READY, OK, STOPPED, status_name
+from rhythmid_nodes.lifecycle import LIFECYCLE
 from rhythmid_nodes.lockstep import ACK_TOPIC
 from rhythmid_nodes.qos import latched
 
 from .punctuality import timing
+from .transitions import Transitions
 
 
 class Observer(Node):
@@ -28,6 +30,7 @@ class Observer(Node):
     figures : node name -> its key-value pairs, the newest.
     heard : node name -> how many sets of them have come.
     run : content of the topic `run`, the newest; empty before the start.
+    excitation : brings the excitation through its states.
     acknowledged_ns : simulated time up to which the recorder has everything (lockstep).
     """
 
@@ -44,7 +47,7 @@ class Observer(Node):
         self.create_subscription(Header, ACK_TOPIC, self._on_ack, latched())
         self._run = self.create_publisher(String, "run", latched())
         self._start = self.create_client(Trigger, "excitation/start")
-        self._stop = self.create_client(Trigger, "excitation/stop")
+        self.excitation = Transitions(self, "excitation")
         self._answer: Any = None
         self._started = False
 
@@ -65,10 +68,9 @@ class Observer(Node):
         self._started = response.success
         return None if response.success else response.message
 
-    def ask_stop(self) -> None:
-        """Ask the excitation to fade out and stop."""
-        if self._stop.service_is_ready():
-            self._stop.call_async(Trigger.Request())
+    def lifecycle(self, node: str) -> str:
+        """The managed state of a node, as /diagnostics says; "" before."""
+        return self.figures.get(node, {}).get(LIFECYCLE, "")
 
     def tell_outcome(self, failure: str, punctual: bool) -> None:
         """Say on `run`, if there was one, why it failed, what came from strangers, and where that means something how punctual it was."""

@@ -19,6 +19,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from rhythmid.experiment import Delay, Experiment
+from rhythmid_nodes.lifecycle import ACTIVE
 
 from .arguments import command, compose_command, replacement_command, ros_arguments
 from .liveness import SILENT_AFTER, Liveness, Relay
@@ -115,7 +116,12 @@ class Supervisor:
     def _launch(self) -> None:
         everything = self._experiment.nodes()
         specs = [spec for spec in everything if spec.name not in self._replaced]
-        arguments = [ros_arguments(spec, self._experiment.namespace, self._folder) for spec in specs]
+        arguments = [
+            ros_arguments(
+                spec, self._experiment.namespace, self._folder, {"autostart": spec.name != "excitation"}
+            )
+            for spec in specs
+        ]
         if self._experiment.time.layout == "composed":
             graph = self._folder / f"{GRAPH}.json"
             listed = [
@@ -156,6 +162,11 @@ class Supervisor:
             said = self._liveness.stalled(observer.figures)
         return Outcome(1, said) if said else None
 
+    def _bring_up_excitation(self, observer: Observer) -> None:
+        """Configure and activate the excitation, once all others are active, the recorder among them."""
+        if all(observer.lifecycle(name) == ACTIVE for name in self._nodes if name != "excitation"):
+            observer.excitation.advance(observer.lifecycle("excitation"))
+
     def _wait_until_ready(self, observer: Observer) -> Outcome | None:
         """Until every node says that it is ready and the excitation has started; why not, if it comes to nothing."""
         patience = time.monotonic() + READY_WITHIN
@@ -164,6 +175,7 @@ class Supervisor:
             while not observer.state:
                 if trouble := self._trouble(observer):
                     return trouble
+                self._bring_up_excitation(observer)
                 silent = [name for name in self._nodes if name not in observer.obstacles]
                 waiting = [f"{name}: {why}" for name, why in observer.obstacles.items() if why]
                 if not silent and not waiting:
@@ -237,7 +249,7 @@ class Supervisor:
         """Let the excitation ramp down, if it still plays, before the graph goes."""
         if self._lockstep or observer.state != "running":
             return
-        observer.ask_stop()
+        observer.excitation.deactivate()
         patience = time.monotonic() + self._experiment.safety.ramp + 1.0
         while observer.state == "running" and time.monotonic() < patience:
             self._listen()

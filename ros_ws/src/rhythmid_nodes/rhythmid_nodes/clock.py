@@ -41,22 +41,26 @@ class Clock:
 
 
 class Worker:
-    """A thread that ends when asked and hands its failure to whoever watches the node."""
+    """A thread that ends when asked, can be started again, and hands its failure to whoever watches the node."""
 
     def __init__(self, name: str, body: Callable[[], None], priority: int = 0) -> None:
         self.stopping = threading.Event()
         self.failure: BaseException | None = None
+        self._name = name
         self._body = body
         self._priority = priority
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread: threading.Thread | None = None
 
     def start(self) -> None:
+        """Start the thread; it must not be running."""
+        self.stopping.clear()
+        self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
         """Ask the thread to end, and wait until it has."""
         self.stopping.set()
-        if self._thread.is_alive():
+        if self._thread is not None and self._thread.is_alive():
             self._thread.join()
 
     def _run(self) -> None:
@@ -77,7 +81,7 @@ class Grid(Worker):
     """Calls `tick(stamp_ns)` at every multiple of `period_ns` of the clock, without drift.
 
     After an overrun of up to `catch_up` seconds the missed ticks follow at once, each with its own grid stamp. After a longer one
-    only the newest does, and `skipped` counts the others. How late they came is in `figures`.
+    only the newest does, and `skipped` counts the others. How late they came since the last start is in `figures`.
     """
 
     def __init__(
@@ -102,6 +106,7 @@ class Grid(Worker):
         return {"rate_hz": f"{rate:.3f}", "skipped": str(self.skipped), **self._lateness.summary("lateness")}
 
     def _loop(self) -> None:
+        self._lateness = Lateness(self._period_ns)
         self._first_ns = due = (self._clock.now() // self._period_ns + 2) * self._period_ns
         while not self.stopping.is_set():
             self._clock.sleep_until(due)

@@ -56,17 +56,19 @@ class CommandGuard(GraphNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("command_guard", PARAMETERS, **options)
+
+    def configure(self) -> None:
         values = self.values
         if self.lockstep:
             raise InputError("parameter time_mode = 'lockstep': a robot has no simulated time")
         self._limits = EffortLimits(values["max_effort"], values["max_effort_rate"], values["max_power"])
         self._watch = Watch(limits(values))
-        self._hold = CommandHold(values["command_timeout"], values["command_ramp"], self.period_ns)
+        self._hold = self._new_hold()
         self._reader = JointStateReader(values["joint"])
         self._wall = Clock()
         self._lock = threading.Lock()  # of the hold: messages come on another thread than ticks
         self._sending = threading.Lock()
-        self._obeys = True
+        self._obeys = False
         self._given = 0.0  # effort sent last
         self._given_ns = 0
         self._quiet_ns = 0  # when to fall silent
@@ -83,6 +85,21 @@ class CommandGuard(GraphNode):
         )
         self._grid = Grid(self._wall, self.period_ns, self._tick, values["priority"])
         self.workers.append(self._grid)
+
+    def activate(self) -> None:
+        self._hold = self._new_hold()
+        self._obeys = True
+        super().activate()
+
+    def fade(self) -> None:
+        """Zero at once, and a while longer: what comes before the guard fades, the guard cuts."""
+        self.stand_down()
+
+    def fading(self) -> bool:
+        return self._engaged(self._wall.now())
+
+    def _new_hold(self) -> CommandHold:
+        return CommandHold(self.values["command_timeout"], self.values["command_ramp"], self.period_ns)
 
     def figures(self) -> dict[str, str]:
         return {
@@ -103,7 +120,7 @@ class CommandGuard(GraphNode):
         return [obstacle for obstacle in found if obstacle]
 
     def stand_down(self) -> None:
-        """A guard that is ended obeys no more, and leaves a last command of zero."""
+        """A guard that is ended or deactivated obeys no more, and leaves a last command of zero."""
         self._obeys = False
         if self._given_ns:
             self._zero()

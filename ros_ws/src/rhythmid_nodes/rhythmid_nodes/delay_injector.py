@@ -56,6 +56,9 @@ class DelayInjector(GraphNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("delay_injector", PARAMETERS, **options)
+        self.add_on_set_parameters_callback(self._on_set)
+
+    def configure(self) -> None:
         values = self.values
         if self.lockstep and values["stamp_mode"] == "keep":
             raise InputError(
@@ -78,14 +81,20 @@ class DelayInjector(GraphNode):
         self._output = self.create_publisher(self._type, "output", stream(self.lockstep))
         self._authority = Authority(self, "input", self.trip) if values["one_publisher"] else None
         self._input = AdaptiveSubscription(
-            self, "input", self._on_lockstep if self.lockstep else self._on_realtime, admits=self._admits
+            self,
+            "input",
+            self.while_active(self._on_lockstep if self.lockstep else self._on_realtime),
+            admits=self._admits,
         )
         if self._profile is not None and not self.lockstep:
             self.create_subscription(String, "run", self._on_run, latched())
-        self.add_on_set_parameters_callback(self._on_set)
         if not self.lockstep:
             self._relay = Worker("relay", self._release_due, values["priority"])
             self.workers.append(self._relay)
+
+    def deactivate(self) -> None:
+        super().deactivate()
+        self._queue.clear()  # what was held back is not released later
 
     def figures(self) -> dict[str, str]:
         applied = self._applied_ns / self._relayed * 1e-6 if self._relayed else 0.0
@@ -124,9 +133,10 @@ class DelayInjector(GraphNode):
                     delay = DELAY.check(parameter.value)  # ROS's own range check lets NaN pass
                 except InputError as error:
                     return SetParametersResult(successful=False, reason=str(error))
-                if self._profile is not None:
+                if self.values["profile"]:
                     return SetParametersResult(successful=False, reason="the delay follows a profile")
-                self.get_logger().info(f"delay {self._delay_ns * 1e-9:g} s -> {delay:g} s")
+                self.get_logger().info(f"delay {self.values['delay']:g} s -> {delay:g} s")
+                self.values["delay"] = delay
                 self._delay_ns = round(delay * 1e9)
         return SetParametersResult(successful=True)
 

@@ -1,6 +1,6 @@
 """excitation: publishes u(t) on `excitation` (or `command_topic`, as `command_type`) when told to, and stops by itself when the machine is not safe.
 
-Services `~/start` and `~/stop` (std_srvs/Trigger). In real time it listens to `joint_states` and stops at once, with a
+Services `~/start` and `~/stop` (std_srvs/Trigger); deactivated, it fades to zero first. In real time it listens to `joint_states` and stops at once, with a
 last command of zero, when the measurements are in danger (see `watch`), nobody listens any more, or another node commands, too.
 """
 
@@ -30,6 +30,7 @@ from .joint_state import JointStateReader
 from .lateness import Lateness
 from .lockstep import Credit
 from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
+from .node_state import NodeState
 from .parameters import Parameter
 from .qos import latched, stream
 from .watch import Watch
@@ -56,6 +57,7 @@ PARAMETERS = (
     Parameter("run", "{}", "JSON published on `run`"),
     Parameter("subscribers", 1, "subscribers of the commands to wait for before starting", "", (0, 1000)),
     Parameter("unattended", False, "start as soon as ready and end the process a second after the last sample"),
+    Parameter("recorder", "recorder", "node that an unattended start waits for until it is active; empty: none"),
     Parameter("consumers", ["plant", "recorder"], "lockstep: nodes whose announcements the excitation waits for"),
 )  # fmt: skip
 
@@ -65,6 +67,8 @@ class ExcitationNode(GraphNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("excitation", PARAMETERS, **options)
+
+    def configure(self) -> None:
         self._effort = self._command()
         self._watch = Watch(limits(self.values))
         self._state = "idle"  # idle -> running (-> ramping) -> finished | stopped
@@ -96,8 +100,25 @@ class ExcitationNode(GraphNode):
                 self._wall, self.period_ns, self._tick, self.values["priority"], self.values["catch_up"]
             )
             self.workers.append(self._grid)
+        self._recorder = None
         if self.values["unattended"]:
+            if self.values["recorder"]:
+                self._recorder = NodeState(self, self.values["recorder"])
             self.create_timer(0.05, self._attend)
+
+    def activate(self) -> None:
+        """In lockstep a run goes on where it was; in real time the next start plays from the beginning."""
+        if not self.lockstep:
+            self._state, self._ended_at = "idle", None
+        super().activate()
+        self._send_lockstep()
+
+    def fade(self) -> None:
+        if not self.lockstep:
+            self._fade_out()
+
+    def fading(self) -> bool:
+        return not self.lockstep and self._state in ("running", "ramping")
 
     def _command(self) -> NDArray[np.float64]:
         """u(t) [N] on the grid, faded and clamped: the same numbers as in a run without ROS."""
@@ -141,7 +162,7 @@ class ExcitationNode(GraphNode):
         }
 
     def obstacles(self) -> list[str]:
-        found = [self._unheard(), self._authority.conflict()]
+        found = [self._unheard(), self._authority.conflict(), self._unrecorded()]
         if not self.lockstep:
             found.append(self._watch.danger(self._wall.now()))
         return [obstacle for obstacle in found if obstacle]
@@ -150,6 +171,11 @@ class ExcitationNode(GraphNode):
         """How many of those who must listen do not; empty when all do."""
         matched, wanted = self._output.publisher.get_subscription_count(), self.values["subscribers"]
         return f"{matched} of {wanted} subscribers of {self._authority.topic}" if matched < wanted else ""
+
+    def _unrecorded(self) -> str:
+        """That the recorder is not active, where nobody attends who would know; else empty."""
+        waits = self._recorder is not None and self._state == "idle" and not self._recorder.active
+        return f"{self.values['recorder']} is not active" if waits else ""
 
     def _other_graphs(self) -> list[str]:
         """Namespaces of the other excitations in this DDS domain; each is told when it is seen first."""
@@ -165,7 +191,7 @@ class ExcitationNode(GraphNode):
         with self._lock:
             playing = not self.lockstep and self._state in ("running", "ramping")
             if playing:
-                self._halt(self._wall.now(), "the node was ended")
+                self._halt(self._wall.now(), "the node was ended or deactivated")
         if playing:
             for publisher in (self._output.publisher, self._run):
                 publisher.wait_for_all_acked(Duration(seconds=0.5))
@@ -178,7 +204,11 @@ class ExcitationNode(GraphNode):
         return response
 
     def _attend(self) -> None:
+        if not self.active or self.transitions.leaving:
+            return
         if self._state == "idle":
+            if self._recorder is not None:
+                self._recorder.ask()
             self._start()
         elif self._state in ("finished", "stopped"):
             if self.lockstep and not self.tripped and self._credit.taken < len(self._effort):
@@ -189,6 +219,8 @@ class ExcitationNode(GraphNode):
     def _start(self) -> str:
         """Start playing from the beginning; why not, if it may not."""
         with self._lock:
+            if not self.active or self.transitions.leaving:
+                return "not active"
             if self._state in ("running", "ramping"):
                 return "already running"
             if self.lockstep and self._state != "idle":
@@ -204,12 +236,17 @@ class ExcitationNode(GraphNode):
         return ""
 
     def _on_stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        with self._lock:
-            response.success = self._state == "running"
-            response.message = "" if response.success else f"not running: {self._state}"
-            if response.success:
-                self._state, self._fade_from = "ramping", self._sent
+        response.message = "" if self._fade_out() else f"not running: {self._state}"
+        response.success = not response.message
         return response
+
+    def _fade_out(self) -> bool:
+        """Begin to fade to zero, if it plays."""
+        with self._lock:
+            playing = self._state == "running"
+            if playing:
+                self._state, self._fade_from = "ramping", self._sent
+        return playing
 
     def _enter(self, state: str, reason: str = "") -> None:
         self._state = state
@@ -240,7 +277,7 @@ class ExcitationNode(GraphNode):
     def _send_lockstep(self) -> None:
         """Send what the credit allows; after a stop, zeros up to the end, so that every stream has its full length."""
         with self._lock:
-            if self._state not in ("running", "ramping"):
+            if not self.active or self._state not in ("running", "ramping"):
                 return
             while self._sent < min(self._credit.limit, len(self._effort)):
                 self._send()

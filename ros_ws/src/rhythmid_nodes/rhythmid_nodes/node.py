@@ -1,4 +1,4 @@
-"""What every node of the graph has: declared parameters, diagnostics, workers, and a way to be run and ended."""
+"""What every node of the graph has: declared parameters, diagnostics, and a way to be run and ended."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.executors import Executor
 from rclpy.experimental.events_executor import EventsExecutor
-from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
@@ -24,8 +25,9 @@ from rhythmid.errors import InputError
 from rhythmid.simulation.command_hold import TIMEOUT
 
 from .authority import UNNAMED
-from .clock import Worker
 from .diagnostics import Diagnostics
+from .lifecycle import LIFECYCLE
+from .managed_node import ManagedNode
 from .parameters import Parameter, declare
 
 _PR_SET_PDEATHSIG = 1
@@ -55,23 +57,28 @@ CATCH_UP = Parameter(
 )
 """By default as long as a command is held: after a longer overrun the robot has been given up already."""
 
+AUTOSTART = Parameter("autostart", True, "configures and activates itself; else ~/change_state does")
+_NO_SIM_TIME = "parameter use_sim_time = True: the nodes take no time from /clock; for simulated time use time_mode = 'lockstep'"
+
 
 def lapse_notice(timeout: float) -> str:
     """What a node says that holds a command for `timeout` seconds at most."""
     return f"a command was not renewed within {timeout:g} s: it fades to zero"
 
 
-class GraphNode(Node):
-    """A node with `values` (its parameters by name), /diagnostics, and workers that end with it."""
+class GraphNode(ManagedNode):
+    """A managed node with `values` (its parameters by name), /diagnostics, and workers that end with it."""
 
     def __init__(self, name: str, parameters: tuple[Parameter, ...], **options: Any) -> None:
         super().__init__(name, **options)
-        self.values = declare(self, parameters)
+        self.values = declare(self, (*parameters, AUTOSTART))
+        if self.get_parameter("use_sim_time").value:
+            raise InputError(_NO_SIM_TIME)
+        self.add_on_set_parameters_callback(_refuse_sim_time)
         self.lockstep = self.values["time_mode"] == "lockstep"
-        self.workers: list[Worker] = []
-        self.done = False  # set by a node whose work ends by itself; the process then ends
         self.tripped = ""  # why the node stopped its work early, if it did; the process then ends with code 1
-        self.diagnostics = Diagnostics(self, self.figures, self.obstacles, lambda: self.tripped)
+        self.diagnostics = Diagnostics(self, self._all_figures, self._all_obstacles, lambda: self.tripped)
+        self.manage(self.values["autostart"])
 
     @property
     def period_ns(self) -> int:
@@ -86,41 +93,43 @@ class GraphNode(Node):
         """What keeps the node from its work; empty when it is ready."""
         return []
 
+    def _all_figures(self) -> dict[str, str]:
+        return {LIFECYCLE: self.managed_state, **(self.figures() if self.configured else {})}
+
+    def _all_obstacles(self) -> list[str]:
+        return self.obstacles() if self.active else [self.managed_state]
+
     def trip(self, reason: str) -> None:
         """Stop the work for good, because of `reason`: say so, and end the process soon. What is told last counts."""
         self.tripped = reason
         self.get_logger().error(f"stopped: {reason}")
         if UNNAMED in reason:
-            self.create_timer(_NAMING, self._finish)
+            self.create_timer(_NAMING, self.end)
         else:
-            self._finish()
-
-    def _finish(self) -> None:
-        self.done = True
+            self.end()
 
     def notice(self, text: str) -> None:
         """Have `text` logged as a warning, once; clock threads use this."""
         self.diagnostics.notice(text)
 
-    def stand_down(self) -> None:
-        """Give no more effort, at once; called when the node is about to end, perhaps more than once."""
-
     def begin(self) -> None:
-        """Start the workers, once every node of the process stands."""
-        for worker in self.workers:
-            worker.start()
-
-    @property
-    def failure(self) -> BaseException | None:
-        """Why a worker died, if one did."""
-        return next((worker.failure for worker in self.workers if worker.failure is not None), None)
+        """Activate the node, once every node of the process stands, unless others are to do that."""
+        if self.values["autostart"]:
+            self.trigger_activate()
 
     def close(self) -> None:
         """Give no more effort, end the workers and say the last figures; the context is still valid."""
-        self.stand_down()
+        if self.configured:
+            self.stand_down()
+            self.finish()
         for worker in self.workers:
             worker.stop()
         self.diagnostics.publish_last()
+
+
+def _refuse_sim_time(parameters: list[RosParameter]) -> SetParametersResult:
+    wanted = any(parameter.name == "use_sim_time" and parameter.value for parameter in parameters)
+    return SetParametersResult(successful=not wanted, reason=_NO_SIM_TIME if wanted else "")
 
 
 def _end_with_supervisor() -> None:
@@ -197,7 +206,8 @@ def _spin(executor: Executor, nodes: Sequence[GraphNode], asked: list[int]) -> N
             if end_at == math.inf and (asked or any(node.done for node in nodes)):
                 end_at = time.monotonic() + _LAST_WORDS
                 for node in nodes:
-                    node.stand_down()
+                    if node.configured:
+                        node.stand_down()
 
 
 def run(build: Callable[[], GraphNode]) -> None:

@@ -61,6 +61,8 @@ class PlantNode(GraphNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("plant", PARAMETERS, **options)
+
+    def configure(self) -> None:
         self._plant = self._build()
         self._reader = JointStateReader(self.values["joint"])
         self._state_writer = JointStateWriter(self.values["joint"], "position", "velocity", "effort")
@@ -89,10 +91,13 @@ class PlantNode(GraphNode):
                 self.period_ns,
                 self._advance_lockstep,
             )
-            subscribe_informed(self, JointState, "command", self._on_lockstep, profile)
+            subscribe_informed(self, JointState, "command", self.while_active(self._on_lockstep), profile)
         else:
             self._wall = Clock()
-            self._origin_ns: int | None = None
+            self._origin_ns: int | None = (
+                None  # of the plant's time; None before the first tick since activation
+            )
+            self._next_ns = 0  # time since the origin of the first tick after that
             self._transport = Lateness(self.period_ns)  # by which commands acted later than they were stamped
             self._done_ns = 0  # time since the origin up to which the plant has been integrated
             self._arrived: deque[tuple[int, int, float]] = deque()
@@ -122,6 +127,14 @@ class PlantNode(GraphNode):
 
         plant().advance(2 * self.period_ns)  # compiles now what would otherwise be compiled in the first tick
         return plant()
+
+    def deactivate(self) -> None:
+        """Time stands still on the machine; the last command is gone when it goes on."""
+        super().deactivate()
+        if self._grid is not None:
+            self._arrived.clear()
+            self._drop_command(self._done_ns)
+            self._origin_ns = None
 
     def figures(self) -> dict[str, str]:
         figures = {
@@ -211,12 +224,12 @@ class PlantNode(GraphNode):
 
     def _on_realtime(self, data: bytes, about: dict[str, Any]) -> None:
         sample = self._accepted(data, about)
-        if sample is not None:
+        if sample is not None and self.active:
             self._arrived.append((sample.stamp_ns, self._wall.now(), sample.effort))
 
     def _tick(self, stamp_ns: int) -> None:
         if self._origin_ns is None:
-            self._origin_ns = stamp_ns
+            self._origin_ns = stamp_ns - self._next_ns
         while self._arrived:
             released_ns, received_ns, effort = self._arrived.popleft()
             act_ns = min(released_ns, received_ns) - self._origin_ns  # a foreign clock may be ahead of ours
@@ -229,10 +242,15 @@ class PlantNode(GraphNode):
             self._commands += 1
         done_ns, self._done_ns = self._done_ns, stamp_ns - self._origin_ns
         if self.tripped:
-            self._push(max(done_ns, self._newest_ns + 1), 0.0)
-            self._hold.renew(self._newest_ns, 0.0)
+            self._drop_command(done_ns)
         self._fade_until(self._done_ns)
         self._publish(self._done_ns, self._origin_ns, newest_only=True)
+        self._next_ns = self._done_ns + self.period_ns
+
+    def _drop_command(self, stamp_ns: int) -> None:
+        """Zero effort from a time since the origin on."""
+        self._push(max(stamp_ns, self._newest_ns + 1), 0.0)
+        self._hold.renew(self._newest_ns, 0.0)
 
     def _fade_until(self, stamp_ns: int) -> None:
         """The steps of a command that was not renewed, up to a time since the origin."""

@@ -53,6 +53,8 @@ class Recorder(GraphNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("recorder", PARAMETERS, **options)
+
+    def configure(self) -> None:
         values = self.values
         self._regex, self._exclude = self._expression("regex"), self._expression("exclude_regex")
         # `topics` has a default, and who gives an expression instead does not want it
@@ -99,8 +101,11 @@ class Recorder(GraphNode):
         }.items():
             self.create_service(Trigger, f"~/{name}", _answering(act))
 
-    def begin(self) -> None:
+    def activate(self) -> None:
         """Nothing to start: the bag's thread runs since the bag was opened."""
+
+    def deactivate(self) -> None:
+        """Nothing to stop: what was received is still written."""
 
     def figures(self) -> dict[str, str]:
         figures = {
@@ -118,14 +123,13 @@ class Recorder(GraphNode):
     def obstacles(self) -> list[str]:
         return [f"no publisher of {topic}" for topic, sub in self._inputs.items() if not sub.matched]
 
-    def close(self) -> None:
+    def finish(self) -> None:
         if self.lockstep and not self._closed:
             if self._order is None:  # not every topic was found
                 self._begin_order()
             assert self._order is not None
             self._put_all(self._order.rest())
         self._closed = True
-        super().close()
 
     # Topics
 
@@ -172,7 +176,8 @@ class Recorder(GraphNode):
         def receive(data: bytes, received_ns: int) -> None:
             self._receive(topic, track, data, received_ns)
 
-        self._inputs[topic] = AdaptiveSubscription(self, topic, receive, found)
+        taken = self.while_active(receive) if self.lockstep else receive
+        self._inputs[topic] = AdaptiveSubscription(self, topic, taken, found)
 
     def _begin_order(self) -> None:
         """Declare the topics, now that all are known, and let go what came before."""
@@ -193,7 +198,7 @@ class Recorder(GraphNode):
         if track.type_name == _TEXT:
             data = unpadded_text(data)
         stamp_ns = stamp_of(data) if track.has_header else 0
-        if self._paused:
+        if self._paused or not self.active:
             self._skipped += 1
         else:
             if track.has_header:

@@ -67,7 +67,7 @@ class _Ear:
         self._rate = (time.monotonic(), 0, 0.0)
         self._stamped = False
         self._node, self._topic = node, topic
-        self.subscription = AdaptiveSubscription(node, topic, self._receive, self._found)
+        self.subscription = AdaptiveSubscription(node, topic, node.while_active(self._receive), self._found)
 
     def _found(self, type_name: str, _publishers: Sequence[TopicEndpointInfo]) -> None:
         fields = message_type(type_name).get_fields_and_field_types()
@@ -96,6 +96,8 @@ class TwinNode(GraphNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("twin", PARAMETERS, **options)
+
+    def configure(self) -> None:
         values = self.values
         if self.lockstep:
             raise InputError("parameter time_mode = 'lockstep': a twin runs beside a machine, in real time")
@@ -148,8 +150,8 @@ class TwinNode(GraphNode):
             f"no publisher of {topic}" for topic, ear in self._ears.items() if not ear.subscription.matched
         ]
 
-    def close(self) -> None:
-        super().close()
+    def finish(self) -> None:
+        self._thread.stop()
         self._watch.close()
         calibration = self._watch.twin.calibration
         if self.values["save_calibration"] and calibration is not None:

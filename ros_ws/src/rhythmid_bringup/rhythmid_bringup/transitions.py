@@ -1,0 +1,35 @@
+"""Brings a managed node of the graph through its states, over its service `~/change_state`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.node import Node
+
+from rhythmid_nodes.lifecycle import INACTIVE, UNCONFIGURED
+
+_NEXT = {UNCONFIGURED: Transition.TRANSITION_CONFIGURE, INACTIVE: Transition.TRANSITION_ACTIVATE}
+
+
+class Transitions:
+    """Requests transitions of the node `name`, one at a time."""
+
+    def __init__(self, node: Node, name: str) -> None:
+        self._client = node.create_client(ChangeState, f"{name}/change_state")
+        self._answer: Any = None
+
+    def advance(self, state: str) -> None:
+        """Configure the node if it is unconfigured, activate it if it is inactive."""
+        if state in _NEXT:
+            self._request(_NEXT[state])
+
+    def deactivate(self) -> None:
+        """Deactivate the node, which takes back what effort it gives."""
+        self._request(Transition.TRANSITION_DEACTIVATE)
+
+    def _request(self, number: int) -> None:
+        answered = self._answer is None or self._answer.done()
+        if answered and self._client.service_is_ready():
+            self._answer = self._client.call_async(ChangeState.Request(transition=Transition(id=number)))
