@@ -66,12 +66,12 @@ class Model:
     @classmethod
     def load(cls, path: str | Path, catalogue: Catalogue | None = None) -> "Model":
         """The model in a YAML file. Raises InputError naming line, parameter and unit of what is wrong."""
-        return _model(read(path), load_catalogue() if catalogue is None else catalogue)
+        return model_of(read(path), load_catalogue() if catalogue is None else catalogue)
 
     @classmethod
     def from_text(cls, text: str, name: str = "model", catalogue: Catalogue | None = None) -> "Model":
         """The model in a YAML text; `name` stands for it in messages."""
-        return _model(parse(text, name), load_catalogue() if catalogue is None else catalogue)
+        return model_of(parse(text, name), load_catalogue() if catalogue is None else catalogue)
 
     @property
     def parameters(self) -> dict[str, Value]:
@@ -200,7 +200,7 @@ class Model:
                 "position": self.units.position,
                 "mass": self.units.mass,
             }
-        content["inertia"] = {"mass": _entry(self.mass, MASS)}
+        content["inertia"] = {"mass": entry_of(self.mass, MASS)}
         for slot in SLOTS:
             terms = [term for term in self.terms if term.element.slot == slot]
             if terms or slot != "timing":
@@ -226,12 +226,13 @@ def _fed(units: Units, behind: Iterable[Element]) -> Units:
 
 def _body(term: Term) -> dict[str, Any]:
     body: dict[str, Any] = {
-        name: _entry(value, term.element.parameter(name)) for name, value in term.values.items()
+        name: entry_of(value, term.element.parameter(name)) for name, value in term.values.items()
     }
     return body | ({"against": "room"} if term.against == "room" else {})
 
 
-def _entry(value: Value, usual: Parameter) -> dict[str, Any]:
+def entry_of(value: Value, usual: Parameter) -> dict[str, Any]:
+    """A parameter as a file holds it, without what is usual."""
     entry: dict[str, Any] = {"value": float(value.value), "unit": value.unit}
     if value.fixed or usual.fixed:
         entry["fixed"] = value.fixed
@@ -242,7 +243,7 @@ def _entry(value: Value, usual: Parameter) -> dict[str, Any]:
     return entry
 
 
-def _value(node: Node, parameter: Parameter, units: Units) -> Value:
+def value_of(node: Node, parameter: Parameter, units: Units) -> Value:
     """Parameter from `{value: …, unit: …}` or from a bare number in the machine's own units."""
     if not isinstance(node.value, dict):
         value, unit, bounds, prior = node.number(), units.of(parameter.unit), parameter.bounds, None
@@ -317,7 +318,7 @@ def _term(item: Node, slot: str, catalogue: Catalogue, units: Units, taken: set[
     values: dict[str, Value] = {}
     for parameter in element.parameters:
         if parameter.name in given:
-            values[parameter.name] = _value(given[parameter.name], parameter, units)
+            values[parameter.name] = value_of(given[parameter.name], parameter, units)
         elif parameter.default is None:
             body.fail(
                 f"parameter {parameter.name!r} is missing ({parameter.description}, {units.of(parameter.unit)})"
@@ -337,7 +338,8 @@ def _named(item: Node, catalogue: Catalogue) -> Iterator[Element]:
         yield from (catalogue[str(name)] for name in item.value if str(name) in catalogue)
 
 
-def _model(document: Node, catalogue: Catalogue) -> Model:
+def model_of(document: Node, catalogue: Catalogue) -> Model:
+    """The model that a document describes. Raises InputError naming line, parameter and unit of what is wrong."""
     if document.value is None:
         raise InputError(f"{document.place}: the model file is empty")
     sections = document.mapping(["units", "inertia", *SLOTS])
@@ -349,7 +351,7 @@ def _model(document: Node, catalogue: Catalogue) -> Model:
     if "mass" not in inertia:
         sections["inertia"].fail("'mass' is missing")
     units = _units(sections, inertia["mass"])
-    mass = _value(inertia["mass"], MASS, units)
+    mass = value_of(inertia["mass"], MASS, units)
     if mass.value <= 0.0:
         inertia["mass"].fail("must be greater than 0")
     taken: set[str] = set()
