@@ -25,7 +25,10 @@ def multisine(time: Array, rng: np.random.Generator, low: float, high: float, co
 
 
 def references(
-    joints: Mapping[str, tuple[float, float]], time: Array, rng: np.random.Generator, band: tuple[float, float]
+    joints: Mapping[str, tuple[float, float]],
+    time: Array,
+    rng: np.random.Generator,
+    band: tuple[float, float],
 ) -> dict[str, Array]:
     """A multisine for each joint about a middle [rad] with an rms [rad], faded in."""
     fade = np.clip(time / 0.5, 0.0, 1.0)
@@ -70,7 +73,9 @@ def recorded(
     made: dict[str, Record] = {}
     for place, joint in enumerate(plant.joints):
         position = encoder * np.round(run.output[:, place] / encoder)
-        effort = np.zeros(len(stamps)) if not with_effort else asked_effort(plant, joint, run, place, asked, time)
+        effort = (
+            np.zeros(len(stamps)) if not with_effort else asked_effort(plant, joint, run, place, asked, time)
+        )
         effort = effort + torque_noise * np.sqrt(np.mean(effort**2)) * rng.normal(size=len(stamps))
         given = np.interp(stamps, time, asked[joint])
         made[joint] = Record(
@@ -83,7 +88,9 @@ def recorded(
     base = None
     if plant.body.base in plant.body.joints:
         pose = run.pose[:, plant.body.joints[plant.body.base].position]
-        base = Record("run", Channel(stamps[kept], (encoder * 0.1) * np.round(pose / (encoder * 0.1))[kept], "m"))
+        base = Record(
+            "run", Channel(stamps[kept], (encoder * 0.1) * np.round(pose / (encoder * 0.1))[kept], "m")
+        )
     return JointRecord("run", made, base)
 
 
@@ -93,6 +100,7 @@ def asked_effort(
     """The torque that the joint's drive reports: what its controller asked for."""
     model = plant.paths[joint]
     late = model.value("input_delay.delay") if "input_delay.delay" in model.parameters else 0.0
-    reference = np.interp(run.time - late, time, asked[joint])
+    held = 0.5 * plant.body.step  # a step takes the mean of its command
+    reference = np.interp(run.time - late + held, time, asked[joint])
     kp, kd = model.value("position_control.proportional"), model.value("position_control.derivative")
     return kp * (reference - run.position[:, place]) - kd * run.velocity[:, place]

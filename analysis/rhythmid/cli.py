@@ -41,7 +41,7 @@ def _main(
 
 
 for _module in pkgutil.iter_modules(commands.__path__):
-    if _module.name != "options":
+    if _module.name not in ("options", "machines"):
         _name = _module.name
         app.command(name=_name)(getattr(importlib.import_module(f"rhythmid.commands.{_name}"), _name))
 

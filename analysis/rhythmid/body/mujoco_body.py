@@ -107,6 +107,16 @@ class MujocoBody(Body):
             if self.model.body_weldid[i] != 0 and self.model.body_mass[i] > 0.0
         }
 
+    def joint_of(self, link: str) -> str:
+        """The joint that moves a link: its own, or the nearest one between it and the world."""
+        number = self.links[link]
+        while number:
+            first, count = int(self.model.body_jntadr[number]), int(self.model.body_jntnum[number])
+            if count:
+                return str(self.model.joint(first + count - 1).name)
+            number = int(self.model.body_parentid[number])
+        raise InputError(f"{self.path}: the link {link!r} does not move")
+
     @property
     def parameters(self) -> dict[str, float]:
         masses = {f"{name}.mass": float(self.model.body_mass[i]) for name, i in self.links.items()}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
+from rhythmid.commands import machines
 from rhythmid.commands.options import Bags, Elements, JsonFile, ReportFile, SignalsFile, command_line
 from rhythmid.errors import InputError
 from rhythmid.output import require_new, write_json
@@ -72,6 +73,10 @@ def diagnose(
         raise InputError(
             "--holdout, --budget and --save-model belong to a model: give --model NOMINAL.yaml too"
         )
+    if model is not None and machines.is_machine(model):
+        machines.refuse(sim=sim, report=report)
+        machines.diagnose_files(bags, model, signals, holdout or (), elements or (), json, save_model, budget)
+        return
     catalogue = load_catalogue(elements or ())
     nominal = None if model is None else Model.load(model, catalogue)
     records = load_records(bags, signals)

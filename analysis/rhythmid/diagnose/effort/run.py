@@ -90,13 +90,19 @@ def _rows(case: Case, found: EffortSearch, unseen: Balance | None) -> _Rows:
 
 
 def effort_run(
-    case: Case, applicability: Applicability, most: int = MOST, unseen: Balance | None = None
+    case: Case,
+    applicability: Applicability,
+    most: int = MOST,
+    unseen: Balance | None = None,
+    promising: float | None = None,
+    places: int = 1,
 ) -> EffortResult:
     """Search for up to `most` effects, weigh and decide; `unseen` is the balance of held-out efforts where the case has no records
-    of them. Raises InputError where the records hold too little."""
+    of them, `promising` as for `search_effort`; the same search is made at so many `places`, and chance has as many candidates. Raises InputError where the records hold too little."""
     found = search_effort(
-        case.records, case.nominal, case.catalogue, applicability.balance, most, case.tell, case.budget
-    )
+        case.records, case.nominal, case.catalogue, applicability.balance, most, case.tell, case.budget,
+        promising,
+    )  # fmt: skip
     case.tell("weighing the hypotheses on data that no fit has seen")
     rows = _rows(case, found, unseen)
     size = size_of(found.balance)
@@ -129,7 +135,7 @@ def effort_run(
     ]
     left = remainder_of(found.balance, found.chosen)
     maps = {left.goes_with: made(mapped["the motion and the load"])}
-    contest = Contest(tuple(hypotheses), maps, found.candidates, size, PRACTICAL_EFFORT)
+    contest = Contest(tuple(hypotheses), maps, places * found.candidates, size, PRACTICAL_EFFORT)
     selection = select(contest)
     chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)
     noise = predicted[chosen.elements].error

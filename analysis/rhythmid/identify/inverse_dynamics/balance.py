@@ -72,8 +72,11 @@ class Balance:
         return cls.of_motions(motions, chosen, max(one.period for one in raw))
 
     @classmethod
-    def of_motions(cls, motions: Sequence[Motion], chosen: Bandwidth, period: float) -> "Balance":
-        """The balance of these motions, whose records were sampled every `period` [s]. Raises InputError where they are too short."""
+    def of_motions(
+        cls, motions: Sequence[Motion], chosen: Bandwidth, period: float, clear: float | None = None
+    ) -> "Balance":
+        """The balance of these motions, whose records were sampled every `period` [s]. With `clear`, so many periods of the cut-off are
+        left out at both ends of each motion, however little remains. Raises InputError where too few rows are left."""
         speed = float(np.quantile(np.abs(np.concatenate([one.leg_velocity for one in motions])), FAST))
         length = sum(len(one.time) * one.period for one in motions)
         often = max(DECIMATED * chosen.effort, MANY_ROWS / length)
@@ -81,6 +84,8 @@ class Balance:
         for motion in motions:
             step = max(1, int(1.0 / (often * motion.period)))
             margin = min(math.ceil(1.0 / (chosen.effort * motion.period)), len(motion.time) // 4)
+            if clear is not None:
+                margin = math.ceil(clear / (chosen.effort * motion.period))
             rows = np.arange(margin, len(motion.time) - margin, step)
             all_rows += len(rows)
             sticks = stuck(

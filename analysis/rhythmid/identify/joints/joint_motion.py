@@ -15,7 +15,6 @@ from scipy.interpolate import CubicSpline
 from rhythmid.body.body import BODY
 from rhythmid.body.machine import Machine
 from rhythmid.elements.element import Element, Parameter
-from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.bandwidth import (
     Bandwidth,
@@ -28,6 +27,9 @@ from rhythmid.model import Model, Term, Value
 from rhythmid.record.joint_record import JointRecord, Taken
 
 Array = NDArray[np.float64]
+# periods of the cut-off at both ends of a stretch, in which a filter that begins there errs by several times the noise (measured on
+# flights between contacts)
+CLEAR = 1.5
 SAME_CLOCK = 1e-3  # of a sample: by how much motion and an effort that was made from it may be out
 FAINT = 1e-3  # of a joint's effort, below which what a link does to it is not looked at
 
@@ -128,7 +130,7 @@ class JointBalances:
                 replace(motion, effort=controller_effort(model, joint, motion, body, late))
                 for motion, body in zip(motions, self.bodies, strict=True)
             ]
-        return Balance.of_motions(motions, self.bandwidths[joint], period)
+        return Balance.of_motions(motions, self.bandwidths[joint], period, CLEAR)
 
 
 def controller_effort(model: Model, joint: str, motion: Motion, body: BodyMotion, late: float) -> Array:
@@ -173,7 +175,9 @@ def _cut(machine: Machine, stretches: Sequence[JointStretch]) -> tuple[float, fl
     for joint in machine.joints:
         place = machine.body.joints[joint].position
         raw = [
-            Stretch(one.record, one.name, one.time, one.pose[:, place], one.time, one.period, "force", "position")
+            Stretch(
+                one.record, one.name, one.time, one.pose[:, place], one.time, one.period, "force", "position"
+            )
             for one in stretches
         ]
         found.append(bandwidth_of_motion(raw))
@@ -223,5 +227,7 @@ def _motion(
 
 def _bandwidth(motions: Sequence[Motion], cut: float, dominant: float) -> Bandwidth:
     """The bandwidth of a joint's effort beside what the rest of the body asks for."""
-    own = [replace(one, effort=one.effort - (0.0 if one.coupling is None else one.coupling)) for one in motions]
+    own = [
+        replace(one, effort=one.effort - (0.0 if one.coupling is None else one.coupling)) for one in motions
+    ]
     return bandwidth_below(own, cut, dominant)

@@ -18,7 +18,9 @@ from rhythmid.record.record import Record, Uniform
 Array = NDArray[np.float64]
 NEAR = 0.002  # [m] between two surfaces, below which they may touch: what an encoder and a link's shape are wrong by
 WHOLE = 0.99  # of a sample that has to be no bridge over a gap
-MOST = 4000  # poses at which contact is looked for, in a record: contacts last longer than the samples between
+MOST = (
+    4000  # poses at which contact is looked for, in a record: contacts last longer than the samples between
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,10 @@ def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[Jo
             pose[:, machine.body.joints[joint].position] = one.output
         every = max(1, len(grid) // MOST)
         touching = machine.body.touches(pose[::every], NEAR)
-        flying = ~np.repeat(touching, every)[: len(grid)]
+        beside = touching.copy()  # a contact may begin between the poses that were looked at
+        beside[1:] |= touching[:-1]
+        beside[:-1] |= touching[1:]
+        flying = ~np.repeat(beside, every)[: len(grid)]
         ends = np.flatnonzero(np.diff(np.concatenate([[0], (valid & flying).astype(int), [0]])))
         for first, end in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
             if end - first < SHORTEST:
@@ -78,15 +83,23 @@ def check_recorded(machine: Machine, record: JointRecord) -> None:
         )
     for joint in machine.joints:
         if joint not in record.joints:
-            raise InputError(f"{record.name}: the joint {joint!r} is not recorded; it has {', '.join(record.joints)}")
+            raise InputError(
+                f"{record.name}: the joint {joint!r} is not recorded; it has {', '.join(record.joints)}"
+            )
     for joint in record.joints:
         if joint not in machine.joints:
-            raise InputError(f"{record.name}: the joint {joint!r} has no path in the model; name it under 'joints:'")
+            raise InputError(
+                f"{record.name}: the joint {joint!r} has no path in the model; name it under 'joints:'"
+            )
     for joint in body.joints:
         if joint == body.base and record.base is None:
-            raise InputError(f"{record.name}: the base moves along {joint!r}, which is not recorded; name it in signals.yaml as 'base:'")
+            raise InputError(
+                f"{record.name}: the base moves along {joint!r}, which is not recorded; name it in signals.yaml as 'base:'"
+            )
         if joint != body.base and joint not in machine.joints:
-            raise InputError(f"{body.path.name}: the joint {joint!r} moves, but the model says nothing of it; name it under 'joints:'")
+            raise InputError(
+                f"{body.path.name}: the joint {joint!r} moves, but the model says nothing of it; name it under 'joints:'"
+            )
 
 
 def _common(
@@ -126,9 +139,7 @@ def _at(grid: Uniform, time: Array) -> Uniform:
     )  # fmt: skip
 
 
-def _drives(
-    model: Model, record: Record, grid: Uniform
-) -> tuple[Array | None, Array | None, Array | None]:
+def _drives(model: Model, record: Record, grid: Uniform) -> tuple[Array | None, Array | None, Array | None]:
     """Effort, reference and feed-forward of a joint."""
     if record.effort is not None:
         return grid.effort, None, None

@@ -1,0 +1,129 @@
+"""What the commands do with a model of several joints: `rhythmid diagnose`, `identify` and `simulate` come here where the model file
+has a `body:`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from rhythmid.errors import InputError
+from rhythmid.output import write_json
+from rhythmid.report.quantity import rounded
+
+if TYPE_CHECKING:
+    from rhythmid.body.machine import Machine
+    from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
+    from rhythmid.elements.catalogue import Catalogue
+    from rhythmid.record.joint_record import JointRecord
+
+UNDRAWN = "{} is not made for a machine of several joints; --json has all of the answer"
+
+
+def is_machine(model: Path | None) -> bool:
+    """Whether a model file describes a machine of several joints."""
+    if model is None:
+        return False
+    from rhythmid.body.machine import describes_machine
+
+    return describes_machine(model)
+
+
+def loaded(
+    model: Path, catalogue: "Catalogue", bags: Sequence[Path], signals: Path | None
+) -> "tuple[Machine, list[JointRecord]]":
+    """The machine and its records. Raises InputError where no signals say which joint is what."""
+    from rhythmid.body.machine import Machine
+    from rhythmid.record.joint_record import load_joint_records
+
+    machine = Machine.load(model, catalogue)
+    return machine, [] if not bags else load_joint_records(bags, _signals(bags, signals))
+
+
+def _signals(bags: Sequence[Path], signals: Path | None) -> Path:
+    if signals is not None:
+        return signals
+    if len(bags) == 1 and bags[0].suffix in (".yaml", ".yml"):
+        return bags[0]
+    raise InputError("a machine of several joints needs --signals: a signals.yaml with  joints: [hip, knee]")
+
+
+def refuse(**given: Any) -> None:
+    """Raise InputError for options that have no meaning for several joints."""
+    for name, value in given.items():
+        if value:
+            raise InputError(UNDRAWN.format(f"--{name.replace('_', '-')}"))
+
+
+def diagnose_files(
+    bags: Sequence[Path],
+    model: Path,
+    signals: Path | None,
+    holdout: Sequence[Path],
+    elements: Sequence[Path],
+    json: Path | None,
+    save_model: Path | None,
+    budget: float | None,
+) -> None:
+    """Diagnose the machine of several joints in a model file, print and write the answer."""
+    from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
+    from rhythmid.elements.catalogue import load_catalogue
+    from rhythmid.progress_bar import progress
+    from rhythmid.record.joint_record import load_joint_records
+
+    catalogue = load_catalogue(elements)
+    machine, records = loaded(model, catalogue, bags, signals)
+    unseen = load_joint_records(holdout, _signals(bags, signals)) if holdout else []
+    with progress(Console(stderr=True), budget) as tell:
+        answer = diagnose_machine(records, machine, unseen, catalogue, tell, budget)
+    show_diagnosis(answer.diagnosis, Console())
+    if json is not None:
+        write_json(json, answer.diagnosis.to_dict())
+    if save_model is not None:
+        answer.machine.save(save_model)
+
+
+def show_diagnosis(found: "MachineDiagnosis", console: Console) -> None:
+    """Print a diagnosis: the verdict, what is missing at which joint, then a row for every joint."""
+    console.print(f"[bold]{found.verdict.replace('_', ' ')}[/]: {escape(found.summary)}")
+    for one in found.missing:
+        what = f"mass of {one.link}" if one.link else one.element
+        console.print(
+            f"[bold]{escape(one.joint)}: {escape(what)}[/]   {escape(one.equation)}   (probability {one.probability:.2f}, "
+            f"{100.0 * one.share:.3g} % of the joint's mismatch)"
+        )
+        for name, value in one.parameters.items():
+            std = "" if value.std is None else f" ± {value.std:.2g}"
+            console.print(f"  {name}: {rounded(value.value, value.std)}{std} {escape(value.unit)}")
+    for group in found.indistinguishable:
+        console.print(f"indistinguishable here: {escape(', '.join(group))}")
+    table = Table(title="error of the effort on data that no fit has seen, as a share of it")
+    for column in ("joint", "verdict", "nominal", "augmented", "left"):
+        table.add_column(column)
+    for joint, one in found.joints.items():
+        before, after = (one.fit[name].heldout_nrmse for name in ("refitted_nominal", "augmented"))
+        left = (
+            f"{100.0 * one.remainder.share:.2g} % of the mismatch" if one.remainder.significant else "noise"
+        )
+        table.add_row(joint, one.verdict.replace("_", " "), _share(before), _share(after), left)
+    console.print(table)
+    for joint, why in found.not_judged.items():
+        console.print(f"not judged: {escape(joint)}: {escape(why)}")
+    for label, lines in (("assumption", found.assumptions), ("note", found.notes)):
+        for line in lines:
+            console.print(f"{label}: {escape(line)}")
+    console.print(f"next experiment: {escape(found.next_experiment)}")
+
+
+def _share(error: float | None) -> str:
+    return "—" if error is None else f"{100.0 * error:.3g} %"
+
+
+def written(json: Path | None, content: dict[str, Any]) -> None:
+    """Write an answer where one is asked for."""
+    if json is not None:
+        write_json(json, content)
+        typer.echo(f"{json}: written")
