@@ -77,12 +77,10 @@ def concealed(machine: Machine, joint: str, effect: str, effort: float, rng: np.
         "actuator_delay": {"delay": float(rng.uniform(0.006, 0.01))},
         "constant_force": {"force": share * effort},
         "linear_spring": {"stiffness": 4.0 * share * effort, "rest_length": float(rng.uniform(-0.5, 0.5))},
-        "actuator_deadband": {"width": 1.5 * share * effort},
+        "actuator_deadband": {"threshold": share * effort},
     }[effect]  # fmt: skip
     element = catalogue[effect]
-    known = {p.name for p in element.parameters}
-    made = machine.with_element(joint, element, {k: v for k, v in values.items() if k in known})
-    return made, next(iter(values.values()))
+    return machine.with_element(joint, element, values), next(iter(values.values()))
 
 
 def asked(body: str, machine: Machine, time, rng: np.random.Generator):
@@ -99,7 +97,7 @@ def asked(body: str, machine: Machine, time, rng: np.random.Generator):
 def family(name: str) -> str:
     """The family of an element; its own name where it is none."""
     catalogue = load_catalogue()
-    return catalogue[name].family if name in catalogue else name
+    return (catalogue[name].family if name in catalogue else "") or name
 
 
 def run(number: int, seed: int, bodies: Sequence[str]) -> Case:
@@ -124,7 +122,7 @@ def run(number: int, seed: int, bodies: Sequence[str]) -> Case:
     here = [one for one in answer.missing if one.joint == joint]
     alike = {family(effect), effect}
     groups = [
-        set(name.split(": ")[1] for name in group)
+        {name.split(": ")[1] for name in group}
         for group in answer.indistinguishable
         if group[0].startswith(joint)
     ]

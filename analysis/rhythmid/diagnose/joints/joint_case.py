@@ -20,6 +20,7 @@ from rhythmid.progress import Tell
 # gain of log likelihood that a score test has to promise for an addition to be fitted: 1 in 70 reaches it by chance (chi-square), and
 # what is named has to gain more than twice as much
 PROMISING = 3.0
+STIFFNESS = 0.1  # of the effort for the motion's size, that a spring is tried at
 GAINS = (0.9, 1.1)  # at which it is tried whether an actuator gives less or more than is asked of it
 
 
@@ -34,12 +35,20 @@ class JointResult:
 
 
 def joint_catalogue(catalogue: Catalogue) -> Catalogue:
-    """The catalogue for a joint, whose inertia is known from the body: there an actuator's gain is no mere calibration."""
-    gain = catalogue.elements.get("actuator_gain")
-    if gain is None:
-        return catalogue
-    found = replace(gain, candidate=True, starts=lambda _: [{"gain": value} for value in GAINS])
-    return Catalogue({**catalogue.elements, gain.name: found})
+    """The catalogue for a joint, whose inertia and weight are known from the body: there an actuator's gain is no mere calibration,
+    and a spring may be at rest anywhere."""
+    found = dict(catalogue.elements)
+    if (gain := found.get("actuator_gain")) is not None:
+        found[gain.name] = replace(gain, candidate=True, starts=lambda _: [{"gain": one} for one in GAINS])
+    if (spring := found.get("linear_spring")) is not None:
+        found[spring.name] = replace(
+            spring,
+            starts=lambda s: [
+                {"stiffness": STIFFNESS * s.effort / s.position, "rest_length": rest}
+                for rest in (s.low, s.centre, s.high)
+            ],
+        )
+    return Catalogue(found)
 
 
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other

@@ -63,7 +63,7 @@ def compose_machine(
             if joint in named or joint in undecided
             for group in one.indistinguishable
         ),
-        fit={joint: dict(one.fit) for joint, one in answers.items()},
+        fit={joint: {str(k): v for k, v in one.fit.items()} for joint, one in answers.items()},
         parameters={
             f"{joint}.{name}": value
             for joint, one in answers.items()
