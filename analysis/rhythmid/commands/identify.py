@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from rhythmid.commands import machines
 from rhythmid.commands.options import Bags, Elements, JsonFile, ReportFile, SignalsFile, command_line
 from rhythmid.output import require_new, write_json
 from rhythmid.report.quantity import rounded
@@ -69,6 +70,10 @@ def identify(
     from rhythmid.record.read import load_records
 
     require_new(json, report, save_model, save)
+    if model is not None and machines.is_machine(model):
+        machines.refuse(report=report, save=save, forcing=forcing, clock_offset=clock_offset)
+        machines.identify_files(bags, model, signals, elements or (), json, save_model)
+        return
     if method not in get_args(Method):
         raise InputError(f"--method {method}: one of {', '.join(get_args(Method))} is expected")
     if htf not in get_args(HtfMethod):

@@ -3,7 +3,7 @@ has a `body:`."""
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 from rich.console import Console
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rhythmid.body.machine import Machine
     from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
     from rhythmid.elements.catalogue import Catalogue
+    from rhythmid.identify.joints.joint_identification import MachineIdentification
     from rhythmid.record.joint_record import JointRecord
 
 UNDRAWN = "{} is not made for a machine of several joints; --json has all of the answer"
@@ -51,7 +52,7 @@ def _signals(bags: Sequence[Path], signals: Path | None) -> Path:
     raise InputError("a machine of several joints needs --signals: a signals.yaml with  joints: [hip, knee]")
 
 
-def refuse(**given: Any) -> None:
+def refuse(**given: object) -> None:
     """Raise InputError for options that have no meaning for several joints."""
     for name, value in given.items():
         if value:
@@ -122,8 +123,63 @@ def _share(error: float | None) -> str:
     return "—" if error is None else f"{100.0 * error:.3g} %"
 
 
-def written(json: Path | None, content: dict[str, Any]) -> None:
-    """Write an answer where one is asked for."""
+def identify_files(
+    bags: Sequence[Path],
+    model: Path,
+    signals: Path | None,
+    elements: Sequence[Path],
+    json: Path | None,
+    save_model: Path | None,
+) -> None:
+    """Identify the machine of several joints in a model file, print and write the answer."""
+    from rhythmid.elements.catalogue import load_catalogue
+    from rhythmid.identify.joints.joint_identification import identify_machine
+    from rhythmid.progress_bar import progress
+
+    machine, records = loaded(model, load_catalogue(elements), bags, signals)
+    with progress(Console(stderr=True), None) as tell:
+        found = identify_machine(records, machine, tell=tell)
+    show_identification(found, Console())
     if json is not None:
-        write_json(json, content)
-        typer.echo(f"{json}: written")
+        write_json(json, found.to_dict())
+    if save_model is not None:
+        found.machine.save(save_model)
+
+
+def show_identification(found: "MachineIdentification", console: Console) -> None:
+    """Print an identification: parameters, inertias, errors, and what the records do not tell apart."""
+    table = Table(title="parameters")
+    for column in ("name", "value", "std", "unit"):
+        table.add_column(column)
+    for name, one in found.parameters.items():
+        table.add_row(name, rounded(one.value, one.std), f"{one.std:.2g}", escape(one.unit))
+    console.print(table)
+    if found.inertia is not None:
+        seen = found.inertia
+        console.print(
+            f"{seen.rank} of {seen.count} inertial parameters, or combinations of them, are seen; condition {seen.condition:.3g}"
+        )
+        for link, values in seen.links.items():
+            centre = ", ".join(f"{values[name] / values['m']:.4g}" for name in ("mx", "my", "mz"))
+            console.print(f"{escape(link)}: mass {values['m']:.4g} kg, centre at ({centre}) m")
+    for joint, error in found.effort_nrmse.items():
+        runs = ", ".join(f"{100.0 * one[joint]:.3g} % {name}" for name, one in found.free_run.items())
+        console.print(
+            f"{escape(joint)}: effort missed by {100.0 * error:.3g} %; free run, held out: {runs or 'none'}"
+        )
+    for label, lines in (("not separable", found.not_separable), ("note", found.notes)):
+        for line in lines:
+            console.print(f"{label}: {escape(line)}")
+
+
+def simulate_files(model: Path, experiment: Path, out: Path, elements: Sequence[Path]) -> None:
+    """Run an experiment with the machine of several joints in a model file, and write its bag."""
+    from rhythmid.body.joint_experiment import JointExperiment, perform
+    from rhythmid.body.machine import Machine
+    from rhythmid.elements.catalogue import load_catalogue
+    from rhythmid.record.joint_messages import write_joint_bag
+
+    machine = Machine.load(model, load_catalogue(elements))
+    made = perform(machine, JointExperiment.load(experiment))
+    write_joint_bag(out, {topic: (made.stamp_ns, *rest) for topic, rest in made.topics.items()})
+    typer.echo(f"{out}: {len(made.stamp_ns)} samples of {', '.join(made.topics)}")

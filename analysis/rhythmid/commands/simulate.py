@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from rhythmid.commands import machines
 from rhythmid.commands.options import Elements
 from rhythmid.output import require_new
 
@@ -23,6 +24,10 @@ def simulate(
     from rhythmid.record.bag_writer import write_bag
 
     require_new(out)
+    if machines.is_machine(model):
+        machines.refuse(all_topics=all_topics)
+        machines.simulate_files(model, experiment, out, elements or ())
+        return
     described = Experiment.load(experiment, tuple(elements or ()), model)
     messages = perform(described)
     wanted = (
