@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from threadpoolctl import threadpool_limits
 
 from rhythmid.diagnose.case import Budget, Case
+from rhythmid.diagnose.effort.candidate import DELAY
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST
 from rhythmid.elements.catalogue import Catalogue
@@ -13,7 +14,6 @@ from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.joints.joint_motion import JointBalances
-from rhythmid.identify.joints.reference_delay import reference_delay
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 
@@ -48,17 +48,18 @@ def joint_catalogue(catalogue: Catalogue) -> Catalogue:
                 for rest in (s.low, s.centre, s.high)
             ],
         )
+    if (constant := found.get("constant_force")) is not None:  # a spring that is at rest far from the motion
+        found[constant.name] = replace(constant, special_case_of=(*constant.special_case_of, "linear_spring"))
     return Catalogue(found)
 
 
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
 def diagnose_joint(
     balances: JointBalances, unseen: JointBalances | None, joint: str, catalogue: Catalogue, tell: Tell,
-    budget: Budget, most: int = MOST,
+    budget: Budget, late: float = 0.0, most: int = MOST,
 ) -> JointResult:  # fmt: skip
-    """Search for what one joint's path lacks. Raises InputError where the records hold too little of its motion."""
+    """Search for what one joint's path lacks; a reference acts there `late` [s] after its stamp. Raises InputError where the records hold too little of its motion."""
     model = balances.models[joint]
-    late = reference_delay(balances, joint) if joint in balances.computed else 0.0
     balance = balances.balance(joint, late)
     other: Balance | None = None
     if unseen is not None:
@@ -85,6 +86,6 @@ def name_of(joint: str, label: str) -> tuple[str, str]:
         return "armature", joint
     if label.endswith(".mass"):
         return "link_mass", label.removeprefix("body.").removesuffix(".mass")
-    if label == "input_delay.delay":
+    if label == DELAY:
         return "actuator_delay", joint
     return label, joint

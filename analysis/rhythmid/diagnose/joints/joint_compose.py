@@ -6,6 +6,7 @@ from rhythmid.body.body import BODY
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
 from rhythmid.diagnose.answer.wording import SENTENCES
+from rhythmid.diagnose.effort.candidate import DELAY
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, name_of
@@ -107,7 +108,7 @@ def _own(element: str) -> str:
 
 
 def _value(one: JointResult, answer: Diagnosis, label: str) -> Estimate:
-    if label == "input_delay.delay":
+    if label == DELAY:
         late = answer.delays["sum"]
         return Estimate(late["value"], late["std"], "s")
     said = answer.parameters[label]

@@ -14,12 +14,14 @@ from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import STATED
+from rhythmid.diagnose.effort.candidate import DELAY
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.joints.joint_motion import JointBalances
+from rhythmid.identify.joints.reference_delay import reference_delay
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.joint_record import JointRecord
@@ -82,10 +84,11 @@ def _searched(
 ) -> tuple[dict[str, JointResult], dict[str, str]]:  # fmt: skip
     found: dict[str, JointResult] = {}
     refused: dict[str, str] = {}
+    late = reference_delay(balances, balances.computed) if balances.computed else 0.0
     for joint in joints:
         tell(f"joint {joint}")
         try:
-            found[joint] = diagnose_joint(balances, unseen, joint, catalogue, tell, budget)
+            found[joint] = diagnose_joint(balances, unseen, joint, catalogue, tell, budget, late)
         except InputError as error:
             refused[joint] = str(error)
     return found, refused
@@ -106,8 +109,8 @@ def stated_at(one: JointResult) -> tuple[str, ...]:
 
 def _differs(one: JointResult, label: str) -> bool:
     """Whether a value of the body has come out other than it was."""
-    if label not in one.case.nominal.parameters:
-        return True  # a delay
+    if label == DELAY or label not in one.case.nominal.parameters:
+        return True
     before = one.case.nominal.value(label)
     return abs(one.result.chosen.model.value(label) - before) > MATTERS * abs(before)
 

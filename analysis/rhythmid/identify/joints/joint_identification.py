@@ -99,11 +99,14 @@ def identify_machine(
     correlations: dict[str, float] = {}
     errors: dict[str, float] = {}
     identified = machine
+    rotors = {joint: _rotor_freed(model) for joint, model in balances.models.items()}
+    balances = replace(balances, models=rotors)
+    common = reference_delay(balances, balances.computed) if balances.computed else None
     for joint in machine.joints:
         tell(f"joint {joint}")
-        late = reference_delay(balances, joint) if joint in balances.computed else None
+        late = common if joint in balances.computed else None
         balance = balances.balance(joint, late or 0.0)
-        fit = fit_effort(balance, _rotor_freed(balances.models[joint]))
+        fit = fit_effort(balance, balances.models[joint])
         fits[joint] = balance, fit
         errors[joint] = fit.error / size_of(balance)
         identified = _with_fit(identified, machine, joint, fit, late, balances.period, found)
