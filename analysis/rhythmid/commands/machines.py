@@ -83,8 +83,7 @@ def diagnose_files(
     show_diagnosis(answer.diagnosis, Console())
     if json is not None:
         write_json(json, answer.diagnosis.to_dict())
-    if save_model is not None:
-        answer.machine.save(save_model)
+    saved(answer.machine, save_model)
 
 
 def show_diagnosis(found: "MachineDiagnosis", console: Console) -> None:
@@ -123,6 +122,16 @@ def _share(error: float | None) -> str:
     return "—" if error is None else f"{100.0 * error:.3g} %"
 
 
+def saved(machine: "Machine", path: Path | None) -> None:
+    """Write a machine where that is asked for: as YAML, or as MJCF (.xml) or URDF (.urdf)."""
+    if path is None:
+        return
+    from rhythmid.body.write_back import save_machine
+
+    if left := save_machine(machine, path):
+        typer.echo(f"{path}: cannot express {', '.join(left)}; a .yaml can")
+
+
 def identify_files(
     bags: Sequence[Path],
     model: Path,
@@ -142,8 +151,7 @@ def identify_files(
     show_identification(found, Console())
     if json is not None:
         write_json(json, found.to_dict())
-    if save_model is not None:
-        found.machine.save(save_model)
+    saved(found.machine, save_model)
 
 
 def show_identification(found: "MachineIdentification", console: Console) -> None:

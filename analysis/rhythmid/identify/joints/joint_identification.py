@@ -6,6 +6,7 @@ the machine also runs free over the stretches of the records, and the paths' par
 inverse dynamics being what is known before.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -99,7 +100,10 @@ def identify_machine(
     correlations: dict[str, float] = {}
     errors: dict[str, float] = {}
     identified = machine
-    rotors = {joint: _rotor_freed(model) for joint, model in balances.models.items()}
+    rotors = {
+        joint: rotor_freed(model, machine.body.parameters[f"{joint}.armature"])
+        for joint, model in balances.models.items()
+    }
     balances = replace(balances, models=rotors)
     common = reference_delay(balances, balances.computed) if balances.computed else None
     for joint in machine.joints:
@@ -143,9 +147,10 @@ def _split(records: Sequence[JointRecord]) -> tuple[list[JointRecord], list[Join
     )
 
 
-def _rotor_freed(model: Model) -> Model:
-    """The path with the rotor's inertia free: what the body says of it is a guess."""
-    return replace(model, mass=replace(model.mass, fixed=False))
+def rotor_freed(model: Model, armature: float) -> Model:
+    """The path with the rotor's inertia free, but not negative: what the body says of it is a guess."""
+    least = max(model.mass.value - armature, 0.0)
+    return replace(model, mass=replace(model.mass, fixed=False, bounds=(least, math.inf)))
 
 
 def _with_fit(

@@ -7,6 +7,7 @@ parameters). So each joint is balanced as the one of a machine of one axis, with
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,24 @@ Array = NDArray[np.float64]
 # periods of the cut-off at both ends of a stretch, in which a filter that begins there errs by several times the noise (measured on
 # flights between contacts)
 CLEAR = 1.5
+SHORT = 400  # samples of a stretch, up to which its filter is a matrix
 SAME_CLOCK = 1e-3  # of a sample: by how much motion and an effort that was made from it may be out
 FAINT = 1e-3  # of a joint's effort, below which what a link does to it is not looked at
+
+
+class JointBalance(Balance):
+    """A balance of many short stretches: the filter of each length is a matrix that is made once."""
+
+    def filtered(self, signal: Array, period: float) -> Array:
+        if len(signal) > SHORT:
+            return super().filtered(signal, period)
+        return _filter(len(signal), period, self.bandwidth.effort) @ signal
+
+
+@lru_cache(maxsize=512)
+def _filter(length: int, period: float, frequency: float) -> Array:
+    """The zero-phase low-pass as a matrix (length, length)."""
+    return np.ascontiguousarray(low_pass(np.eye(length), period, frequency))
 
 
 def nothing(t):
@@ -130,13 +147,14 @@ class JointBalances:
                 replace(motion, effort=controller_effort(model, joint, motion, body, late))
                 for motion, body in zip(motions, self.bodies, strict=True)
             ]
-        return Balance.of_motions(motions, self.bandwidths[joint], period, CLEAR)
+        return JointBalance.of_motions(motions, self.bandwidths[joint], period, CLEAR)
 
 
 def controller_effort(model: Model, joint: str, motion: Motion, body: BodyMotion, late: float) -> Array:
     """Force (n,) that a controller with known gains has asked for."""
     stretch = body.stretch
-    asked = np.interp(stretch.time - late, stretch.time, stretch.reference[joint])
+    held = 0.5 * stretch.period  # what is held from sample to sample is on average so much older
+    asked = np.interp(stretch.time - late - held, stretch.time, stretch.reference[joint])
     asked = low_pass(asked, stretch.period, 1.0 / (FINER * stretch.period * body.every))[:: body.every]
     total = np.zeros(len(motion.time))
     for term in model.terms:
