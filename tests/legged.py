@@ -17,6 +17,20 @@ MODELS = Path(str(files("rhythmid"))) / "models" / "legs"
 Array = NDArray[np.float64]
 
 
+def fixed_leg(folder: Path) -> Path:
+    """Files of the leg with its trunk held fast, in the air; the model's."""
+    text = (MODELS / "leg.xml").read_text()
+    rail = text[text.index('<joint name="rail"') :]
+    (folder / "leg.xml").write_text(text.replace(rail[: rail.index(">") + 1], ""))
+    body = (
+        (MODELS / "leg.yaml").read_text().replace("base: rail, step: 0.0005", "step: 0.001, contacts: false")
+    )
+    (folder / "leg.yaml").write_text(body)
+    xml = (folder / "leg.xml").read_text()
+    (folder / "leg.xml").write_text(xml.replace('<keyframe><key qpos="0.42 0.6 -1.2"/></keyframe>', ""))
+    return folder / "leg.yaml"
+
+
 def multisine(time: Array, rng: np.random.Generator, low: float, high: float, count: int = 6) -> Array:
     """A sum of sines of random phases, of unit rms."""
     frequency = np.linspace(low, high, count) * (1.0 + 0.05 * rng.normal(size=count))

@@ -21,10 +21,12 @@ from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.joints.joint_motion import BodyMotion, JointBalances
 from rhythmid.record.joint_record import JointRecord
-from rhythmid.simulation.signal import continuous
+from rhythmid.record.record import Channel
+from rhythmid.simulation.signal import Hold, continuous
 
 Array = NDArray[np.float64]
 DIFFERENCE = 1e-3  # of a parameter's spread: step of its finite difference
+BEFORE = 1.0  # [s] for which a command is taken to have had its first value, longer than any delay
 DIVERGED = 10.0  # times the motion, the error that a run counts for which diverges
 TRIALS = 8  # runs of the whole with other parameters, at most
 
@@ -59,10 +61,16 @@ def commands(machine: Machine, record: JointRecord) -> tuple[dict[str, PPoly], d
         if not closed and given is None:
             given = one.effort
         if given is not None:
-            drives[joint] = continuous(given.time, given.value, "zero" if closed else one.hold)
+            drives[joint] = _signal(given, "zero" if closed else one.hold)
         if closed and one.forcing is not None:
-            forward[joint] = continuous(one.forcing.time, one.forcing.value, "linear")
+            forward[joint] = _signal(one.forcing, "linear")
     return drives, forward
+
+
+def _signal(channel: Channel, hold: Hold) -> PPoly:
+    """A channel as a signal that had its first value before it was recorded: what is late begins with it, too."""
+    time = np.concatenate([[channel.time[0] - BEFORE], channel.time])
+    return continuous(time, np.concatenate([channel.value[:1], channel.value]), hold)
 
 
 def errors_of(machine: Machine, balances: JointBalances, records: Sequence[JointRecord]) -> Array:
