@@ -21,7 +21,7 @@ from rhythmid.identify.identify import paper_hopper
 from rhythmid.identify.monte_carlo import noisy
 from rhythmid.ltp.htf import linearised
 from rhythmid.ltp.nonparametric import harmonic_transfer_functions
-from rhythmid.ltp.number_of_harmonics import FALSE_ALARM
+from rhythmid.ltp.number_of_harmonics import TOO_LARGE
 from rhythmid.ltp.pumping import pumping_of
 from rhythmid.ltp.spectra import spectra
 from rhythmid.parallel import fork_map
@@ -117,7 +117,7 @@ def false_alarms(runs: int) -> None:
         )
         wrong += max(found.harmonics) > 0
     print(
-        f"\nrecords of G_0 and noise: harmonics found in {wrong} of {runs}, promised {FALSE_ALARM:.0%} at most"
+        f"\nrecords of G_0 and noise: harmonics found in {wrong} of {runs}, promised {TOO_LARGE:.0%} at most"
     )
 
 

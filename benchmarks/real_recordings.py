@@ -30,6 +30,8 @@ from bench_case import Case
 from cluttered_machines import cluttered_cases
 from recording_sets import real_cases
 
+from rhythmid.elements.catalogue import load_catalogue
+
 HEADS = (
     "set",
     "records",
@@ -159,7 +161,8 @@ def table(rows: Iterable[Row], markdown: bool = False) -> str:
 
 
 def mirrored(rows: Sequence[Row]) -> list[str]:
-    """Whether the left and right joints of a quadruped get the same dominant name."""
+    """Whether the left and right joints of a quadruped get dominant names of the same family."""
+    catalogue = load_catalogue()
     first = {
         row.case.removeprefix("go2 "): row.names[0][0] if row.names else row.verdict
         for row in rows
@@ -169,7 +172,10 @@ def mirrored(rows: Sequence[Row]) -> list[str]:
     for left, name in first.items():
         right = left.replace("L_", "R_", 1)
         if "L_" in left and right in first:
-            verb = "agree" if name == first[right] else "differ"
+            families = {
+                catalogue[one].family or one if one in catalogue else one for one in (name, first[right])
+            }
+            verb = "agree" if len(families) == 1 else "differ"
             lines.append(f"{left} and {right} {verb}: {name}, {first[right]}")
     return lines
 

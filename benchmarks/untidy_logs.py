@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from bench_case import Array, write_table
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.elements.catalogue import load_catalogue
@@ -31,6 +32,7 @@ from rhythmid.simulation.signal import zero_order_hold
 from rhythmid.simulation.simulate import simulate
 
 ARRIVAL = (2e-4, 6e-4)  # s by which commands are late under `command_jitter`
+STAMPED = 0.3  # standard deviation of what the stamps are out by under `stamp_jitter`, in sample periods
 IRREGULAR = 0.15  # standard deviation of the times under `jittered`, in sample periods
 SETTLED = 2.0  # s of the run before the table begins
 Table = dict[str, Array]  # the columns t [s], u, y of equal length
@@ -173,6 +175,13 @@ def rounded(rng: np.random.Generator, table: Table) -> Table:
     return table | {"y": y}
 
 
+def stamps_out(rng: np.random.Generator, table: Table) -> Table:
+    """Positions whose stamps do not say when they were taken: each is that of another time than the row's, by at most a period."""
+    t, period = table["t"], float(np.median(np.diff(table["t"])))
+    late = np.clip(STAMPED * period * rng.standard_normal(len(t)), -period, period)
+    return table | {"y": CubicSpline(t, table["y"])(np.clip(t + late, t[0], t[-1]))}
+
+
 FAULTS: dict[str, Fault] = {
     "clean": lambda rng, table: table,
     "few_lost": few_lost,
@@ -184,6 +193,7 @@ FAULTS: dict[str, Fault] = {
     "reordered": reordered,
     "jittered": lambda rng, table: table,  # made by the simulation
     "rounded": rounded,
+    "stamp_jitter": stamps_out,
     "command_jitter": lambda rng, table: table,  # made by the simulation
 }
 

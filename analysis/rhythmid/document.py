@@ -1,7 +1,6 @@
 """A YAML document that remembers where each value stands, so that a complaint can name file and line."""
 
-import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -10,6 +9,12 @@ from typing import Any, NoReturn
 import yaml
 
 from rhythmid.errors import InputError
+
+LARGEST = (
+    4 << 20
+)  # characters of a document: a minute's reading; the largest that are written have some thousands
+MOST_VALUES = 200_000  # of a document, those that aliases repeat counted each time: a few lines of them stand for billions
+LONGEST_PATH = 1024  # characters; as long as YAML lets a plain key be
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,14 @@ class Node:
             return [node.plain for node in self.value]
         return self.value
 
+    def at(self, key: str | int) -> "Node":
+        """What stands at a key or an index, the node itself where nothing does."""
+        if isinstance(self.value, dict) and key in self.value:
+            return self.value[key]
+        if isinstance(self.value, list) and isinstance(key, int) and key < len(self.value):
+            return self.value[key]
+        return self
+
     def mapping(self, known: Iterable[str] | None = None) -> "dict[str, Node]":
         """The value as a mapping; with `known`, any other key is refused."""
         if not isinstance(self.value, dict):
@@ -41,10 +54,7 @@ class Node:
             known = list(known)
             for key, node in self.value.items():
                 if key not in known:
-                    near = get_close_matches(str(key), known, 1)
-                    node.fail(
-                        f"unknown key; {f'did you mean {near[0]!r}?' if near else 'known: ' + ', '.join(known)}"
-                    )
+                    node.fail(unknown_key(str(key), known))
         return self.value
 
     def items(self) -> "list[Node]":
@@ -55,48 +65,39 @@ class Node:
             self.fail("a list (- item) is expected here")
         return self.value
 
-    def number(self, low: float = -math.inf, high: float = math.inf, finite: bool = True) -> float:
-        """The value as a number within [low, high]; `finite=False` allows infinity, for the ends of a range."""
-        if not isinstance(self.value, (int, float, str)) or isinstance(self.value, bool):
-            self.fail(f"a number is expected, not {self.plain!r}")
-        try:
-            value = float(self.value)  # YAML 1.1 reads 1e-3 as text
-        except (ValueError, OverflowError):
-            self.fail(f"a number is expected, not {self.value!r}")
-        if math.isnan(value):
-            self.fail("is not a number (NaN)")
-        if finite and math.isinf(value):
-            self.fail("must be finite")
-        if not low <= value <= high:
-            self.fail(f"{value:g} is outside [{low:g}, {high:g}]")
-        return value
 
-    def whole(self, low: int, high: int) -> int:
-        """The value as a whole number within [low, high]."""
-        value = self.number(low, high)
-        if value != int(value):
-            self.fail(f"a whole number is expected, not {value:g}")
-        return int(value)
+def unknown_key(key: str, known: Sequence[str]) -> str:
+    """What to say of a key that is not among those known."""
+    near = get_close_matches(key, known, 1)
+    return f"unknown key; {f'did you mean {near[0]!r}?' if near else 'known: ' + ', '.join(known)}"
 
-    def text(self) -> str:
-        """The value as text."""
-        if not isinstance(self.value, str):
-            self.fail(f"text is expected, not {self.plain!r}")
-        return self.value
 
-    def choice(self, choices: Iterable[str]) -> str:
-        """The value as one of `choices`."""
-        if self.value not in (choices := list(choices)):
-            self.fail(f"{self.plain!r} is none of {', '.join(choices)}")
-        return self.value
+def as_node(plain: Any, name: str, path: str = "") -> Node:
+    """A value that was no document, such as a parameter in JSON, as if one held it; `name` stands for its place."""
+    if isinstance(plain, Mapping):
+        held = {str(k): as_node(v, name, f"{path}.{k}" if path else str(k)) for k, v in plain.items()}
+        return Node(held, name, path)
+    if isinstance(plain, (list, tuple)):
+        return Node([as_node(item, name, f"{path}[{i}]") for i, item in enumerate(plain)], name, path)
+    return Node(plain, name, path)
 
 
 def _node(
-    raw: yaml.Node | None, name: str, path: str, loader: yaml.SafeLoader, line: int | None = None
+    raw: yaml.Node | None,
+    name: str,
+    path: str,
+    loader: yaml.SafeLoader,
+    left: Iterator[int],
+    line: int | None = None,
 ) -> Node:
-    """`line` is where the key of this value stands: the value itself may begin further down."""
+    """`line` is where the key of this value stands: the value itself may begin further down. `left` counts down the values
+    that the document may still hold."""
     if raw is None:
         return Node(None, name, path)
+    if len(path) > LONGEST_PATH:
+        raise InputError(f"{name}: is nested too deeply, or has a key of more than {LONGEST_PATH} characters")
+    if next(left, None) is None:
+        raise InputError(f"{name}: holds more than {MOST_VALUES} values, those of aliases included")
     place = f"{name}:{(raw.start_mark.line if line is None else line) + 1}"
     if isinstance(raw, yaml.MappingNode):
         found: dict[str, Node] = {}
@@ -105,7 +106,7 @@ def _node(
                 raise InputError(f"{name}:{key_node.start_mark.line + 1}: a key is a single word")
             key = str(key_node.value)
             inner = _node(
-                value_node, name, f"{path}.{key}" if path else key, loader, key_node.start_mark.line
+                value_node, name, f"{path}.{key}" if path else key, loader, left, key_node.start_mark.line
             )
             if key in found:
                 inner.fail("is given twice")
@@ -113,20 +114,24 @@ def _node(
         return Node(found, place, path)
     if isinstance(raw, yaml.SequenceNode):
         return Node(
-            [_node(item, name, f"{path}[{i}]", loader) for i, item in enumerate(raw.value)], place, path
+            [_node(item, name, f"{path}[{i}]", loader, left) for i, item in enumerate(raw.value)], place, path
         )
     try:
         return Node(loader.construct_object(raw), place, path)
     except ValueError as error:  # a date that does not exist, say
         raise InputError(f"{place}: {path}: {error}") from None
+    except (LookupError, AttributeError, TypeError, OverflowError):
+        raise InputError(f"{place}: {path}: {raw.value!r} is no {raw.tag.rsplit(':', 1)[-1]}") from None
 
 
 def parse(text: str, name: str) -> Node:
     """The document in `text`; `name` stands for it in messages. Raises InputError when it is not YAML."""
+    if len(text) > LARGEST:
+        raise InputError(f"{name}: is too large: {len(text)} characters, {LARGEST} are the most")
     try:
         loader = yaml.SafeLoader(text)
         try:
-            return _node(loader.get_single_node(), name, "", loader)
+            return _node(loader.get_single_node(), name, "", loader, iter(range(MOST_VALUES)))
         finally:
             loader.dispose()
     except yaml.YAMLError as error:
@@ -141,7 +146,8 @@ def parse(text: str, name: str) -> Node:
 def read(path: str | Path) -> Node:
     """The document in the file `path`. Raises InputError when it cannot be read or is not YAML."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        with Path(path).open(encoding="utf-8") as file:
+            text = file.read(LARGEST + 1)
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "is not a text file"
         raise InputError(f"{path}: cannot be read: {reason}") from None

@@ -4,27 +4,28 @@
 function that turns it into nodes with parameters; `perform` is the same run without ROS.
 """
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, Field, TypeAdapter
 
 from rhythmid.document import Node, parse, read
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.excitation.excitation import Excitation
-from rhythmid.excitation.sequence import build
+from rhythmid.excitation.sequence import IN_FOLDER, AnyExcitation
 from rhythmid.model import Model
 from rhythmid.record.messages import Messages
-from rhythmid.settings import Delay, Forcing, Noise, Recording, Safety, TimeMode
+from rhythmid.settings import KEYS, Delay, Forcing, Noise, Recording, Safety, TimeMode
+from rhythmid.validation import ByShape, InKeys, Number, Plain, Whole, validated
 
-TOPICS = ("excitation", "command", "forcing", "plant/joint_states", "joint_states", "run", "diagnostics")
-LONGEST = 50_000_000  # samples of an offline run: 14 hours at 1 kHz, a few gigabytes
+LONGEST_DELAY = 10.0  # [s]; a longer one is given in another unit
+LONGEST_RUN = 50_000_000  # samples of an offline run: 14 hours at 1 kHz, a few gigabytes
 
 
 @dataclass(frozen=True)
@@ -167,6 +168,8 @@ class Experiment:
                     "seed": self.seed,
                     "initial": [] if self.initial is None else list(self.initial),
                     "consumers": sinks,
+                    "max_effort": self.safety.max_effort,
+                    "command_timeout": self.safety.command_timeout,
                 },
             ),
             injector("command_delay", "excitation", "command", self.input_delay),
@@ -182,6 +185,9 @@ class Experiment:
                     "ramp": self.safety.ramp,
                     "stale_after": self.safety.stale_after,
                     "envelope": [low, high],
+                    "max_speed": self.safety.max_speed,
+                    "frozen_after": self.safety.frozen_after,
+                    "max_gap": self.safety.max_gap,
                     "run": _json(self.description()),
                     "subscribers": 1 + ("excitation" in self.record.topics),
                     "consumers": ["plant", *sinks],
@@ -221,13 +227,13 @@ def perform(experiment: Experiment) -> dict[str, Messages]:
 
     Equals the graph's lockstep run, sample by sample and stamp by stamp. Raises InputError for a run too long to keep.
     """
-    from rhythmid.simulation.plant import (
-        Plant,  # the compiler behind it is slow to load, and most nodes need no plant
-    )
+    # the compiler behind the plant is slow to load, and most nodes need no plant
+    from rhythmid.simulation.command_hold import RAMP, CommandHold
+    from rhythmid.simulation.plant import Plant
 
-    if experiment.count > LONGEST:
+    if experiment.count > LONGEST_RUN:
         raise InputError(
-            f"{experiment.count} samples are too many to simulate at once; the limit is {LONGEST}"
+            f"{experiment.count} samples are too many to simulate at once; the limit is {LONGEST_RUN}"
         )
     period = experiment.time.period_ns
     stamps = np.arange(experiment.count, dtype=np.int64) * period
@@ -235,7 +241,7 @@ def perform(experiment: Experiment) -> dict[str, Messages]:
     effort = ramped(experiment.excitation, experiment.safety, time, experiment.count * period * 1e-9)
     arrival = experiment.input_delay.release(stamps)
     plant = Plant(experiment.plant_model, period, experiment.seed, experiment.initial)
-    plant.push_many(arrival, effort)
+    plant.push_many(*CommandHold(experiment.safety.command_timeout, RAMP, period).fill(arrival, effort))
     samples = plant.advance(int(stamps[-1]))
     seen = experiment.measurement_delay.release(stamps)
     return {
@@ -251,143 +257,126 @@ def perform(experiment: Experiment) -> dict[str, Messages]:
     }
 
 
-def _delay(node: Node | None, folder: Path) -> Delay:
-    if node is None:
-        return Delay()
-    if isinstance(node.value, dict):
-        keys = node.mapping(["profile"])
-        if "profile" not in keys:
-            node.fail("a delay [s] or {profile: file.csv} is expected")
-        delay = Delay(profile=folder / keys["profile"].text())
+def _of_seconds(value: float) -> float:
+    if not 0.0 <= value <= LONGEST_DELAY:
+        raise ValueError(
+            f"{value:g} s is outside [0, {LONGEST_DELAY:g}]; a delay is in seconds and cannot be negative"
+        )
+    return value
+
+
+def _settled(word: str) -> str:
+    if word != "limit_cycle":
+        raise ValueError("limit_cycle or {position: …, velocity: …} is expected")
+    return word
+
+
+def _of_topic(namespace: str) -> str:
+    if not re.fullmatch(r"(/[A-Za-z_]\w*)+", namespace, re.ASCII):
+        raise ValueError(f"{namespace!r} is no namespace; write one like /hopper or /lab/hopper")
+    return namespace
+
+
+@dataclass(frozen=True)
+class _Profile:
+    __pydantic_config__ = KEYS
+    profile: Path
+
+
+AnyDelay = Annotated[
+    Annotated[_Profile, InKeys] | Annotated[Number, AfterValidator(_of_seconds), Plain], ByShape
+]
+
+
+@dataclass(frozen=True)
+class _Delays:
+    __pydantic_config__ = KEYS
+    input: AnyDelay | None = None
+    measurement: AnyDelay | None = None
+
+
+@dataclass(frozen=True)
+class _Start:
+    __pydantic_config__ = KEYS
+    position: Number = 0.0
+    velocity: Number = 0.0
+
+
+@dataclass(frozen=True)
+class _Document:
+    """experiment.yaml as it is written."""
+
+    __pydantic_config__ = KEYS
+    excitation: AnyExcitation
+    model: str | None = None
+    forcing: Forcing | None = None
+    delays: _Delays = _Delays()
+    noise: Noise = Noise()
+    time: TimeMode = TimeMode()
+    duration: Annotated[Number, Field(ge=1e-6, le=1e6)] | None = None
+    seed: Annotated[Whole, Field(ge=0, le=2**31 - 1)] = 0
+    initial: Annotated[
+        Annotated[_Start, InKeys] | Annotated[str, AfterValidator(_settled), Plain], ByShape
+    ] = "limit_cycle"
+    safety: Safety = Safety()
+    record: Recording = Recording()
+    namespace: Annotated[str, AfterValidator(_of_topic)] = "/hopper"
+    joint: str = "leg"
+    elements: tuple[Path, ...] = ()
+
+
+_DOCUMENT: TypeAdapter[_Document] = TypeAdapter(_Document)
+
+
+def _delay(given: _Profile | float | None, model: Model, label: str, folder: Path) -> Delay:
+    """The delay as it is given, else the model's."""
+    if given is None:
+        term = model.term(label)
+        return Delay() if term is None else Delay(term.values["delay"].value)
+    if isinstance(given, _Profile):
+        delay = Delay(profile=folder / given.profile)
         delay.table()
         return delay
-    value = node.number()
-    if not 0.0 <= value <= 10.0:
-        node.fail(f"{value:g} s is outside [0, 10]; a delay is in seconds and cannot be negative")
-    return Delay(value)
+    return Delay(given)
 
 
-def _numbers(node: Node | None, **limits: tuple[float, float]) -> dict[str, float]:
-    """Keys of `node` as numbers within their limits; no other keys are allowed."""
-    if node is None:
-        return {}
-    keys = node.mapping(list(limits))
-    return {name: child.number(*limits[name]) for name, child in keys.items()}
+def _forcing(given: Forcing | None, model: Model) -> tuple[Forcing, Model]:
+    """The forcing as it is given, else the model's; and the model without its own."""
+    term = model.term("periodic_forcing")
+    if term is None or given is not None:
+        return given or Forcing(), model if term is None else model.without("periodic_forcing")
+    return Forcing(**{name: value.value for name, value in term.values.items()}), model
 
 
 def _experiment(
     document: Node, folder: Path, elements: tuple[Path, ...], instead: str | Path | None = None
 ) -> Experiment:
-    keys = document.mapping(
-        ["model", "excitation", "forcing", "delays", "noise", "time", "duration", "seed", "initial", "safety",
-         "record", "namespace", "joint", "elements"]
-    )  # fmt: skip
-    for name in ("model", "excitation"):
-        if name not in keys and not (name == "model" and instead):
-            document.fail(f"'{name}:' is missing")
-    if "elements" in keys:
-        elements = (*elements, *(folder / item.text() for item in keys["elements"].items()))
-    catalogue = load_catalogue(elements)
+    given = validated(document, _DOCUMENT, {IN_FOLDER: folder})
+    elements = (*elements, *(folder / path for path in given.elements))
     if instead is not None:
         model_path = Path(instead)
+    elif given.model is None:
+        document.fail("'model:' is missing")
     else:
-        model_path = folder / keys["model"].text()
+        model_path = folder / given.model
         if not model_path.is_file():
-            keys["model"].fail(f"no such file: {model_path}")
-    model = Model.load(model_path, catalogue)
-    spec = keys["excitation"].plain
-    if not isinstance(spec, dict):
-        keys["excitation"].fail("a mapping with a 'type' is expected")
+            document.at("model").fail(f"no such file: {model_path}")
+    model = Model.load(model_path, load_catalogue(elements))
+    place = document.at("excitation")
     try:
-        excitation = build(spec, folder)
+        duration = given.excitation.duration  # reads the table of samples
     except InputError as error:
-        raise InputError(f"{keys['excitation'].place}: {error}") from None
-    far = (-math.inf, math.inf)
-    forcing = Forcing(**_numbers(keys.get("forcing"), amplitude=far, frequency=(1e-6, 1e6), phase=far))
-    if "forcing" not in keys and model.term("periodic_forcing") is not None:
-        term = model.term("periodic_forcing")
-        assert term is not None
-        forcing = Forcing(**{name: value.value for name, value in term.values.items()})
-    elif model.term("periodic_forcing") is not None:
-        model = model.without("periodic_forcing")
-    delays = keys["delays"].mapping(["input", "measurement"]) if "delays" in keys else {}
-    nodes_delay = {name: _delay(delays.get(name), folder) for name in ("input", "measurement")}
-    for name, label in (("input", "input_delay"), ("measurement", "measurement_delay")):
-        if name not in delays and (term := model.term(label)) is not None:
-            nodes_delay[name] = Delay(term.values["delay"].value)
-    noise = Noise(
-        **_numbers(keys.get("noise"), measurement_std=(0, math.inf), correlation=(0, 0.9999),
-                   quantisation=(0, math.inf))
-    )  # fmt: skip
-    time = _time(keys.get("time"))
-    duration = keys["duration"].number(1e-6, 1e6) if "duration" in keys else excitation.duration
-    initial = None
-    if "initial" in keys and keys["initial"].value != "limit_cycle":
-        if not isinstance(keys["initial"].value, dict):
-            keys["initial"].fail("limit_cycle or {position: …, velocity: …} is expected")
-        given = keys["initial"].mapping(["position", "velocity"])
-        initial = (
-            given["position"].number() if "position" in given else 0.0,
-            given["velocity"].number() if "velocity" in given else 0.0,
+        place.fail(str(error))
+    forcing, model = _forcing(given.forcing, model)
+    if given.excitation.peak > given.safety.max_effort:
+        place.fail(
+            f"its peak of {given.excitation.peak:g} N exceeds safety.max_effort = {given.safety.max_effort:g} N"
         )
-    seed = keys["seed"].whole(0, 2**31 - 1) if "seed" in keys else 0
-    namespace = keys["namespace"].text() if "namespace" in keys else "/hopper"
-    if not re.fullmatch(r"(/[A-Za-z_]\w*)+", namespace, re.ASCII):
-        keys["namespace"].fail(f"{namespace!r} is no namespace; write one like /hopper or /lab/hopper")
-    experiment = Experiment(
-        model, model_path, excitation, spec, forcing, nodes_delay["input"], nodes_delay["measurement"], noise, time,
-        duration, seed, initial, _safety(keys.get("safety")), _recording(keys.get("record")), namespace,
-        keys["joint"].text() if "joint" in keys else "leg", folder, elements,
+    return Experiment(
+        model, model_path, given.excitation, place.plain, forcing,
+        _delay(given.delays.input, model, "input_delay", folder),
+        _delay(given.delays.measurement, model, "measurement_delay", folder),
+        given.noise, given.time, duration if given.duration is None else given.duration, given.seed,
+        None if isinstance(given.initial, str) else (given.initial.position, given.initial.velocity),
+        given.safety, given.record, given.namespace, given.joint, folder, elements,
     )  # fmt: skip
-    if excitation.peak > experiment.safety.max_effort:
-        keys["excitation"].fail(
-            f"its peak of {excitation.peak:g} N exceeds safety.max_effort = {experiment.safety.max_effort:g} N"
-        )
-    return experiment
-
-
-def _time(node: Node | None) -> TimeMode:
-    if node is None:
-        return TimeMode()
-    keys = node.mapping(["mode", "rate", "window", "layout"])
-    made: dict[str, Any] = {}
-    if "mode" in keys:
-        made["mode"] = keys["mode"].choice(["lockstep", "realtime"])
-    if "layout" in keys:
-        made["layout"] = keys["layout"].choice(["composed", "processes"])
-    if "rate" in keys:
-        made["rate"] = keys["rate"].whole(1, 100_000)
-    if "window" in keys:
-        made["window"] = keys["window"].whole(1, 100)
-    return TimeMode(**made)
-
-
-def _safety(node: Node | None) -> Safety:
-    if node is None:
-        return Safety()
-    keys = node.mapping(["max_effort", "ramp", "stale_after", "envelope"])
-    made: dict[str, Any] = {
-        name: keys[name].number(low=low)
-        for name, low in (("max_effort", 0.0), ("ramp", 0.0), ("stale_after", 1e-3))
-        if name in keys
-    }
-    if "envelope" in keys:
-        ends = [end.number(finite=False) for end in keys["envelope"].items()]
-        if len(ends) != 2 or not ends[0] < ends[1]:
-            keys["envelope"].fail("two positions [low, high] in m are expected, low < high")
-        made["envelope"] = (ends[0], ends[1])
-    return Safety(**made)
-
-
-def _recording(node: Node | None) -> Recording:
-    if node is None:
-        return Recording()
-    keys = node.mapping(["path", "storage", "topics"])
-    made: dict[str, Any] = {}
-    if "path" in keys:
-        made["path"] = Path(keys["path"].text())
-    if "storage" in keys:
-        made["storage"] = keys["storage"].choice(["mcap", "sqlite3"])
-    if "topics" in keys:
-        made["topics"] = tuple(item.choice(TOPICS) for item in keys["topics"].items())
-    return Recording(**made)

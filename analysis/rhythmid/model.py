@@ -5,9 +5,10 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any
 
 import yaml
+from pydantic import ConfigDict, Field, StrictBool, TypeAdapter
 
 from rhythmid.document import Node, parse, read
 from rhythmid.elements.candidates import Setting
@@ -16,6 +17,7 @@ from rhythmid.elements.element import SLOTS, Against, Element, Parameter
 from rhythmid.errors import InputError
 from rhythmid.output import write_text
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
+from rhythmid.validation import NUMBER, Number, Range, Word, validated
 
 INERTIA = "inertia.mass"
 CONTROLLER = "position_control"  # what an element that acts on a controller's measurements asks for where there is none
@@ -26,8 +28,9 @@ MASS = Parameter("mass", "kg", "inertia", bounds=(0.0, math.inf))
 class Prior:
     """Gaussian knowledge of a parameter before the data."""
 
-    mean: float
-    std: float
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    mean: Number
+    std: Annotated[Number, Field(gt=0)]
 
 
 @dataclass(frozen=True)
@@ -66,12 +69,17 @@ class Model:
     @classmethod
     def load(cls, path: str | Path, catalogue: Catalogue | None = None) -> "Model":
         """The model in a YAML file. Raises InputError naming line, parameter and unit of what is wrong."""
-        return model_of(read(path), load_catalogue() if catalogue is None else catalogue)
+        return cls.from_document(read(path), catalogue)
 
     @classmethod
     def from_text(cls, text: str, name: str = "model", catalogue: Catalogue | None = None) -> "Model":
         """The model in a YAML text; `name` stands for it in messages."""
-        return model_of(parse(text, name), load_catalogue() if catalogue is None else catalogue)
+        return cls.from_document(parse(text, name), catalogue)
+
+    @classmethod
+    def from_document(cls, document: Node, catalogue: Catalogue | None = None) -> "Model":
+        """The model in a document, or in a part of one."""
+        return _model(document, load_catalogue() if catalogue is None else catalogue)
 
     @property
     def parameters(self) -> dict[str, Value]:
@@ -243,60 +251,57 @@ def entry_of(value: Value, usual: Parameter) -> dict[str, Any]:
     return entry
 
 
+@dataclass(frozen=True)
+class _Entry:
+    """A parameter as it is written: {value: …, unit: …}."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    value: Number
+    unit: Word | None = None
+    fixed: StrictBool | None = None
+    bounds: Range | None = None
+    prior: Prior | None = None
+
+
+@dataclass(frozen=True)
+class _UnitNames:
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    force: str = "N"
+    position: str = "m"
+    mass: str | None = None
+
+
+_AGAINST: TypeAdapter[Against] = TypeAdapter(Against)
+_ENTRY: TypeAdapter[_Entry] = TypeAdapter(_Entry)
+_UNIT_NAMES: TypeAdapter[_UnitNames] = TypeAdapter(_UnitNames)
+
+
 def value_of(node: Node, parameter: Parameter, units: Units) -> Value:
     """Parameter from `{value: …, unit: …}` or from a bare number in the machine's own units."""
-    if not isinstance(node.value, dict):
-        value, unit, bounds, prior = node.number(), units.of(parameter.unit), parameter.bounds, None
-        fixed = parameter.fixed
-    else:
-        keys = node.mapping(["value", "unit", "fixed", "bounds", "prior"])
-        if "value" not in keys:
-            node.fail("has no value")
-        value = keys["value"].number()
-        unit = units.of(parameter.unit)
-        if "unit" in keys:
-            units.check(str(keys["unit"].value), parameter.unit, f"{keys['unit'].place}: {node.path}")
-        fixed = parameter.fixed
-        if "fixed" in keys:
-            if not isinstance(keys["fixed"].value, bool):
-                keys["fixed"].fail("is true or false")
-            fixed = keys["fixed"].value
-        bounds = parameter.bounds
-        if "bounds" in keys:
-            ends = [end.number(finite=False) for end in keys["bounds"].items()]
-            if len(ends) != 2 or not ends[0] < ends[1]:
-                keys["bounds"].fail("two numbers [low, high] are expected, low < high")
-            bounds = (max(ends[0], parameter.bounds[0]), min(ends[1], parameter.bounds[1]))
-        prior = None
-        if "prior" in keys:
-            inner = keys["prior"].mapping(["mean", "std"])
-            if set(inner) != {"mean", "std"}:
-                keys["prior"].fail("mean and std are both needed")
-            prior = Prior(inner["mean"].number(), inner["std"].number(low=1e-300))
-    if not bounds[0] <= value <= bounds[1]:
-        node.fail(f"{value:g} {unit} is outside [{bounds[0]:g}, {bounds[1]:g}] ({parameter.description})")
-    return Value(value, unit, fixed, bounds, prior)
+    whole = isinstance(node.value, dict)
+    given = validated(node, _ENTRY) if whole else _Entry(validated(node, NUMBER))
+    unit = units.of(parameter.unit)
+    if given.unit is not None:
+        units.check(given.unit, parameter.unit, f"{node.at('unit').place}: {node.path}")
+    low, high = parameter.bounds
+    if given.bounds is not None:
+        low, high = max(given.bounds[0], low), min(given.bounds[1], high)
+    if not low <= given.value <= high:
+        node.fail(f"{given.value:g} {unit} is outside [{low:g}, {high:g}] ({parameter.description})")
+    fixed = parameter.fixed if given.fixed is None else given.fixed
+    return Value(given.value, unit, fixed, (low, high), given.prior)
 
 
-def _units(document: dict[str, Node], mass: Node | None) -> Units:
+def _units(document: dict[str, Node], mass: Node) -> Units:
     if "units" in document:
-        given = document["units"].mapping(["force", "position", "mass"])
-        force = given["force"].text() if "force" in given else "N"
-        position = given["position"].text() if "position" in given else "m"
-        default = "kg" if (force, position) == ("N", "m") else f"{force}*s^2/{position}"
-        return Units(force, position, given["mass"].text() if "mass" in given else default)
-    unit = ""
-    if mass is not None and isinstance(mass.value, dict) and "unit" in mass.value:
-        unit = str(mass.value["unit"].value)
-    return (
-        ROTATIONAL
-        if re.sub(r"[ ·]", "", unit.replace("**", "^").replace("²", "^2"))
-        in (
-            "kg*m^2",
-            "kgm^2",
+        given = validated(document["units"], _UNIT_NAMES)
+        default = (
+            "kg" if (given.force, given.position) == ("N", "m") else f"{given.force}*s^2/{given.position}"
         )
-        else TRANSLATIONAL
-    )
+        return Units(given.force, given.position, default if given.mass is None else given.mass)
+    unit = str(mass.at("unit").value) if isinstance(mass.value, dict) and "unit" in mass.value else ""
+    plain = re.sub(r"[ ·]", "", unit.replace("**", "^").replace("²", "^2"))
+    return ROTATIONAL if plain in ("kg*m^2", "kgm^2") else TRANSLATIONAL
 
 
 def _term(item: Node, slot: str, catalogue: Catalogue, units: Units, taken: set[str]) -> Term:
@@ -314,7 +319,7 @@ def _term(item: Node, slot: str, catalogue: Catalogue, units: Units, taken: set[
     sides = ["against"] if element.against is not None else []
     given = {} if body.value is None else body.mapping([*names, *sides])
     if "against" in given:
-        element = element.acting_against(cast(Against, given["against"].choice(["base", "room"])))
+        element = element.acting_against(validated(given["against"], _AGAINST))
     values: dict[str, Value] = {}
     for parameter in element.parameters:
         if parameter.name in given:
@@ -338,8 +343,7 @@ def _named(item: Node, catalogue: Catalogue) -> Iterator[Element]:
         yield from (catalogue[str(name)] for name in item.value if str(name) in catalogue)
 
 
-def model_of(document: Node, catalogue: Catalogue) -> Model:
-    """The model that a document describes. Raises InputError naming line, parameter and unit of what is wrong."""
+def _model(document: Node, catalogue: Catalogue) -> Model:
     if document.value is None:
         raise InputError(f"{document.place}: the model file is empty")
     sections = document.mapping(["units", "inertia", *SLOTS])

@@ -9,6 +9,7 @@ import multiprocessing
 import multiprocessing.connection
 import os
 import pickle
+import signal
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
@@ -28,6 +29,7 @@ def _work(function: Callable[[Any], Any], items: Sequence[Any], own: Sequence[in
     # What was inherited is not this process's to collect: going through it would copy the parent's memory, and may
     # meet frames of threads that exist in the parent only.
     gc.freeze()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who interrupts means the parent, which ends its workers
     for index in own:
         try:
             answer = (index, function(items[index]), None)

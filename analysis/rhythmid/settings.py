@@ -3,22 +3,31 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from rhythmid.errors import InputError
 from rhythmid.time_table import read_time_table
+from rhythmid.validation import Number, Range, Whole
+
+Topic = Literal[
+    "excitation", "command", "forcing", "plant/joint_states", "joint_states", "run", "diagnostics"
+]
+KEYS = ConfigDict(extra="forbid")  # a key that is not known is a mistake
 
 
 @dataclass(frozen=True)
 class Forcing:
     """Periodic forcing amplitude [N] cos(2π frequency [Hz] t + phase [rad]); amplitude 0 switches it off."""
 
-    amplitude: float = 1.0
-    frequency: float = 1.0
-    phase: float = 0.0
+    __pydantic_config__ = KEYS
+
+    amplitude: Number = 1.0
+    frequency: Annotated[Number, Field(ge=1e-6, le=1e6)] = 1.0
+    phase: Number = 0.0
 
 
 @dataclass(frozen=True)
@@ -39,29 +48,38 @@ class Delay:
 
     def release(self, stamp_ns: NDArray[np.int64]) -> NDArray[np.int64]:
         """Stamps [ns] on release: stamp + delay, in order (nothing overtakes). Shapes (n,) -> (n,)."""
-        times, delays = self.table()
-        late = np.rint(np.interp(stamp_ns * 1e-9, times, delays) * 1e9).astype(np.int64)
-        released = stamp_ns + late
+        released = stamp_ns + profile_delay(stamp_ns, *self.table())
         order = np.arange(len(released), dtype=np.int64)
         return np.maximum.accumulate(released - order) + order
+
+
+def profile_delay(
+    since_ns: NDArray[np.int64] | int, times: NDArray[np.float64], delays: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Delay [ns] of what is stamped `since_ns` [ns] after the start, by a profile's corner times and delays [s]."""
+    return np.rint(np.interp(np.multiply(since_ns, 1e-9), times, delays) * 1e9).astype(np.int64)
 
 
 @dataclass(frozen=True)
 class Noise:
     """Measurement noise: standard deviation [m], correlation from sample to sample, rounding step [m] (0: none)."""
 
-    measurement_std: float = 0.0
-    correlation: float = 0.0
-    quantisation: float = 0.0
+    __pydantic_config__ = KEYS
+
+    measurement_std: Annotated[Number, Field(ge=0)] = 0.0
+    correlation: Annotated[Number, Field(ge=0, le=0.9999)] = 0.0
+    quantisation: Annotated[Number, Field(ge=0)] = 0.0
 
 
 @dataclass(frozen=True)
 class TimeMode:
     """`mode` lockstep (simulated time) or realtime; `rate` [Hz]; credit `window` [samples]; process `layout`."""
 
+    __pydantic_config__ = KEYS
+
     mode: Literal["lockstep", "realtime"] = "lockstep"
-    rate: int = 1000
-    window: int = 100
+    rate: Annotated[Whole, Field(ge=1, le=100_000)] = 1000
+    window: Annotated[Whole, Field(ge=1, le=100)] = 100
     layout: Literal["composed", "processes"] = "composed"
 
     @property
@@ -71,19 +89,33 @@ class TimeMode:
 
 @dataclass(frozen=True)
 class Safety:
-    """Limits of the excitation: largest effort [N], ramps in and out [s], age of the newest measurement [s] and
-    range of positions [m] beyond which it stops by itself."""
+    """Limits of a run. The effort never exceeds `max_effort` [N]; it fades in and out over `ramp` [s].
 
-    max_effort: float = 100.0
-    ramp: float = 0.0
-    stale_after: float = 0.5
-    envelope: tuple[float, float] = (-math.inf, math.inf)
+    The excitation stops by itself when the newest measurement is older than `stale_after` [s], two successive ones lie further apart
+    than `max_gap` [s] (0: as `stale_after`), the position leaves `envelope` [m] or does not change for `frozen_after` [s]
+    (0: never looked at), or the speed exceeds `max_speed` [m/s]. A command that nobody renews ends after `command_timeout` [s] (0: never).
+    """
+
+    __pydantic_config__ = KEYS
+
+    max_effort: Annotated[Number, Field(ge=0)] = 100.0
+    ramp: Annotated[Number, Field(ge=0)] = 0.0
+    stale_after: Annotated[Number, Field(ge=1e-3)] = 0.5
+    envelope: Range = (-math.inf, math.inf)
+    max_speed: Annotated[float, Field(ge=0)] = math.inf
+    frozen_after: Annotated[Number, Field(ge=0)] = 0.0
+    max_gap: Annotated[Number, Field(ge=0)] = 0.0
+    command_timeout: Annotated[Number, Field(ge=0)] = 0.1
 
 
 @dataclass(frozen=True)
 class Recording:
     """What is recorded, where and how."""
 
+    __pydantic_config__ = KEYS
+
     path: Path = Path("bag")
     storage: Literal["mcap", "sqlite3"] = "mcap"
-    topics: tuple[str, ...] = ("excitation", "joint_states", "forcing", "run")
+    topics: Annotated[tuple[Topic, ...], BeforeValidator(lambda given: given or ())] = (
+        "excitation", "joint_states", "forcing", "run",
+    )  # fmt: skip

@@ -172,12 +172,12 @@ def test_clipped_samples_are_left_out_and_counted(rubbing):
     assert len(said) == 2 and all(int(note.split(": ")[1].split()[0]) > 100 for note in said)
 
 
-@pytest.mark.parametrize("flaw", ["strays", "repeats"])
+@pytest.mark.parametrize("flaw", ["outliers", "repeats"])
 def test_a_sensors_flaws_do_not_pass_for_physics_and_are_told(rubbing, flaw):
     given = []
     for one in rubbing:
         value = one.output.value.copy()
-        if flaw == "strays":
+        if flaw == "outliers":
             value[500::700] += 0.5
         else:
             value = np.repeat(value[::5], 5)[: len(value)]
@@ -185,7 +185,7 @@ def test_a_sensors_flaws_do_not_pass_for_physics_and_are_told(rubbing, flaw):
     found = run(given)
     assert found.verdict == "missing_physics"
     assert [effect.element for effect in found.missing] == ["coulomb_friction"]
-    said = {"strays": "stand far off their neighbours", "repeats": "repeat the one before"}[flaw]
+    said = {"outliers": "stand far off their neighbours", "repeats": "repeat the one before"}[flaw]
     assert sum(said in note for note in found.notes) == len(rubbing)
 
 

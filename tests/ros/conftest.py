@@ -19,6 +19,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.utilities import try_shutdown
+from read_back import require_readable_by_others
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
@@ -165,3 +166,11 @@ def graph(domain: int, tmp_path: Path) -> Iterator[Graph]:
 def no_shared_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """For processes that are going to be killed: they would leave their shared memory behind."""
     monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
+
+
+@pytest.fixture(autouse=True)
+def every_bag_is_readable_by_others(tmp_path: Path) -> Iterator[None]:
+    """Whatever bag a test leaves, rosbags and mcap read every message of it."""
+    yield
+    for metadata in tmp_path.rglob("metadata.yaml"):
+        require_readable_by_others(metadata.parent)

@@ -5,12 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import String
 
 from rhythmid.errors import InputError
 from rhythmid.experiment import Delay
 from rhythmid_nodes.delay_injector import DelayInjector
+from rhythmid_nodes.joint_state import JointStateWriter
 from rhythmid_nodes.qos import latched, stream
 
 MS = 1_000_000
@@ -156,3 +158,27 @@ def test_a_profile_counts_from_the_start_of_the_run(graph, tmp_path: Path):
     send(graph.joint_state(sent, effort=1.0))
     graph.until(lambda: heard, "the message")
     assert stamp_ns(heard[0]) - sent < 150 * MS  # 200 ms before the start, nothing two seconds after it
+
+
+def test_bursts_that_overflow_the_queues_do_not_stop_it_and_what_is_lost_is_told(graph):
+    """The sender keeps the last 1000 messages only: of a larger burst the middleware loses some."""
+    process = graph.spawn("delay_injector", "delay_injector", REMAP)
+    heard, told = graph.listen("there"), graph.listen("/diagnostics", DiagnosticArray, latched())
+    send, sent, write = graph.talk("here"), 1, JointStateWriter("leg", "effort").write
+    send(write(time.time_ns(), 0.0))
+    graph.until(lambda: heard, "the first message, from which losses are counted")
+    while sent < 40_000 and (sent < 10_000 or sent == len(heard)):
+        before = len(heard)
+        for _ in range(2000):
+            send(write(time.time_ns(), float(sent)))
+            sent += 1
+        graph.until(lambda before=before: len(heard) > before, "a message of the burst")
+        graph.spin(0.3)
+    send(graph.joint_state(time.time_ns(), effort=float(sent)))
+    graph.until(lambda: heard[-1].effort[0] == sent, "the last message")
+
+    def figures():
+        return {pair.key: int(pair.value) for pair in told[-1].status[0].values if pair.value.isdigit()}
+
+    graph.until(lambda: figures()["relayed"] + figures()["lost"] == sent + 1, "figures that account for all")
+    assert process.returncode is None and figures()["dropped"] == 0

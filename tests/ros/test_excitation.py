@@ -5,7 +5,9 @@ import time
 
 import numpy as np
 import pytest
+from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray, String
 
 from rhythmid.errors import InputError
@@ -28,12 +30,13 @@ class Robot:
 
     def __init__(self, graph, qos=qos_profile_sensor_data):
         self.position = 0.15
+        self.offset_ns = 0
         self._graph = graph
         self._send = graph.talk("joint_states", qos=qos)
         self._timer = graph.probe.create_timer(0.005, self._measure)
 
     def _measure(self):
-        self._send(self._graph.joint_state(time.time_ns(), position=self.position))
+        self._send(self._graph.joint_state(time.time_ns() + self.offset_ns, position=self.position))
 
     def die(self):
         self._timer.cancel()
@@ -63,7 +66,7 @@ def last_state(run):
 
 
 def test_it_plays_the_experiments_samples_on_a_grid_without_gaps(graph, excite):
-    _, heard, run, _ = excite(CHIRP, ramp=0.1, count=500)
+    _, heard, run, _ = excite(CHIRP, ramp=0.1, count=500, catch_up=10.0)  # on a busy machine, too
     start(graph)
     graph.until(lambda: last_state(run).get("state") == "finished", "the end")
     graph.until(lambda: len(heard) == 501, "501 samples")
@@ -127,6 +130,61 @@ def test_leaving_the_envelope_stops_it(graph, excite, position):
     assert "envelope" in last_state(run)["reason"]
     graph.spin(0.1)
     assert heard[-1].effort[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("parameters", "fault", "said"),
+    [
+        ({}, {"offset_ns": -(10**9)}, "stamped 1."),
+        ({"max_gap": 0.1}, {"offset_ns": 2 * 10**8}, "step by 0.2"),
+        ({"frozen_after": 1.0}, {}, "exactly 0.15 m"),
+        ({"max_speed": 3.0}, {"position": 0.25}, "exceeds 3 m/s"),
+    ],
+)
+def test_measurements_that_cannot_be_trusted_stop_it_with_exit_code_1(graph, excite, parameters, fault, said):
+    node, heard, run, robot = excite(**parameters)
+    start(graph)
+    graph.until(lambda: len(heard) > 20, "samples")
+    for name, value in fault.items():
+        setattr(robot, name, value)
+    graph.until(lambda: last_state(run).get("state") == "stopped", "the stop")
+    assert said in last_state(run)["reason"] and said in node.tripped
+    graph.spin(0.05)
+    assert heard[-1].effort[0] == 0.0
+
+
+def test_it_stops_when_its_only_subscriber_leaves(graph):
+    node = graph.add(ExcitationNode, max_effort=1.0, excitation=json.dumps(CONSTANT))
+    run = graph.listen("run", String, latched())
+    listener = graph.probe.create_subscription(JointState, "excitation", lambda _: None, 10)
+    Robot(graph)
+    start(graph)
+    graph.until(lambda: int(node.figures()["sent"]) > 20, "samples")
+    graph.probe.destroy_subscription(listener)
+    graph.until(lambda: last_state(run).get("state") == "stopped", "the stop")
+    assert node.tripped == "0 of 1 subscribers of /hopper/excitation"
+
+
+def test_a_second_publisher_stops_it_and_is_named(graph, excite):
+    node, heard, run, _ = excite()
+    start(graph)
+    graph.until(lambda: len(heard) > 20, "samples")
+    publisher = graph.probe.create_publisher(JointState, "excitation", 10)
+    graph.until(lambda: last_state(run).get("state") == "stopped", "the stop")
+    assert "2 publishers of /hopper/excitation: /hopper/excitation, /hopper/probe" in node.tripped
+    answer = graph.call("excitation/start")
+    assert not answer.success and "2 publishers" in answer.message
+    graph.probe.destroy_publisher(publisher)
+    start(graph)
+    assert not node.tripped
+
+
+def test_two_graphs_in_one_domain_see_each_other(graph, excite, capfd):
+    node, *_ = excite()
+    other = Node("excitation", namespace="/lab/other")
+    graph.until(lambda: node.figures()["other_graphs"] == "/lab/other", "the other graph")
+    other.destroy_node()
+    assert "another graph is in this DDS domain: /lab/other" in capfd.readouterr().err
 
 
 def test_the_stop_service_fades_out_and_start_plays_anew(graph, excite):

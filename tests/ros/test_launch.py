@@ -1,4 +1,4 @@
-"""The launch file says the same nodes as the experiment; ROS's launch itself is not to be had from PyPI: a stand-in."""
+"""The launch file says the same nodes as the experiment; ROS's launch itself is not available from PyPI: a substitute."""
 
 import importlib.util
 import sys
@@ -29,10 +29,12 @@ class Configuration(Action):
 
 @pytest.fixture
 def launch_file(monkeypatch):
-    """The launch file as a module, with stand-ins for `launch` and `launch_ros`."""
+    """The launch file as a module, with substitutes for `launch` and `launch_ros`."""
     names = {
         "launch": ("LaunchContext", "LaunchDescription"),
         "launch.actions": ("DeclareLaunchArgument", "OpaqueFunction", "Shutdown"),
+        "launch.events": (),
+        "launch.events.process": ("ProcessExited",),
         "launch.substitutions": (),
         "launch_ros": (),
         "launch_ros.actions": ("Node",),
@@ -65,6 +67,21 @@ def test_it_starts_the_experiments_nodes_with_their_parameters(launch_file, tmp_
         assert node["namespace"] == "/hopper" and dict(node["remappings"]) == dict(spec.remappings)
         unattended = {"unattended": True} if spec.executable == "excitation" else {}
         assert node["parameters"] == [{**given_parameters(spec), **unattended}]
+
+
+@pytest.mark.parametrize(("returncode", "expected"), [(0, None), (1, 1), (2, 2), (-9, 137)])
+def test_any_nodes_end_shuts_it_down_with_that_nodes_exit_code(
+    launch_file, monkeypatch, tmp_path, returncode, expected
+):
+    exits = []
+    monkeypatch.setattr(launch_file.atexit, "register", lambda _exit, code: exits.append(code))
+    context = {"experiment": str(BRINGUP / "config" / "demo.yaml"), "bag": str(tmp_path / "bag")}
+    assert all(node.keywords["on_exit"] is launch_file.shut_down for node in launch_file.graph(context))
+    event = types.SimpleNamespace(returncode=returncode, process_name="plant-1")
+    (action,) = launch_file.shut_down(event, types.SimpleNamespace(is_shutdown=False))
+    assert type(action).__name__ == "Shutdown" and "plant-1" in action.keywords["reason"]
+    assert launch_file.shut_down(event, types.SimpleNamespace(is_shutdown=True)) == []
+    assert exits == ([] if expected is None else [expected])
 
 
 def test_its_arguments_are_declared(launch_file):

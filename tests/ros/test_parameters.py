@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from rcl_interfaces.srv import DescribeParameters
 
+from rhythmid_nodes.command_guard import PARAMETERS as GUARD_PARAMETERS
+from rhythmid_nodes.command_guard import CommandGuard
 from rhythmid_nodes.delay_injector import PARAMETERS as DELAY_PARAMETERS
 from rhythmid_nodes.delay_injector import DelayInjector
 from rhythmid_nodes.excitation import PARAMETERS as EXCITATION_PARAMETERS
@@ -22,6 +24,7 @@ NODES = {
     "measurement_delay": (DelayInjector, DELAY_PARAMETERS),
     "excitation": (ExcitationNode, EXCITATION_PARAMETERS),
     "recorder": (Recorder, RECORDER_PARAMETERS),
+    "command_guard": (CommandGuard, GUARD_PARAMETERS),
 }
 
 

@@ -30,7 +30,7 @@ def reference(initial=(0.15, 0.0)):
 
 
 def test_real_time_samples_lie_on_the_grid_without_gaps_and_follow_the_physics(graph):
-    node = graph.add(PlantNode, model=str(MODEL), initial=[0.15, 0.0])
+    node = graph.add(PlantNode, model=str(MODEL), initial=[0.15, 0.0], catch_up=10.0)
     states, forcing = graph.listen("plant/joint_states"), graph.listen("forcing")
     graph.until(lambda: len(states) > 300 and len(forcing) > 300, "300 samples")
     stamps = np.array([stamp_ns(message) for message in states])
@@ -53,34 +53,69 @@ def test_without_the_right_to_priority_it_runs_at_ordinary_priority_and_says_so(
 
 
 def test_a_command_acts_at_its_stamp_and_a_late_one_at_once(graph):
-    node = graph.add(PlantNode, model=str(MODEL))
-    states, forcing = graph.listen("plant/joint_states"), graph.listen("forcing")
+    node = graph.add(PlantNode, model=str(MODEL), command_timeout=0.0, catch_up=10.0, forcing_amplitude=0.0)
+    states = graph.listen("plant/joint_states")
     send = graph.talk("command")
     graph.until(lambda: len(states) > 50, "samples")
     now = time.time_ns()
     send(graph.joint_state(now, effort=0.3))
     graph.until(lambda: node.figures()["commands"] == "1", "the command")
-    reached = len(states) + 10
-    graph.until(lambda: len(states) > reached, "samples under the command")
+    graph.until(lambda: states[-1].effort[0] == 0.3, "samples under the command")
     send(graph.joint_state(now - 1_000_000_000, effort=0.7))
     graph.until(lambda: node.figures()["commands"] == "2", "the late command")
     assert int(node.figures()["late_commands"]) >= 1
-    graph.spin(0.1)
-    count = min(len(states), len(forcing))
-    given = np.array(
-        [s.effort[0] - f.effort[0] for s, f in zip(states[:count], forcing[:count], strict=True)]
-    )
+    graph.until(lambda: states[-1].effort[0] == 0.7, "its effect")
+    given = np.array([state.effort[0] for state in states])
     levels = given[np.concatenate([[True], np.abs(np.diff(given)) > 1e-9])]
     np.testing.assert_allclose(levels, [0.0, 0.3, 0.7], atol=1e-9)
     first = stamp_ns(states[int(np.argmax(given > 1e-9))])
     assert first >= now
 
 
+def test_a_command_that_nobody_renews_fades_to_zero_and_is_counted(graph):
+    node = graph.add(
+        PlantNode,
+        model=str(MODEL),
+        command_timeout=0.1,
+        command_ramp=0.02,
+        catch_up=10.0,
+        forcing_amplitude=0.0,
+    )
+    states = graph.listen("plant/joint_states")
+    send = graph.talk("command")
+    graph.until(lambda: len(states) > 50, "samples")
+    now = time.time_ns()
+    send(graph.joint_state(now, effort=0.3))
+    graph.until(lambda: node.figures()["lapsed_commands"] == "1", "the lapse")
+    graph.until(lambda: stamp_ns(states[-1]) > now + 0.3e9, "what follows")
+    given = {stamp_ns(state): state.effort[0] for state in states}
+    acting = [stamp for stamp, effort in given.items() if effort > 1e-9]
+    held = [stamp for stamp in acting if given[stamp] > 0.3 - 1e-9]
+    assert now <= acting[0] and 0.09e9 < held[-1] - held[0] < 0.1e9 + 2 * PERIOD_NS
+    assert 0.015e9 < acting[-1] - held[-1] < 0.02e9
+    assert abs(list(given.values())[-1]) < 1e-9
+
+
+def test_a_command_beyond_the_limit_is_clamped(graph):
+    node = graph.add(PlantNode, model=str(MODEL), max_effort=0.1, command_timeout=0.0, forcing_amplitude=0.0)
+    states = graph.listen("plant/joint_states")
+    graph.talk("command")(graph.joint_state(time.time_ns(), effort=-5.0))
+    graph.until(lambda: node.figures()["clamped_commands"] == "1", "the command")
+    graph.until(lambda: states and states[-1].effort[0] == -0.1, "its effect")
+
+
+def test_a_command_that_is_no_number_stops_the_plant(graph):
+    node = graph.add(PlantNode, model=str(MODEL))
+    graph.talk("command")(graph.joint_state(time.time_ns(), effort=float("nan")))
+    graph.until(lambda: node.done, "the end")
+    assert node.tripped == "a command of nan on /hopper/command"
+
+
 def test_a_command_for_another_joint_is_counted_and_ignored(graph):
     node = graph.add(PlantNode, model=str(MODEL), joint="arm")
     send = graph.talk("command")
     send(graph.joint_state(time.time_ns(), effort=0.3))
-    graph.until(lambda: node.figures()["foreign_commands"] == "1", "the command")
+    graph.until(lambda: node.figures()["commands_of_other_joints"] == "1", "the command")
     assert node.figures()["commands"] == "0"
 
 

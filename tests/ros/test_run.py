@@ -11,8 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rclpy
 import yaml
+from rclpy.node import Node
+from rclpy.utilities import try_shutdown
 from rosbags.rosbag2 import Reader
+from sensor_msgs.msg import JointState
 
 from rhythmid.experiment import Experiment, perform
 from rhythmid_nodes.joint_state import JointStateReader
@@ -132,6 +136,21 @@ def test_lockstep_equals_the_run_without_ros(rhythmid, tmp_path, offline, layout
     assert "0.0403" not in concealed and "0.0507" not in concealed and "stiffness" not in concealed
 
 
+def test_equal_lockstep_runs_give_equal_bytes(rhythmid, tmp_path):
+    """Whatever the layout and the window: what the middleware interleaves otherwise stands in the bag in one order."""
+    found = []
+    for layout, window in (("composed", 100), ("processes", 13)):
+        path = experiment_file(
+            tmp_path, time={"layout": layout, "window": window}, excitation={"sweep": 1.0}
+        )  # fmt: skip
+        done = rhythmid("run", path, "--out", tmp_path / layout / "bag")
+        assert done.returncode == 0, done.stderr
+        found.append({file.name: file.read_bytes() for file in (tmp_path / layout / "bag").iterdir()})
+    assert set(found[0]) == set(found[1])
+    for name, data in found[0].items():
+        assert data == found[1][name], name
+
+
 def test_lockstep_follows_a_delay_profile_as_the_run_without_ros_does(rhythmid, tmp_path):
     (tmp_path / "profile.csv").write_text("0,0.04\n1.5,0.06\n1.51,0.0\n3,0.2\n")
     path = experiment_file(tmp_path, delays={"input": {"profile": "profile.csv"}}, time={"window": 1})
@@ -235,6 +254,50 @@ def test_a_nodes_death_ends_the_run_with_a_valid_bag(no_shared_memory, started, 
     assert not any(Path(f"/proc/{pid}").exists() for pid in children.values())
 
 
+def test_a_stranger_who_commands_ends_the_run_with_code_1_and_is_named(
+    domain, monkeypatch, started, tmp_path
+):
+    monkeypatch.delenv("RHYTHMID_SUPERVISOR")  # of nodes that this process starts
+    path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"}, duration=60.0)
+    run = started(path)
+    run.wait_for_samples(tmp_path / "experiment_bag")
+    rclpy.init(args=[])
+    try:
+        stranger = Node("stranger", namespace="/elsewhere")
+        publisher = stranger.create_publisher(JointState, "/hopper/command", 10)
+        patience = time.monotonic() + 20
+        while publisher.get_subscription_count() == 0 and time.monotonic() < patience:
+            time.sleep(0.01)
+        for _ in range(20):
+            publisher.publish(JointState(name=["leg"], effort=[5.0]))
+        code, said = run.end()
+        stranger.destroy_node()
+    finally:
+        try_shutdown()
+    assert code == 1
+    assert "2 publishers of /hopper/command: /elsewhere/stranger, /hopper/command_delay" in said, said
+    rows, states = content(tmp_path / "experiment_bag")
+    assert max(abs(row.effort) for row in rows["command"] if row.stamp_ns > 0) <= 0.05
+    assert (
+        max(abs(state.effort) for state in rows["plant/joint_states"]) < 1.1
+    )  # forcing and excitation, not 5 N
+    assert "/elsewhere/stranger" in states[-1]["failure"]
+    assert "/elsewhere/stranger" in states[-1]["foreign"]["plant"]["conflict"]
+
+
+def test_a_node_that_lives_and_does_not_work_ends_the_run(no_shared_memory, started, tmp_path):
+    path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"}, duration=60.0)
+    run = started(path)
+    run.wait_for_samples(tmp_path / "experiment_bag")
+    children = run.children()
+    os.kill(children["recorder"], signal.SIGSTOP)
+    code, said = run.end()
+    assert code == 1 and "nothing was heard from recorder for 5 s" in said
+    rows, _ = content(tmp_path / "experiment_bag")
+    assert rows["excitation"]
+    assert not any(Path(f"/proc/{pid}").exists() for pid in children.values())
+
+
 def test_the_nodes_end_when_the_supervisor_is_killed(no_shared_memory, started, tmp_path):
     run = started(experiment_file(tmp_path, time={"mode": "realtime", "layout": "composed"}, duration=60.0))
     run.wait_for_samples(tmp_path / "experiment_bag")
@@ -253,7 +316,7 @@ def test_a_machine_that_leaves_its_envelope_ends_the_run_with_code_1(rhythmid, t
         tmp_path,
         time={"mode": "realtime"},
         excitation={"type": "profile", "points": [[0.0, 0.0], [0.5, 20.0]], "length": 20.0},
-        safety={"envelope": [0.0, 0.25], "max_effort": 30.0},
+        safety={"envelope": [0.0, 0.25], "max_effort": 30.0, "stale_after": 5.0},
     )
     done = rhythmid("run", path)
     assert done.returncode == 1 and "outside the envelope" in done.stderr

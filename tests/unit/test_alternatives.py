@@ -8,7 +8,7 @@ import pytest
 
 from machines import CATALOGUE, SHORT, hopper, records, search_of
 from rhythmid.diagnose import alternatives as module
-from rhythmid.diagnose.alternatives import LONGEST, alternatives, fixed_values
+from rhythmid.diagnose.alternatives import LONGEST_DELAY, alternatives, fixed_values
 from rhythmid.diagnose.baseline import INPUT_DELAY
 from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.diagnose.search.round import Round
@@ -55,7 +55,7 @@ def proposed(monkeypatch: pytest.MonkeyPatch, *given, **options) -> list[Proposa
     """What is fitted, before it is."""
     kept: list[Proposal] = []
 
-    def run_trials(proposals, *_):
+    def run_trials(proposals, *_, **__):
         kept.extend(proposals)
         return [], []
 
@@ -177,7 +177,7 @@ def test_a_longer_delay_is_tried_free_of_its_prior_and_not_beyond_a_part_of_the_
     (one,) = kept
     delay = one.model.parameters[INPUT_DELAY]
     assert delay.prior is None
-    assert delay.bounds[1] == LONGEST / max(dominant_frequency(s) for s in plain.run.series)
+    assert delay.bounds[1] == LONGEST_DELAY / max(dominant_frequency(s) for s in plain.run.series)
     assert all(0.0 < guess[INPUT_DELAY] < delay.bounds[1] for guess in one.guesses)
 
 

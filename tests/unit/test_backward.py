@@ -1,4 +1,4 @@
-"""Chosen effects defend their places against being left out, and against others, as long as they may be named at all."""
+"""Backward elimination tries chosen effects against being left out, and against others, as long as they may be named at all."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def test_effects_are_exchanged_only_where_they_may_be_named(
 ):
     tried: list[tuple[str, ...]] = []
 
-    def run_trials(proposals, *_):
+    def run_trials(proposals, *_, **__):
         tried.extend(p.added for p in proposals)
         return [], []
 
@@ -39,7 +39,7 @@ def test_effects_are_exchanged_only_where_they_may_be_named(
         name: {p.name: 0.1 for p in CATALOGUE[name].parameters} for name in ("quadratic_drag", "backlash")
     }
     first = Round(tuple(Score(0, CATALOGUE[name], guess, 50.0, 1.0) for name, guess in scored.items()), 0.0)
-    kept, _ = module.defend(
+    kept, _ = module.eliminate(
         best, [SERIES], CATALOGUE, {(): best}, QUIET, 1e-3, [first], 10.0, most, lambda _: None
     )
     assert kept is best

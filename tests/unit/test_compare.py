@@ -114,7 +114,7 @@ def test_of_several_recordings_the_one_of_the_same_experiment_is_compared(simula
     assert compare(simulation, others).recording == "record 2"
 
 
-def test_a_recordings_stray_samples_are_left_out_and_told(simulation):
+def test_a_recordings_outliers_are_left_out_and_told(simulation):
     clean = record(hopper(), CHIRP, delays=NONE)
     value = clean.output.value.copy()
     value[300::900] += 0.5

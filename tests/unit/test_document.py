@@ -1,9 +1,14 @@
 """A YAML document knows where each of its values stands."""
 
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
 import pytest
+from pydantic import ConfigDict, Field, TypeAdapter
 
 from rhythmid.document import parse, read
 from rhythmid.errors import InputError
+from rhythmid.validation import NUMBER, Number, Range, Whole, validated
 
 TEXT = """\
 # a comment
@@ -52,7 +57,7 @@ def test_plain_gives_the_content_without_places(document):
 
 
 def test_numbers_are_read_in_every_notation(document):
-    assert [node.number() for node in document.mapping()["sizes"].items()] == [1.0, 2.5, 1e-3]
+    assert [validated(node, NUMBER) for node in document.mapping()["sizes"].items()] == [1.0, 2.5, 1e-3]
 
 
 @pytest.mark.parametrize(
@@ -66,23 +71,29 @@ def test_numbers_are_read_in_every_notation(document):
         ("[1]", "a number is expected, not [1]"),
         ("{a: 1}", "a number is expected, not {'a': 1}"),
         ("", "a number is expected, not None"),
-        ("12", "12 is outside [0, 10]"),
+        ("12", "12 is too large; at most 10 is expected"),
         ("1" + "0" * 400, "a number is expected"),
     ],
 )
 def test_what_is_no_number_within_its_limits_is_refused(text, problem):
     node = parse(f"\nx: {text}", "f.yaml").mapping()["x"]
-    message = refusal(node.number, 0.0, 10.0)
+    message = refusal(validated, node, TypeAdapter(Annotated[Number, Field(ge=0, le=10)]))
     assert message.startswith("f.yaml:2: x: ") and problem in message
 
 
 def test_the_ends_of_a_range_may_be_infinite():
-    assert parse("-.inf", "f").number(finite=False) == float("-inf")
+    assert validated(parse("[-.inf, 1e-3]", "f"), TypeAdapter(Range)) == (float("-inf"), 1e-3)
+
+
+@pytest.mark.parametrize("text", ["[1, 1]", "[2, 1]", "[1]", "[1, 2, 3]"])
+def test_a_range_is_two_rising_numbers(text):
+    assert "two numbers [low, high] are expected" in refusal(validated, parse(text, "f"), TypeAdapter(Range))
 
 
 def test_whole_numbers_are_not_rounded():
-    assert parse("7.0", "f").whole(0, 10) == 7
-    assert "a whole number is expected, not 7.5" in refusal(parse("7.5", "f").whole, 0, 10)
+    whole = TypeAdapter(Whole)
+    assert [validated(parse(text, "f"), whole) for text in ("7", "7.0", "1e3")] == [7, 7, 1000]
+    assert "a whole number is expected, not 7.5" in refusal(validated, parse("7.5", "f"), whole)
 
 
 def test_an_unknown_key_is_refused_with_the_nearest_known_one(document):
@@ -95,9 +106,50 @@ def test_other_shapes_are_refused(document):
     keys = document.mapping()
     assert "a mapping (key: value) is expected" in refusal(keys["sizes"].mapping)
     assert "a list (- item) is expected" in refusal(keys["name"].items)
-    assert "text is expected, not {'deeper'" in refusal(keys["nested"].text)
-    assert "'hopper' is none of walker, runner" in refusal(keys["name"].choice, ["walker", "runner"])
+    assert "text is expected, not {'deeper'" in refusal(validated, keys["nested"], TypeAdapter(str))
+    walker = TypeAdapter(Literal["walker", "runner"])
+    assert "'hopper' is none of walker, runner" in refusal(validated, keys["name"], walker)
     assert keys["nothing"].items() == []
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A part of a machine."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    radius: Number
+    spokes: Whole | None = None
+
+
+@dataclass(frozen=True)
+class Cart:
+    """A machine of parts."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    wheels: tuple[Wheel, ...]
+    axle: Wheel | None = None
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "wheels:\n- {radius: 1}\n- {raduis: 1}",
+            "f:3: wheels[1].raduis: unknown key; did you mean 'radius'?",
+        ),
+        ("wheels: []\naxle: {x: 1, radius: 1}", "f:2: axle.x: unknown key; known: radius, spokes"),
+        ("wheels: []\naxel: {radius: 1}", "f:2: axel: unknown key; did you mean 'axle'?"),
+        ("wheels:\n- radius: 1\n  spokes: 2.5", "f:3: wheels[0].spokes: a whole number is expected, not 2.5"),
+        ("wheels:\n- {spokes: 3}", "f:2: wheels[0]: 'radius:' is missing"),
+        ("wheels: 4", "f:1: wheels: a list (- item) is expected here"),
+        ("wheels: [4]", "f:1: wheels[0]: a mapping (key: value) is expected here"),
+        ("axle: {radius: 1}", "f:1: 'wheels:' is missing"),
+        ("{}", "f:1: 'wheels:' is missing"),
+        ("", "f: a mapping (key: value) is expected here"),
+    ],
+)
+def test_what_a_type_does_not_allow_is_refused_with_line_and_path(text, message):
+    assert refusal(validated, parse(text, "f"), TypeAdapter(Cart)) == message
 
 
 @pytest.mark.parametrize(

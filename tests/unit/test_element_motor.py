@@ -8,6 +8,7 @@ from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import compile_model
 from rhythmid.simulation.effect import Path, effect_along
+from rhythmid.simulation.generated_source import Variant
 from rhythmid.simulation.signal import pieces, zero_order_hold
 from rhythmid.simulation.simulate import simulate
 
@@ -48,7 +49,7 @@ def test_a_duty_cycle_is_a_share_of_the_supply():
 def test_a_position_servo_is_a_controller_in_volts_and_a_motor():
     model = Model.from_text(SERVO, catalogue=CATALOGUE)
     reference = zero_order_hold(np.array([0.0]), np.array([0.1]))
-    compiled = compile_model(model, excited="reference")
+    compiled = compile_model(model, Variant("reference"))
     out = np.empty((len(TIME), 4))
     none = pieces(None)
     compiled.run(

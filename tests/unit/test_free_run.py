@@ -1,11 +1,11 @@
-"""Free runs over records: delays of the command path in order, stand-ins for held commands, where elements start."""
+"""Free runs over records: delays of the command path in order, surrogates for held commands, where elements start."""
 
 import numpy as np
 import pytest
 from scipy.interpolate import PPoly
 
 from machines import CATALOGUE, hopper
-from rhythmid.identify.free_run import _delay_of, prepare_run, start_of
+from rhythmid.identify.free_run import prepare_run, start_of
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.signal import spline, zero_order_hold
@@ -45,21 +45,6 @@ def test_a_delay_and_a_hold_act_as_in_the_simulator(block):
     np.testing.assert_allclose(outputs[0], one.of_block(expected), atol=1e-12)
 
 
-def test_a_command_is_delayed_before_it_waits_for_the_tick():
-    late = _delay_of(machine(command_hold={"period": 0.02}), np.array([0.0, 0.006, 0.008, 0.03]))
-    assert late is not None  # it arrives at 13.3, 19.3, 21.3 and 43.3 ms
-    np.testing.assert_allclose(late, [0.02, 0.014, 0.032, 0.03], atol=1e-12)
-
-
-def test_a_command_never_overtakes_an_earlier_one():
-    jitter = {"std": 0.005, "seed": 3.0}
-    alone = CATALOGUE["command_jitter"].delay
-    assert alone is not None and np.any(np.diff(TIME + alone(TIME, **jitter)) < 0.0)
-    for more in ({}, {"command_hold": {"period": 0.004}}):
-        late = _delay_of(machine(command_jitter=jitter, **more), TIME)
-        assert late is not None and np.all(np.diff(TIME + late) >= 0.0)
-
-
 @pytest.mark.parametrize(
     ("name", "values"),
     [
@@ -70,16 +55,16 @@ def test_a_command_never_overtakes_an_earlier_one():
 )
 def test_play_and_rate_limits_see_every_step_of_a_held_command(name, values):
     run = prepare_run(machine(**{name: values}), [series(5)])
-    assert [given.smooth for given in run.inputs] == [None]
+    assert not run.smooth
 
 
 @pytest.mark.parametrize(
     ("name", "values"),
     [("actuator_saturation", {"limit": 2.0}), ("coulomb_friction", {"force": 0.1, "transition": 0.01})],
 )
-def test_what_remembers_no_extreme_is_driven_by_the_smooth_stand_in(name, values):
+def test_what_remembers_no_extreme_is_driven_by_the_smooth_surrogate(name, values):
     run = prepare_run(machine(**{name: values}), [series(5)])
-    assert run.inputs[0].smooth is not None
+    assert run.smooth
 
 
 @pytest.mark.parametrize("step", [PERIOD, 0.5625 * PERIOD])

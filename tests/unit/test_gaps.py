@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rhythmid.identify.series import prepare, record_of
-from rhythmid.record.gaps import LEAST, PAST, cut_at_gaps
+from rhythmid.record.gaps import LEAST_SAMPLES, PAST, cut_at_gaps
 from rhythmid.record.interpolation import interpolation_errors
 from rhythmid.record.record import Channel, Record
 from rhythmid.record.timing import gaps_between
@@ -100,7 +100,7 @@ def test_missing_measurements_alone_cut_nothing():
 
 
 def test_stretches_that_are_too_short_are_left_out():
-    found = cut_at_gaps(record(slow(0), without((5.0, 6.0), (6.0 + 0.5 * LEAST / RATE, 8.0))))
+    found = cut_at_gaps(record(slow(0), without((5.0, 6.0), (6.0 + 0.5 * LEAST_SAMPLES / RATE, 8.0))))
     assert len(found.stretches) == 2
 
 

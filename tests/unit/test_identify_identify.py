@@ -87,7 +87,7 @@ def test_a_command_that_does_not_repeat_is_noted(paper_record) -> None:
     assert any("does not repeat" in note for note in notes)
 
 
-def test_stray_samples_are_left_out_and_told(paper_record) -> None:
+def test_outliers_are_left_out_and_told(paper_record) -> None:
     clean = paper_record()
     value = clean.output.value.copy()
     value[1000::5000] += 0.5

@@ -7,7 +7,7 @@ import pytest
 from axes import CATALOGUE, axis, axis_model, frame, frame_model
 
 from rhythmid.errors import InputError
-from rhythmid.identify.inverse_dynamics.applicability import applicable, moved_with_bandwidth
+from rhythmid.identify.inverse_dynamics.applicability import applicable
 from rhythmid.identify.inverse_dynamics.balance import Balance, stuck
 from rhythmid.identify.inverse_dynamics.estimate import FARTHEST, fit_effort, size_of
 from rhythmid.record.record import Channel
@@ -102,7 +102,6 @@ def test_the_effort_is_scored_where_it_makes_the_motion():
     assert found.applies and not found.free_run_means_something
     assert "Hz" in found.reason and found.bandwidth > 1.0
     assert found.balance is not None
-    assert max(moved_with_bandwidth([axis()], axis_model(), found.balance).values()) < 3.0
 
 
 def test_the_effort_is_not_scored_where_the_machine_swings_by_itself():

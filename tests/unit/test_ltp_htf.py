@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from piecewise_lti import hybrid_spring_mass_damper
 
 from rhythmid.errors import InputError
 from rhythmid.ltp.harmonic_state_space import harmonic_state_space
 from rhythmid.ltp.htf import linearised, theoretical_htf, transport_delays
 from rhythmid.ltp.limit_cycle import limit_cycle
 from rhythmid.ltp.linearisation import linearise
-from rhythmid.ltp.piecewise_lti import hybrid_spring_mass_damper
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
 from rhythmid.simulation.signal import spline

@@ -6,6 +6,7 @@ import pytest
 from rich.console import Console
 from rich.progress import Progress
 
+from rhythmid.progress import counted
 from rhythmid.progress_bar import SpentColumn, progress, spent_words
 
 
@@ -46,3 +47,16 @@ def test_a_line_with_a_budget_shows_it():
         tell("scoring the catalogue")
     assert isinstance(console.file, io.StringIO)
     assert "0 % of 1000 s spent" in console.file.getvalue()
+
+
+def test_work_of_many_parts_tells_now_and_then_how_long_the_rest_takes():
+    clock, told = [0.0], []
+
+    def parts():
+        for part in range(20):
+            clock[0] += 3.0
+            yield part
+
+    assert list(counted(parts(), 20, "records", told.append, lambda: clock[0])) == list(range(20))
+    assert told[:2] == ["records: 2 of 20 done, about 54 s left", "records: 4 of 20 done, about 48 s left"]
+    assert len(told) == 9

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from machines import CATALOGUE, SHORT, hopper, records
-from rhythmid.record.outlier import repeated_samples, stray_samples, without_stray
+from rhythmid.record.outlier import outlying_samples, repeated_samples, without_outliers
 from rhythmid.record.quality import clipped_samples, resolution
 
 seeds = st.integers(0, 10_000)
@@ -25,20 +25,20 @@ def motion(rng: np.random.Generator, noise: float) -> np.ndarray:
 
 
 @given(seed=seeds, noise=st.sampled_from([0.0, 1e-4, 1e-3, 1e-2]), width=st.integers(1, 3))
-def test_strays_are_found_and_nothing_else(seed, noise, width):
+def test_outliers_are_found_and_nothing_else(seed, noise, width):
     rng = np.random.default_rng(seed)
     value = motion(rng, noise)
     place = rng.choice(np.arange(10, 4980, 10), 7, replace=False)
     wrong = (place[:, None] + np.arange(width)).ravel()
     value[wrong] += np.repeat(rng.choice([-1.0, 1.0], 7) * rng.uniform(0.03, 1.0, 7), width)
-    assert np.array_equal(np.flatnonzero(stray_samples(value)), np.sort(wrong))
+    assert np.array_equal(np.flatnonzero(outlying_samples(value)), np.sort(wrong))
 
 
 @pytest.mark.parametrize("std", [0.0, 1e-6, 1e-4])
 @pytest.mark.parametrize(("name", "values"), [IMPACT, STICTION, PLAY])
 def test_impacts_stiction_and_play_leave_no_sample_out(name, values, std):
     for one in records(hopper().with_element(CATALOGUE[name], values), SHORT, std=std):
-        kept, notes = without_stray(one)
+        kept, notes = without_outliers(one)
         assert kept.output is one.output and notes == ()
 
 
@@ -65,7 +65,7 @@ def test_rest_is_no_repeat():
 def test_rounded_values_are_all_kept_and_their_step_is_known(seed, step):
     value = step * np.round(motion(np.random.default_rng(seed), 1e-3) / step)
     assert resolution(value) == pytest.approx(step, rel=1e-6)
-    assert not stray_samples(value).any() and not repeated_samples(value).any()
+    assert not outlying_samples(value).any() and not repeated_samples(value).any()
 
 
 def test_values_that_were_not_rounded_have_no_step():
@@ -76,7 +76,7 @@ def test_values_that_were_not_rounded_have_no_step():
 def test_two_values_are_the_coarsest_rounding_and_lose_no_sample():
     value = np.where(np.sin(2 * np.pi * TIME) > 0.0, 0.1, 0.3)
     assert resolution(value) == pytest.approx(0.2)
-    assert not stray_samples(value).any() and not repeated_samples(value).any()
+    assert not outlying_samples(value).any() and not repeated_samples(value).any()
 
 
 def test_what_is_left_out_is_said_and_peaks_of_an_acceleration_are_kept():
@@ -84,10 +84,10 @@ def test_what_is_left_out_is_said_and_peaks_of_an_acceleration_are_kept():
     value = one.output.value.copy()
     value[[500, 900]] += 0.5
     broken = replace(one, output=replace(one.output, value=value))
-    kept, notes = without_stray(broken)
+    kept, notes = without_outliers(broken)
     assert len(kept.output) == len(one.output) - 2
     assert len(notes) == 1 and "2 of" in notes[0] and "t = 0.5151 s" in notes[0]
-    assert without_stray(replace(broken, output_kind="acceleration"))[1] == ()
+    assert without_outliers(replace(broken, output_kind="acceleration"))[1] == ()
 
 
 @pytest.mark.parametrize("rate", [50.0, 200.0, 1000.0])

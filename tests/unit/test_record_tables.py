@@ -266,7 +266,7 @@ def test_a_missing_file_and_a_wrong_number_are_refused(tmp_path):
     [
         ("output: {file: FILE, column: y}\n", "'time:' is missing; for a table it is"),
         ("time: header\noutput: {file: FILE, column: y}\n", "a table has no message times"),
-        ("time: {sample_rate: 0}\noutput: {file: FILE, column: y}\n", "sample_rate: 0 is outside"),
+        ("time: {sample_rate: 0}\noutput: {file: FILE, column: y}\n", "sample_rate: 0 is too small"),
         ("time: {sample_rate: 500}\noutput: {column: y}\n", "'file:' is missing"),
         ("time: {sample_rate: 500}\noutput: {file: FILE}\n", "give topic and field"),
         ("time: {column: t}\noutput: {file: FILE, column: y, unit: mm}\n", "write  scale: 0.001, unit: m"),

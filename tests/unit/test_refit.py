@@ -10,7 +10,7 @@ from machines import CATALOGUE, hopper
 from rhythmid.diagnose.search import refit
 from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.trial import Proposal, Trial, propose
-from rhythmid.identify.descent import Descent
+from rhythmid.identify.descent import Descent, out_of_reach
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series
 
@@ -186,3 +186,9 @@ def test_a_descent_that_still_falls_steeply_goes_on_where_others_have_been_left(
     assert end.converged == arrives
     assert sum(left) <= refit.THOROUGH + refit.SKETCH
     assert arrives or sum(left) == refit.BRIEF
+
+
+def test_a_descent_that_would_not_come_to_where_it_matters_is_given_up() -> None:
+    assert not out_of_reach(100.0, 50.0, 4.0, 4.0)  # halved four times more: 3.1
+    assert out_of_reach(100.0, 50.0, 3.0, 4.0)
+    assert not out_of_reach(100.0, 99.0, 0.0, 100.0)  # there already

@@ -69,7 +69,7 @@ def test_a_band_limited_ramp_stays_a_ramp():
     np.testing.assert_allclose(evaluate(band_limited(TIME, 3 * TIME - 1), at), 3 * at - 1, atol=1e-12)
 
 
-def test_the_smooth_stand_in_of_a_held_command_has_its_impulse():
+def test_the_smooth_surrogate_of_a_held_command_has_its_impulse():
     values = np.sin(2 * np.pi * 7 * TIME) ** 2
     smooth = impulse_preserving(zero_order_hold(TIME, values))
     for first, last in [(100, 1500), (0, 1999)]:
@@ -78,7 +78,7 @@ def test_the_smooth_stand_in_of_a_held_command_has_its_impulse():
 
 
 @pytest.mark.parametrize("frequency", [3.0, 12.0])
-def test_the_smooth_stand_in_of_a_held_command_is_its_equal_at_low_frequencies(frequency):
+def test_the_smooth_surrogate_of_a_held_command_is_its_equal_at_low_frequencies(frequency):
     values = np.sin(2 * np.pi * 7 * TIME) * np.hanning(len(TIME))
     smooth = impulse_preserving(zero_order_hold(TIME, values))
     omega = 2.0 * np.pi * frequency
@@ -89,7 +89,7 @@ def test_the_smooth_stand_in_of_a_held_command_is_its_equal_at_low_frequencies(f
     assert abs(found - exact) < 2e-7 * abs(np.sum(np.abs(values)) * 1e-3)
 
 
-def test_the_smooth_stand_in_of_a_held_command_is_nothing_before_it():
+def test_the_smooth_surrogate_of_a_held_command_is_nothing_before_it():
     smooth = impulse_preserving(zero_order_hold(TIME, np.sin(2 * np.pi * 7 * TIME)))
     assert np.all(np.abs(evaluate(smooth, np.array([-1.0, -0.1]))) < 1e-12)
 

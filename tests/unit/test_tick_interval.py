@@ -10,15 +10,15 @@ from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.sample_clock.tick_interval import ticks_followed
 from rhythmid.identify.sample_clock.tick_likelihood import ticks_sought
-from rhythmid.identify.sample_clock.tick_scan import DELAY
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.signal import zero_order_hold
 from rhythmid.simulation.simulate import simulate
+from rhythmid.simulation.transport import INPUT_DELAY
 
 SAMPLE, DURATION, STEP = 1e-3, 12.0, 2e-3
 PERIOD = "command_hold.period"
-TRUE = {DELAY: 0.0130457, PERIOD: 0.0812347}
+TRUE = {INPUT_DELAY: 0.0130457, PERIOD: 0.0812347}
 NOISE = NoiseModel(np.empty(0), 1e-4)
 
 
@@ -42,7 +42,7 @@ def recorded(seed: int) -> Series:
 
 def fitted(seed: int, off: float) -> Fit:
     """The fit that begins with a period that is off by so many seconds, as far as a descent gets."""
-    begin = held(**{PERIOD: TRUE[PERIOD] + off, DELAY: TRUE[DELAY] - 0.5 * off})
+    begin = held(**{PERIOD: TRUE[PERIOD] + off, INPUT_DELAY: TRUE[INPUT_DELAY] - 0.5 * off})
     return estimate(begin, [recorded(seed)], noise=NOISE, max_step=STEP)
 
 
@@ -51,7 +51,7 @@ def test_the_interval_of_the_period_holds_the_truth_where_the_curvature_says_not
     fit = fitted(seed, 2e-6)
     found = ticks_followed(search_of(fit, "command_hold"))
     assert found.fit.chi2 <= fit.chi2
-    for name in (PERIOD, DELAY):
+    for name in (PERIOD, INPUT_DELAY):
         assert abs(found.fit.model.value(name) - TRUE[name]) < 3.0 * found.fit.std[name]
     assert found.fit.std[PERIOD] < 1e-6
     assert found.best.model is found.fit.model

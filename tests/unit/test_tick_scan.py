@@ -7,15 +7,16 @@ import pytest
 
 from machines import CATALOGUE, hopper
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.sample_clock.tick_scan import DELAY, scanned
+from rhythmid.identify.sample_clock.tick_scan import scanned
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.signal import zero_order_hold
 from rhythmid.simulation.simulate import simulate
+from rhythmid.simulation.transport import INPUT_DELAY
 
 SAMPLE, DURATION, STEP = 1e-3, 12.0, 2e-3
 PERIOD = "command_hold.period"
-TRUE = {DELAY: 0.0130457, PERIOD: 0.0812347}
+TRUE = {INPUT_DELAY: 0.0130457, PERIOD: 0.0812347}
 PERIODS = (0.0812347, 0.0613571)
 NOISE = NoiseModel(np.empty(0), 1e-4)
 
@@ -43,28 +44,32 @@ def case() -> tuple[Series, np.ndarray]:
 @pytest.mark.parametrize("period", PERIODS)
 def test_the_period_of_a_held_command_is_found_within_ten_microseconds(period):
     series, start = recorded(period)
-    mean = TRUE[DELAY] + 0.5 * period
-    off = held({DELAY: mean, "linear_spring.stiffness": 200.05, "switched_damper.stance": 1.99})
+    mean = TRUE[INPUT_DELAY] + 0.5 * period
+    off = held({INPUT_DELAY: mean, "linear_spring.stiffness": 200.05, "switched_damper.stance": 1.99})
     best = scanned(off, [series], [start], NOISE)[0]
     assert best[PERIOD] == pytest.approx(period, abs=1e-5)
-    assert best[DELAY] + 0.5 * best[PERIOD] == pytest.approx(mean, abs=1e-3)
+    assert best[INPUT_DELAY] + 0.5 * best[PERIOD] == pytest.approx(mean, abs=1e-3)
 
 
 @pytest.mark.parametrize("period", [0.1710123, 0.1110123, 0.1040123, 0.0970123])
 def test_ticks_hardly_faster_than_the_motion_are_found_by_a_model_that_is_a_little_wrong(period):
     series, start = recorded(period)
     off = held(
-        {DELAY: TRUE[DELAY] + 0.5 * period, "linear_spring.stiffness": 200.5, "switched_damper.stance": 1.9}
+        {
+            INPUT_DELAY: TRUE[INPUT_DELAY] + 0.5 * period,
+            "linear_spring.stiffness": 200.5,
+            "switched_damper.stance": 1.9,
+        }
     )
     assert scanned(off, [series], [start], NOISE)[0][PERIOD] == pytest.approx(period, abs=2e-5)
 
 
 def test_nothing_is_guessed_without_delay_or_command(case):
     series, start = case
-    assert scanned(held({DELAY: 0.0}), [series], [start], NOISE) == []
-    assert scanned(held({DELAY: 0.03}), [replace(series, command=None)], [start], NOISE) == []
+    assert scanned(held({INPUT_DELAY: 0.0}), [series], [start], NOISE) == []
+    assert scanned(held({INPUT_DELAY: 0.03}), [replace(series, command=None)], [start], NOISE) == []
 
 
 def test_nothing_is_guessed_where_a_hold_would_have_to_be_faster_than_the_measurement_shows(case):
     series, start = case
-    assert scanned(held({DELAY: 0.001}), [series], [start], NOISE) == []
+    assert scanned(held({INPUT_DELAY: 0.001}), [series], [start], NOISE) == []

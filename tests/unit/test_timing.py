@@ -5,10 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from machines import CATALOGUE, hopper, record
+from machines import CATALOGUE, hopper, record, records
 from rhythmid.elements.random_delay import uniform_delay
+from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.joint import JointFit, joint_likelihood
-from rhythmid.identify.timing import command_hold, command_jitter, compensated, measurement_jitter
+from rhythmid.identify.output_error import minimise
+from rhythmid.identify.series import prepare
+from rhythmid.identify.timing import (
+    _first_samples,
+    command_hold,
+    command_jitter,
+    compensated,
+    measurement_jitter,
+)
 from rhythmid.record.record import Channel, Record
 
 U, Y = "input_delay.delay", "measurement_delay.delay"
@@ -118,3 +127,13 @@ def test_input_and_output_at_different_rates_do_no_harm():
     )
     joint = fitted(slow)
     assert near(joint, U, DELAYS[0]) and near(joint, Y, DELAYS[1])
+
+
+def test_what_many_records_tell_of_a_roll_off_is_asked_of_the_first_that_are_long_enough():
+    series = prepare(records(hopper(), std=0.0))
+    run = prepare_run(hopper(), series)
+    fit = minimise(hopper(), run, hopper().free, iterations=0)
+    assert len(series) > 1 and _first_samples(fit, 10**9) is fit
+    first = _first_samples(fit, 100)
+    assert [one.name for one in first.run.series] == [series[0].name]
+    assert len(first.starts) == len(first.residuals) == 1 and first.model is fit.model

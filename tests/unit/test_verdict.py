@@ -51,14 +51,16 @@ def test_an_effect_of_a_thousandth_of_the_motion_is_not_named_and_one_of_a_hundr
     assert verdict(contest(nominal, supposed("friction", predicted(quiet, 1e4)))) == expected
 
 
-@pytest.mark.parametrize(("gain", "expected"), [(2.0, NAMED), (0.0, NAMED), (-2.0, NOTHING)])
+@pytest.mark.parametrize(("gain", "expected"), [(2.0, NAMED), (0.0, NAMED), (-0.1, NAMED), (-2.0, NOTHING)])
 def test_an_effect_that_does_worse_on_held_out_data_is_not_named(gain, expected):
     nominal = supposed("", ends(NOMINAL.prediction, 0.0, mood=0.0))
     found = supposed("friction", ends(friction().prediction, gain))
     assert verdict(contest(nominal, found)) == expected
 
 
-@pytest.mark.parametrize(("gain", "expected"), [(2.0, "unknown_physics"), (-2.0, "consistent")])
+@pytest.mark.parametrize(
+    ("gain", "expected"), [(2.0, "unknown_physics"), (-0.1, "unknown_physics"), (-2.0, "consistent")]
+)
 def test_a_line_that_does_not_go_on_in_held_out_data_is_no_unknown_physics(gain, expected):
     quiet = replace(predicted(1e-4), unseen=None)
     nominal = supposed("", ends(NOMINAL.prediction, 0.0, mood=0.0))

@@ -12,12 +12,14 @@ excitation:                      # by joint: a reference where a controller is i
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict, TypeAdapter
+from pydantic import Field as Limits
 
 from rhythmid.body.machine import Machine
 from rhythmid.body.simulate import simulate
@@ -26,6 +28,7 @@ from rhythmid.errors import InputError
 from rhythmid.excitation.excitation import Excitation
 from rhythmid.excitation.sequence import build
 from rhythmid.simulation.signal import zero_order_hold
+from rhythmid.validation import Number, Range, Whole, validated
 
 Array = NDArray[np.float64]
 LONGEST = 10_000_000  # samples of a run
@@ -102,35 +105,49 @@ def perform(machine: Machine, experiment: JointExperiment) -> JointMessages:
     return JointMessages(stamps, topics)
 
 
+@dataclass(frozen=True)
+class _Excitation:
+    """What a joint is commanded, as it is written; the rest says of what kind it is."""
+
+    offset: Number = 0.0
+    limits: Range = (-math.inf, math.inf)
+
+
+@dataclass(frozen=True)
+class _Experiment:
+    """An experiment as it is written."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    duration: Annotated[Number, Limits(ge=1e-6, le=1e6)]
+    excitation: dict[str, dict[str, Any]]
+    rate: Annotated[Number, Limits(ge=1.0, le=1e5)] = 1000.0
+    start: dict[str, Number] = field(default_factory=dict)
+    seed: Annotated[Whole, Limits(ge=0, le=2**31 - 1)] = 0
+    namespace: str = "/machine"
+
+
+_WRITTEN: TypeAdapter[_Experiment] = TypeAdapter(_Experiment)
+_ABOUT: TypeAdapter[_Excitation] = TypeAdapter(_Excitation)
+
+
 def _experiment(document: Node, folder: Path) -> JointExperiment:
-    keys = document.mapping(["duration", "rate", "excitation", "start", "seed", "namespace"])
-    for name in ("duration", "excitation"):
-        if name not in keys:
-            document.fail(f"'{name}:' is missing")
-    start = {} if "start" not in keys else {n: one.number() for n, one in keys["start"].mapping().items()}
-    return JointExperiment(
-        keys["duration"].number(1e-6, 1e6),
-        keys["rate"].number(1.0, 1e5) if "rate" in keys else 1000.0,
-        {joint: _excitation(node, folder) for joint, node in keys["excitation"].mapping().items()},
-        start,
-        keys["seed"].whole(0, 2**31 - 1) if "seed" in keys else 0,
-        "/" + keys["namespace"].text().strip("/") if "namespace" in keys else "/machine",
-    )
+    given = validated(document, _WRITTEN)
+    excitation = {
+        joint: _excitation(node, folder) for joint, node in document.at("excitation").mapping().items()
+    }
+    name = "/" + given.namespace.strip("/")
+    return JointExperiment(given.duration, given.rate, excitation, given.start, given.seed, name)
 
 
 def _excitation(node: Node, folder: Path) -> JointExcitation:
     keys = node.mapping()
-    offset = keys["offset"].number() if "offset" in keys else 0.0
-    limits = (-math.inf, math.inf)
-    if "limits" in keys:
-        ends = [end.number(finite=False) for end in keys["limits"].items()]
-        if len(ends) != 2 or not ends[0] < ends[1]:
-            keys["limits"].fail("two positions [low, high] are expected, low < high")
-        limits = ends[0], ends[1]
-    spec: dict[str, Any] = {n: one.plain for n, one in keys.items() if n not in ("offset", "limits")}
+    own = {name: one for name, one in keys.items() if name in ("offset", "limits")}
+    about = validated(replace(node, value=own), _ABOUT)
+    spec = {name: one for name, one in keys.items() if name not in own}
     if not spec:
-        return JointExcitation(offset, limits)
+        return JointExcitation(about.offset, about.limits)
+    plain = {name: one.plain for name, one in spec.items()}
     try:
-        return JointExcitation(offset, limits, build(spec, folder))
+        return JointExcitation(about.offset, about.limits, build(plain, folder))
     except InputError as error:
         raise InputError(f"{node.place}: {node.path}: {error}") from None

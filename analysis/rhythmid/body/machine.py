@@ -18,9 +18,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import yaml
+from pydantic import ConfigDict, StrictBool, TypeAdapter
+from pydantic import Field as Limits
 
 from rhythmid.body.body import BODY
 from rhythmid.body.mujoco_body import FIXED, FREE, MujocoBody
@@ -28,9 +30,10 @@ from rhythmid.document import Node, read
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.elements.element import SLOTS, Element, Parameter
 from rhythmid.errors import InputError
-from rhythmid.model import INERTIA, Model, Value, entry_of, model_of, value_of
+from rhythmid.model import INERTIA, Model, Value, entry_of, value_of
 from rhythmid.output import write_text
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
+from rhythmid.validation import Number, validated
 
 KINDS = ("mjcf", "urdf")
 LONGEST_STEP = 0.01  # [s] of an integration: ten times what contacts bear
@@ -200,23 +203,32 @@ def _machine(document: Node, folder: Path, catalogue: Catalogue) -> Machine:
     return Machine(body, paths, inertial, kind)
 
 
+@dataclass(frozen=True)
+class _Body:
+    """A body as it is written."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    mjcf: str | None = None
+    urdf: str | None = None
+    base: str = FIXED
+    step: Annotated[Number, Limits(ge=1e-7, le=LONGEST_STEP)] | None = None
+    contacts: StrictBool = True
+    free: dict[str, Any] | None = None
+
+
+_BODY: TypeAdapter[_Body] = TypeAdapter(_Body)
+
+
 def _body(node: Node, folder: Path) -> tuple[MujocoBody, str]:
-    keys = node.mapping([*KINDS, "base", "step", "contacts", "free"])
-    named = [kind for kind in KINDS if kind in keys]
+    given = validated(node, _BODY)
+    named = {kind: name for kind in KINDS if (name := getattr(given, kind)) is not None}
     if len(named) != 1:
         node.fail("name one file: mjcf: leg.xml, or urdf: leg.urdf")
-    base = keys["base"].text() if "base" in keys else FIXED
-    step = keys["step"].number(1e-7, LONGEST_STEP) if "step" in keys else None
-    contacts = True
-    if "contacts" in keys:
-        if not isinstance(keys["contacts"].value, bool):
-            keys["contacts"].fail("is true or false")
-        contacts = keys["contacts"].value
+    kind, name = next(iter(named.items()))
     try:
-        body = MujocoBody.load(folder / keys[named[0]].text(), base, step, contacts)
+        return MujocoBody.load(folder / name, given.base, given.step, given.contacts), kind
     except InputError as error:
-        raise InputError(f"{keys[named[0]].place}: {error}") from None
-    return body, named[0]
+        raise InputError(f"{node.at(kind).place}: {error}") from None
 
 
 def _free(node: Node, body: MujocoBody) -> dict[str, Value]:
@@ -241,7 +253,7 @@ def _path(node: Node, joint: str, body: MujocoBody, catalogue: Catalogue) -> Mod
     inertia = {
         "mass": Node({k: Node(v, node.place, node.path) for k, v in mass.items()}, node.place, node.path)
     }
-    model = model_of(
+    model = Model.from_document(
         replace(node, value={"inertia": Node(inertia, node.place, node.path), **sections}), catalogue
     )
     names = {term.element.name for term in model.terms}

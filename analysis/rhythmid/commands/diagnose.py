@@ -79,10 +79,11 @@ def diagnose(
         return
     catalogue = load_catalogue(elements or ())
     nominal = None if model is None else Model.load(model, catalogue)
-    records = load_records(bags, signals)
-    unseen = load_records(holdout or (), signals)
-    simulation = None if sim is None else _simulation(sim, signals, sim_signals)
     console = Console(stderr=True)
+    with progress(console) as tell:
+        records = load_records(bags, signals, tell)
+        unseen = load_records(holdout or (), signals, tell)
+    simulation = None if sim is None else _simulation(sim, signals, sim_signals)
     result, answer, comparison = {}, None, None
     if simulation is not None:
         from rhythmid.compare.compare import compare

@@ -67,6 +67,7 @@ def identify(
     from rhythmid.identify.latency import save_latency
     from rhythmid.ltp.nonparametric import HtfMethod
     from rhythmid.model import Model
+    from rhythmid.progress_bar import progress
     from rhythmid.record.read import load_records
 
     require_new(json, report, save_model, save)
@@ -86,12 +87,18 @@ def identify(
             f"--clock-offset says that the forcing's clock is unknown, --forcing {forcing} that it is known"
         )
     known = None if model is None else Model.load(model, load_catalogue(elements or ()))
-    with Console(stderr=True).status("reading") as status:
-        records = load_records(bags, signals)
-        status.update("identifying")
+    with progress(Console(stderr=True)) as tell:
+        tell("reading")
+        records = load_records(bags, signals, tell)
         path = "clock_unknown" if offset is not None else cast(Forcing | None, forcing)
         found = find(
-            records, known, method=cast(Method, method), forcing=path, offset=offset, htf=cast(HtfMethod, htf)
+            records,
+            known,
+            method=cast(Method, method),
+            forcing=path,
+            offset=offset,
+            htf=cast(HtfMethod, htf),
+            tell=tell,
         )
     result = found.to_dict()
     show(result)

@@ -20,7 +20,7 @@ from rhythmid.simulation.signal import fast_length
 
 Array = NDArray[np.float64]
 Clock = Literal["command", "forcing", "output"]
-MOST = 200_000  # samples of a common grid
+MOST_SAMPLES = 200_000  # samples of a common grid
 OVERLAP = 0.3  # share of the shorter record that has to be common to both
 CLOSE = 0.03  # of the correlation, within which other offsets of a periodic command are tried as well
 TRIED = 12  # offsets of a periodic command
@@ -117,7 +117,7 @@ def _offsets(
 ) -> tuple[list[tuple[float, float]], float]:
     """Likely offsets [s] with their correlations, best first, and the grid's step [s]."""
     longest = max(c.time[-1] - c.time[0] for c in (recording, simulation))
-    step = max(min(recording.period, simulation.period), longest / MOST)
+    step = max(min(recording.period, simulation.period), longest / MOST_SAMPLES)
     a, b = _on_grid(recording, step), _on_grid(simulation, step)
     if centred:
         a, b = a - a.mean(), b - b.mean()

@@ -1,4 +1,4 @@
-"""Ways in and out: delays, lags, gains, offsets and drifts applied to a simulated motion itself, whatever their size."""
+"""Channel corrections: delays, lags, gains, offsets and drifts applied to a simulated motion itself, whatever their size."""
 
 import math
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Way:
+class Correction:
     """An effect on the way in or out, with its one number."""
 
     name: str
@@ -25,17 +25,17 @@ class Way:
     kind: str  # time, lag, gain, length, rate or skew: how it is searched and which unit it has
 
 
-WAYS = (
-    Way("sensor_offset", "sensor", "offset", 0.0, "length"),
-    Way("measurement_delay", "sensor", "delay", 0.0, "time"),
-    Way("input_delay", "command", "delay", 0.0, "time"),
-    Way("sensor_gain", "sensor", "gain", 1.0, "gain"),
-    Way("actuator_gain", "actuator", "gain", 1.0, "gain"),
-    Way("command_gain", "command", "gain", 1.0, "gain"),
-    Way("sensor_drift", "sensor", "rate", 0.0, "rate"),
-    Way("clock_skew", "timing", "skew", 0.0, "skew"),
-    Way("sensor_lag", "sensor", "time_constant", 0.0, "lag"),
-    Way("command_lag", "command", "time_constant", 0.0, "lag"),
+CORRECTIONS = (
+    Correction("sensor_offset", "sensor", "offset", 0.0, "length"),
+    Correction("measurement_delay", "sensor", "delay", 0.0, "time"),
+    Correction("input_delay", "command", "delay", 0.0, "time"),
+    Correction("sensor_gain", "sensor", "gain", 1.0, "gain"),
+    Correction("actuator_gain", "actuator", "gain", 1.0, "gain"),
+    Correction("command_gain", "command", "gain", 1.0, "gain"),
+    Correction("sensor_drift", "sensor", "rate", 0.0, "rate"),
+    Correction("clock_skew", "timing", "skew", 0.0, "skew"),
+    Correction("sensor_lag", "sensor", "time_constant", 0.0, "lag"),
+    Correction("command_lag", "command", "time_constant", 0.0, "lag"),
 )
 ALIKE = {  # what looks the same from outside
     "sensor_drift": ("a slow force",),
@@ -47,7 +47,7 @@ ALIKE = {  # what looks the same from outside
 
 
 def predicted(pair: Pair, values: Mapping[str, float]) -> Array:
-    """The simulated motion (n,) after effects on the way in and out, by the names of `WAYS`."""
+    """The simulated motion (n,) after effects on the way in and out, by the names of `CORRECTIONS`."""
     n = len(pair.time)
     mean = float(np.mean(pair.simulation))
     base = pair.cycle if pair.cycle is not None else np.full(n, mean)

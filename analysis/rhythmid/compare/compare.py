@@ -23,7 +23,7 @@ from rhythmid.identify.output_error import estimate, start_only
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.progress import Tell
-from rhythmid.record.outlier import without_stray
+from rhythmid.record.outlier import without_outliers
 from rhythmid.record.record import Channel, Record
 from rhythmid.report.comparison import LABELS
 from rhythmid.report.run import Run
@@ -226,7 +226,7 @@ def compare(
                 f"{simulation.name} holds a {simulation.output_kind}, {one.name} a {one.output_kind}; name the same quantity under 'output:'"
             )
     tell("aligning simulation and recording")
-    tidy = [without_stray(one) for one in recordings]
+    tidy = [without_outliers(one) for one in recordings]
     aligned = [(align(simulation, one), one, said) for one, said in tidy]
     alignment, recording, left_out = min(
         aligned, key=lambda case: (bool(case[0].mismatch), case[0].difference or 0.0)

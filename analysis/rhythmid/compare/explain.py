@@ -1,6 +1,6 @@
 """Explain the difference of two aligned motions without a model: what has to be done to one to become the other?
 
-Effects on the way in and out are applied to the simulated motion itself, whatever their size (`ways`). Forces are unknown smooth
+Effects on the way in and out are applied to the simulated motion itself, whatever their size (`corrections`). Forces are unknown smooth
 functions of position, velocity, phase or time, whose effect on the motion is found by an oscillator fitted to the simulation (`forces`);
 they are judged by stretches that were left out of their fit. Of explanations that do almost equally well the simplest is taken,
 and the search goes on with what it leaves.
@@ -13,19 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from rhythmid.compare.channel_corrections import ALIKE, WAYS, Way, predicted
+from rhythmid.compare.channel_corrections import ALIKE, CORRECTIONS, Correction, predicted
 from rhythmid.compare.forces import force_functions, foreign_line
 from rhythmid.compare.pair import Pair
 
 Array = NDArray[np.float64]
 FOLDS, DEALT = 5, 20  # folds of a cross-validation, stretches in each
-LEAST = 0.02  # share of what is left that an explanation has to take away to be one
-FAINT = 0.004  # share of the whole difference that it has to take away where the oscillator limits what can be explained
-SLIGHT = 0.001  # the same among ways in and out, which are applied exactly
-ROUGH = 0.05  # the same where limit cycle and response had to be shifted each for itself
+LEAST_SHARE = 0.02  # share of what is left that an explanation has to take away to be one
+LEAST_OF_WHOLE = 0.004  # share of the whole difference that it has to take away where the oscillator limits what can be explained
+LEAST_OF_WHOLE_CHANNEL = 0.001  # the same among channel corrections, which are applied exactly
+LEAST_OF_WHOLE_ROUGH = 0.05  # the same where limit cycle and response had to be shifted each for itself
 SIMPLER = 0.03  # share by which a simpler explanation may fall behind
-MOST = 4  # explanations
-TWINS = {
+MOST_EXPLANATIONS = 4  # explanations
+EQUIVALENT = {
     "command_lag": "input_delay", "input_delay": "command_lag", "sensor_lag": "measurement_delay", "measurement_delay": "sensor_lag",
 }  # fmt: skip
 UNITS = {"time": "s", "lag": "s", "gain": "", "skew": ""}
@@ -48,7 +48,7 @@ class Explanation:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """An explanation tried: sum of squares it leaves, how simple it is (0 the simplest), and the values of all ways or the columns
+    """An explanation tried: sum of squares it leaves, how simple it is (0 the simplest), and the values of all channel corrections or the columns
     of the function that it needs."""
 
     square: float
@@ -76,7 +76,7 @@ class Difference:
         self._settle()
 
     def without_force(self) -> None:
-        """Forget the force, so that it can be found anew beside the ways."""
+        """Forget the force, so that it can be found anew beside the channel corrections."""
         self.force = None
         self._settle()
 
@@ -109,8 +109,10 @@ class Difference:
         beyond = self.square - floor if self.square > 1.5 * floor else self.square
         return (self.square - square) / max(beyond, 1e-300)
 
-    def fitted(self, names: list[str], way: Way | None = None) -> tuple[float, dict[str, float]]:
-        """Sum of squares and values of these ways fitted together; of the last one, `way`, several starts are tried."""
+    def fitted(
+        self, names: list[str], correction: Correction | None = None
+    ) -> tuple[float, dict[str, float]]:
+        """Sum of squares and values of these corrections fitted together; of the last one, `correction`, several starts are tried."""
         pair = self.pair
         span, size, length = (
             1.0 / pair.frequency,
@@ -125,18 +127,18 @@ class Difference:
             "rate": size / length,
             "skew": 0.1 * span / length,
         }
-        kinds = {one.name: one for one in WAYS}
+        kinds = {one.name: one for one in CORRECTIONS}
         sizes = np.array([scale[kinds[name].kind] for name in names])
         begin = np.array([self.values.get(name, kinds[name].neutral) for name in names])
 
         def left(scaled: Array) -> Array:
             return self._left(dict(zip(names, scaled * sizes)))
 
-        if way is not None:
+        if correction is not None:
             first = {
                 "time": np.linspace(-0.5, 0.5, 25) * span, "lag": np.geomspace(2e-3, 0.5, 7) * span,
                 "gain": np.array([0.7, 1.0, 1.4]), "skew": np.linspace(-0.4, 0.4, 9) * span / length,
-            }.get(way.kind, np.array([way.neutral]))  # fmt: skip
+            }.get(correction.kind, np.array([correction.neutral]))  # fmt: skip
             tried = [float(np.sum(left(np.array([*begin[:-1], start]) / sizes) ** 2)) for start in first]
             begin[-1] = first[int(np.argmin(tried))]
         low = np.array([0.0 if kinds[name].kind == "lag" else -np.inf for name in names])
@@ -162,19 +164,23 @@ class Difference:
             total += float(np.sum((self.residual[test] - part[test] @ solution) ** 2))
         return total
 
-    def ways(self, blind: bool) -> list[Trial]:
-        """Every way in or out, joined to those already found; `blind` where the motions themselves were aligned."""
+    def corrections(self, blind: bool) -> list[Trial]:
+        """Every channel correction, joined to those already found; `blind` where the motions themselves were aligned."""
         found = []
-        for way in WAYS:
-            if way.name in self.values or (blind and way.name == "measurement_delay"):
+        for correction in CORRECTIONS:
+            if correction.name in self.values or (blind and correction.name == "measurement_delay"):
                 continue
-            if (self.pair.cycle is None and way.slot == "command") or (
-                self.pair.effort is None and way.slot == "actuator"
+            if (self.pair.cycle is None and correction.slot == "command") or (
+                self.pair.effort is None and correction.slot == "actuator"
             ):
                 continue
-            square, values = self.fitted([*self.values, way.name], way)
-            extra = ("input_delay",) if way.name == "measurement_delay" and self.pair.cycle is None else ()
-            what = Explanation(way.name, way.slot, 0.0, also=(*extra, *ALIKE.get(way.name, ())))
+            square, values = self.fitted([*self.values, correction.name], correction)
+            extra = (
+                ("input_delay",) if correction.name == "measurement_delay" and self.pair.cycle is None else ()
+            )
+            what = Explanation(
+                correction.name, correction.slot, 0.0, also=(*extra, *ALIKE.get(correction.name, ()))
+            )
             found.append(Trial(square, 0, what, values=values))
         return found
 
@@ -217,16 +223,22 @@ def explain(
         found.append(Explanation("another start", None, 1.0 - known.square / whole))
         rough = True
     floor = max(1.05 * len(known.residual) * pair.noise**2, 1e-12 * float(np.sum(pair.recording**2)))
-    for _ in range(MOST):
+    for _ in range(MOST_EXPLANATIONS):
         if known.square <= floor:
             break
         if known.force is not None and pair.effort is None:
             break
-        trials = known.ways(blind) + (known.forces() if known.force is None else [])
+        trials = known.corrections(blind) + (known.forces() if known.force is None else [])
         chosen = known.simplest(trials)
         gain = known.square - chosen.square
-        faint = ROUGH if rough else SLIGHT if known.force is None and chosen.values is not None else FAINT
-        if gain < LEAST * known.square or gain < faint * whole:
+        faint = (
+            LEAST_OF_WHOLE_ROUGH
+            if rough
+            else LEAST_OF_WHOLE_CHANNEL
+            if known.force is None and chosen.values is not None
+            else LEAST_OF_WHOLE
+        )
+        if gain < LEAST_SHARE * known.square or gain < faint * whole:
             break
         found.append(known.told(chosen))
         known.take(chosen)
@@ -244,14 +256,17 @@ def _pruned(known: Difference, found: list[Explanation], whole: float) -> list[E
         if one.name not in known.values or not rest:
             continue
         square, values = known.fitted(rest)
-        if square - known.square < (SLIGHT if known.force is None else FAINT) * whole:
+        if (
+            square - known.square
+            < (LEAST_OF_WHOLE_CHANNEL if known.force is None else LEAST_OF_WHOLE) * whole
+        ):
             known.take(Trial(square, 0, one, values=values))
             found = [other for other in found if other is not one]
     return found
 
 
 def _force_anew(known: Difference, found: list[Explanation]) -> list[Explanation]:
-    """The force found again now that the ways are known: it may be simpler than it looked through them."""
+    """The force found again now that the channel corrections are known: it may be simpler than it looked through them."""
     before = next(one for one in found if one.slot is not None and one.name not in known.values)
     known.without_force()
     chosen = known.simplest(known.forces())
@@ -266,22 +281,24 @@ def _force_anew(known: Difference, found: list[Explanation]) -> list[Explanation
 def _swapped(known: Difference, found: list[Explanation]) -> list[Explanation]:
     """The explanations with a lag in the place of a delay, or the reverse, where that does better beside all the others."""
     for one in list(found):
-        other = TWINS.get(one.name)
+        other = EQUIVALENT.get(one.name)
         if other is None or one.name not in known.values or other in known.values:
             continue
-        way = next(w for w in WAYS if w.name == other)
-        square, values = known.fitted([*(name for name in known.values if name != one.name), other], way)
+        correction = next(w for w in CORRECTIONS if w.name == other)
+        square, values = known.fitted(
+            [*(name for name in known.values if name != one.name), other], correction
+        )
         if square < known.square:
             known.take(Trial(square, 0, one, values=values))
-            named = replace(one, name=other, slot=way.slot, also=ALIKE.get(other, ()))
+            named = replace(one, name=other, slot=correction.slot, also=ALIKE.get(other, ()))
             found = [named if old is one else old for old in found]
     return found
 
 
 def _valued(one: Explanation, values: Mapping[str, float], unit: str) -> Explanation:
     """The explanation with the number that all of them together settled on."""
-    way = next((w for w in WAYS if w.name == one.name), None)
-    if way is None or one.name not in values:
+    correction = next((w for w in CORRECTIONS if w.name == one.name), None)
+    if correction is None or one.name not in values:
         return one
-    named = {"length": unit, "rate": f"{unit}/s"}.get(way.kind) or UNITS.get(way.kind, "")
-    return replace(one, values={way.parameter: (values[one.name], named)})
+    named = {"length": unit, "rate": f"{unit}/s"}.get(correction.kind) or UNITS.get(correction.kind, "")
+    return replace(one, values={correction.parameter: (values[one.name], named)})

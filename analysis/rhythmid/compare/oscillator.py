@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rhythmid.simulation.signal import fast_length
 
 Array = NDArray[np.float64]
-FEWEST = 8  # frequencies that a force has to hold; a single line takes three
+FEWEST_FREQUENCIES = 8  # frequencies that a force has to hold; a single line takes three
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,10 @@ def oscillator_of(
     answer = np.fft.rfft((motion - motion.mean()) * window)
     frequency = np.arange(len(force)) / (n * step)
     kept = (frequency > 1.5 / (n * step)) & (frequency < bandwidth)
-    if np.sum(np.abs(force) > 1e-2 * np.abs(force).max()) < FEWEST:
+    if np.sum(np.abs(force) > 1e-2 * np.abs(force).max()) < FEWEST_FREQUENCIES:
         return None
     kept &= np.abs(force) > 1e-3 * np.abs(force).max()
-    if kept.sum() < FEWEST:
+    if kept.sum() < FEWEST_FREQUENCIES:
         return None
     s, force, answer = 2j * np.pi * frequency[kept], force[kept], answer[kept]
     best, least = None, math.inf

@@ -14,8 +14,8 @@ from rhythmid.ltp.pumping import active_pumping
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-FEWEST = 64  # common samples below which nothing can be said
-PERIODS = 2.0  # of the motion that have to be common
+FEWEST_SAMPLES = 64  # common samples below which nothing can be said
+COMMON_PERIODS = 2.0  # of the motion that have to be common
 HARMONICS = 12  # of the forcing that a limit cycle is made of
 
 
@@ -24,7 +24,7 @@ class Pair:
     """Two motions (n,) on one even grid with step `step` [s], in the recording's time.
 
     `cycle` is the part of the simulated motion that repeats with the forcing, its mean included; None without forcing or
-    command, when ways in and out cannot be told apart. `command`, `effort` (forcing plus command), `phase` in [0, 1) where known;
+    command, when channel corrections cannot be told apart. `command`, `effort` (forcing plus command), `phase` in [0, 1) where known;
     `used` marks what counts; `noise` is the standard deviation of white noise in the difference; `frequency` [Hz] of the dominant
     motion; `bandwidth` [Hz] beyond which nothing moves; `pumping` [Hz] of the forcing; `oscillator` turns small forces into motion.
     """
@@ -67,9 +67,9 @@ def pair_of(simulation: Record, recording: Record, alignment: Alignment) -> tupl
     """Both motions at common times, and remarks. Raises InputError when they have too little in common."""
     offset = alignment.offset
     for one in (simulation, recording):
-        if len(one.output) < FEWEST:
+        if len(one.output) < FEWEST_SAMPLES:
             raise InputError(
-                f"{one.name}: has only {len(one.output)} samples of the output; {FEWEST} are needed to compare"
+                f"{one.name}: has only {len(one.output)} samples of the output; {FEWEST_SAMPLES} are needed to compare"
             )
         if np.ptp(one.output.value) == 0.0:
             raise InputError(f"{one.name}: the output never changes; there is nothing to compare")
@@ -79,7 +79,7 @@ def pair_of(simulation: Record, recording: Record, alignment: Alignment) -> tupl
         grid.time <= simulation.output.time[-1] + offset
     )
     common, value = grid.time[inside], np.asarray(grid.output[inside])
-    if len(common) < FEWEST:
+    if len(common) < FEWEST_SAMPLES:
         raise InputError(
             f"{simulation.name} and {recording.name} have only {len(common) / rate:.3g} s in common "
             f"(offset {offset:.4g} s by the {alignment.by}); record longer, or check that both ran the same experiment"
@@ -92,10 +92,10 @@ def pair_of(simulation: Record, recording: Record, alignment: Alignment) -> tupl
 
     time, step, real = average(common), block * grid.period, average(value)
     frequency = _dominant(real, step)
-    if frequency * (time[-1] - time[0]) < PERIODS:
+    if frequency * (time[-1] - time[0]) < COMMON_PERIODS:
         raise InputError(
             f"{simulation.name} and {recording.name} have {frequency * (time[-1] - time[0]):.2g} periods of the motion in common "
-            f"({time[-1] - time[0]:.3g} s); at least {PERIODS:g} are needed"
+            f"({time[-1] - time[0]:.3g} s); at least {COMMON_PERIODS:g} are needed"
         )
     simulated = average(smooth(simulation.output)(common - offset))
     command = None if grid.input is None else average(grid.input[inside])

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rhythmid.design.designer import Design
 
 Array = NDArray[np.float64]
-PERIODS = 4  # of the forcing that the motion is shown over
+SHOWN_PERIODS = 4  # of the forcing that the motion is shown over
 CYCLES = 60  # of the highest frequency that the command is shown over; more would be a block of ink
 COLOURS = {0: "black", 1: "tab:blue", 2: "tab:green", 3: "tab:orange", 4: "tab:red"}
 DEEPEST = 1e-2  # of the noise floor, below which nothing is drawn
@@ -54,7 +54,7 @@ def _command(axis: Axes, design: Design) -> None:
 def _motion(axis: Axes, design: Design) -> None:
     rate = design.requirements.rate
     far = int(np.argmax(np.abs(design.output - np.median(design.output))))
-    half = round(0.5 * PERIODS / design.requirements.forcing.frequency * rate)
+    half = round(0.5 * SHOWN_PERIODS / design.requirements.forcing.frequency * rate)
     first = int(np.clip(far - half, 0, max(0, len(design.output) - 2 * half)))
     shown = slice(first, first + 2 * half)
     time = np.arange(len(design.output)) / rate

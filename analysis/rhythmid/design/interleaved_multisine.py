@@ -21,7 +21,7 @@ from rhythmid.excitation.multisine import Multisine
 
 REPEATS = 2  # of the period: what differs between them is noise
 GROUP = 4  # of lines, one of which is left out
-FEWEST = 4  # lines that are worth the name
+FEWEST_LINES = 4  # lines that are worth the name
 
 
 def _pumping_periods(requirements: Requirements, ring_down: float) -> tuple[int, int]:
@@ -68,7 +68,7 @@ def closest_lines(low: int, high: int, periods: int, harmonics: int, spacings: r
     for spacing in spacings:
         for first in range(low | 1, min(low + spacing, high) + 1, 2):
             lines = spaced_lines(first, high, spacing)
-            if len(lines) >= FEWEST and ResponseLines(lines, periods, 1.0, harmonics).separate:
+            if len(lines) >= FEWEST_LINES and ResponseLines(lines, periods, 1.0, harmonics).separate:
                 return lines
     return None
 
@@ -107,15 +107,15 @@ def interleaved(requirements: Requirements, ring_down: float) -> Interleaving:
         spaced = closest_lines(low, high, periods, harmonics, range(2, max(3, high - low), 2))
         if spaced is None:
             raise InputError(
-                f"the design aliases: no {FEWEST} lines between {requirements.band[0]:g} and {requirements.band[1]:g} Hz with a "
+                f"the design aliases: no {FEWEST_LINES} lines between {requirements.band[0]:g} and {requirements.band[1]:g} Hz with a "
                 f"period of {period:g} s keep their sidebands up to ±{harmonics} apart; use a longer --duration, a wider "
                 "--band or fewer --harmonics"
             )
     else:
         spacing = 2 * round(0.5 * requirements.spacing * period)
-        if spacing < 2 or len(spaced_lines(low | 1, high, max(spacing, 2))) < FEWEST:
+        if spacing < 2 or len(spaced_lines(low | 1, high, max(spacing, 2))) < FEWEST_LINES:
             raise InputError(
-                f"--spacing {requirements.spacing:g} Hz leaves fewer than {FEWEST} odd lines of 1/{period:g} Hz in the band"
+                f"--spacing {requirements.spacing:g} Hz leaves fewer than {FEWEST_LINES} odd lines of 1/{period:g} Hz in the band"
             )
         spaced = closest_lines(low, high, periods, harmonics, range(spacing, spacing + 1))
         if spaced is None:

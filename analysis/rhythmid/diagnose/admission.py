@@ -13,7 +13,7 @@ from rhythmid.identify.drive import drive_of, driven
 from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
 from rhythmid.record.gaps import cut_at_gaps
-from rhythmid.record.outlier import without_stray
+from rhythmid.record.outlier import without_outliers
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import clipped_samples
 from rhythmid.record.record import Record
@@ -39,7 +39,7 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
     """
     whole = (*records, *holdout)
     remark = check_driven(whole, model)
-    tidy = [without_stray(record) for record in whole]
+    tidy = [without_outliers(record) for record in whole]
     cleaned = [without_clipped(record) for record, _ in tidy]
     given = tuple(driven(record, model) for record, _ in cleaned)
     check_comparable(prepare(given))

@@ -5,6 +5,7 @@ have it in one place only. Kin of a chosen effect (the other lags, the other law
 Each is a hypothesis like any other, fitted and scored in the same way.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -32,7 +33,7 @@ SIGNALS: tuple[Slot, ...] = ("command", "actuator", "sensor")  # what a law with
 CLOCKS: tuple[Slot, ...] = ("command", "timing")  # what has a delay that may drift
 LONGER = (2.0, 5.0, 12.0, 30.0)  # samples, at which a longer delay is sought
 SERIES = 3  # laws of one quantity that are more likely a series for one law than causes of their own; two of them real springs have
-LONGEST = 0.25  # periods of the motion: a longer one is another minimum of the same
+LONGEST_DELAY = 0.25  # periods of the motion: a longer one is another minimum of the same
 
 
 def alternatives(
@@ -45,10 +46,12 @@ def alternatives(
     known: Trajectories,
     rounds: Sequence[Round],
     weighed: Sequence[Trial],
+    reach: float = math.inf,
 ) -> list[tuple[Trial, Kind]]:
     """Fitted trials of other kinds, for the nominal model and in the place of the chosen effects.
 
-    `known` is the chosen run, `rounds` are the search's scores, and `weighed` the models that are hypotheses already.
+    `known` is the chosen run, `rounds` are the search's scores, and `weighed` the models that are hypotheses already. One whose chi2 would not
+    come to `reach` is not carried to convergence.
     """
     sizes = scales(series, chosen.model)
     freed: list[Proposal] = list(_freed(nominal))
@@ -79,7 +82,7 @@ def alternatives(
     if not kinds:
         return []
     states = compile_model(chosen.model).layout.states
-    trials, _ = run_trials(list(proposals.values()), series, chosen.starts, states, noise, step)
+    trials, _ = run_trials(list(proposals.values()), series, chosen.starts, states, noise, step, reach=reach)
     return [(trial, kinds[tuple(sorted(trial.added))]) for trial in trials]
 
 
@@ -164,7 +167,7 @@ def _longer_delay(base: Trial, series: Sequence[Series]) -> Iterator[Proposal]:
     if delay is None or delay.prior is None:
         return
     period = max(one.period for one in series)
-    most = LONGEST / max(dominant_frequency(one) for one in series)
+    most = LONGEST_DELAY / max(dominant_frequency(one) for one in series)
     free = base.model.with_parameters(
         {INPUT_DELAY: replace(delay, value=0.0, prior=None, bounds=(delay.bounds[0], most))}
     )

@@ -19,8 +19,8 @@ from rhythmid.identify.series import REST_LENGTH, Series, dominant_frequency
 from rhythmid.model import INERTIA, Model, Prior
 from rhythmid.progress import Tell
 from rhythmid.simulation.signal import band_limited, first_order_hold
+from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 
-INPUT_DELAY = "input_delay.delay"
 NO_ORIGIN = "No position was measured, so that its origin is arbitrary: the spring's rest length is kept as it was given."
 EARLIEST, LATEST = (
     1.5,
@@ -28,7 +28,7 @@ EARLIEST, LATEST = (
 )  # samples that the input's delay may be short of none, and of which a nuisance may be
 EVEN = 1e-3  # of the period; spread of the times between samples that still counts as even
 FOLLOWS = 0.3  # error, as a share of the motion, below which a model follows the machine
-GAIN = 0.7  # share to which a delay far from its start has to lower the error, or it but stands in for what is missing
+STANDS_IN = 0.7  # share to which a delay far from its start has to lower the error, or it but stands in for what is missing
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def _no_mass(model: Model) -> str:
 
 def _scan_delays(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Fit:
     """Try delays that are far from the start: a delay beyond half a period of the motion is another local minimum."""
-    names = [name for name in (INPUT_DELAY, "measurement_delay.delay") if name in fit.names]
+    names = [name for name in (INPUT_DELAY, MEASUREMENT_DELAY) if name in fit.names]
     best = fit
     for name in names:
         for delay in (0.03, 0.08, 0.15, 0.25):
@@ -167,7 +167,7 @@ def _scan_delays(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | 
     if best is fit:
         return fit
     found = estimate(best.model, series, pool=pool)
-    return found if found.nrmse() < GAIN * fit.nrmse() else fit
+    return found if found.nrmse() < STANDS_IN * fit.nrmse() else fit
 
 
 def reconstructed(series: Series) -> Series:

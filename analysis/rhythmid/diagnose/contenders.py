@@ -4,6 +4,7 @@ All are scored on the same rows: the whitened residuals of what the fit saw, pre
 not see, the hidden ends of the same records or separate ones.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -28,6 +29,7 @@ from rhythmid.identify.series import Series, record_of
 from rhythmid.identify.start_cost import felt_starts, start_freedom
 from rhythmid.identify.student import autocorrelation_time
 from rhythmid.parallel import fork_map
+from rhythmid.progress import Tell, counted, silent
 
 Array = NDArray[np.float64]
 Shape = Callable[[Trial], Mapping[str, float]]
@@ -44,6 +46,7 @@ class Rows:
     unseen : separate series that no fit sees.
     noise : noise model under which residuals are whitened.
     record : (n,) record of each row: the seen rows first, then the hidden ones, then those of separate series.
+    spread : (n,) relative standard deviation of the noise of each row, see `Series`.
     blocks : blocks of the rows.
     size : rms of what errors are a share of, over all rows.
     heldout_size : the same over the rows that no fit sees; 0 without any.
@@ -54,6 +57,7 @@ class Rows:
     unseen: tuple[Series, ...]
     noise: NoiseModel
     record: Whole
+    spread: Array
     blocks: Blocks
     size: float
     heldout_size: float = 0.0
@@ -77,6 +81,7 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
     names = list(dict.fromkeys(record_of(one) for one in series))
     other_names = list(dict.fromkeys(record_of(one) for one in unseen))
     lengths: list[tuple[int, int]] = []
+    spread: list[Array] = []
     power, total, held_power, held_total = 0.0, 0, 0.0, 0
     for parts, group, first in (
         (seen, series, 0),
@@ -90,6 +95,7 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
             mask = np.zeros(one.blocks, bool)
             for part in slices:
                 mask[part] = True
+                spread.append(one.spread_of(part))
             power, total = power + one.power(mask), total + count
             if group is unseen or parts is hidden:
                 held_power, held_total = held_power + one.power(mask), held_total + count
@@ -101,20 +107,21 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
         tuple(unseen),
         noise,
         record,
+        np.concatenate(spread),
         Blocks.of(record, noise.order, held),
         float(np.sqrt(power / max(total, 1))),
         float(np.sqrt(held_power / max(held_total, 1))),
     )
 
 
-def _stretched(rows: Rows, values: Sequence[Array], which: tuple[tuple[slice, ...], ...]) -> list[Array]:
-    return [value[part] for value, parts in zip(values, which) for part in parts]
-
-
 def linearised(fit: Fit, rows: Rows) -> Linearised:
     """A fit on the rows: what it leaves of each, and how what it saw depends on its parameters."""
     unseen = [_of_unseen(fit, rows)] if rows.unseen else []
-    hidden = [rows.noise.whiten(part) for part in _stretched(rows, fit.residuals, rows.hidden)]
+    hidden = [
+        rows.noise.whiten(one.levelled(residual[part], part))
+        for one, residual, parts in zip(fit.run.series, fit.residuals, rows.hidden)
+        for part in parts
+    ]
     residual = np.concatenate([fit.linearisation.residual, *hidden, *unseen])
     jacobian = np.zeros((len(residual), len(fit.names)))
     jacobian[: len(fit.linearisation.residual)] = fit.linearisation.jacobian
@@ -136,7 +143,7 @@ def _of_unseen(fit: Fit, rows: Rows) -> Array:
     except InputError:
         return np.concatenate(
             [
-                rows.noise.whiten(one.averaged[part] - one.averaged.mean())
+                rows.noise.whiten(one.levelled(one.averaged[part] - one.averaged.mean(), part))
                 for one in rows.unseen
                 for part in _long_enough(one, rows.noise)
             ]
@@ -150,12 +157,13 @@ def _long_enough(one: Series, noise: NoiseModel, hidden: bool = False) -> tuple[
 
 @dataclass(frozen=True)
 class Contender:
-    """A fitted model with the errors of its predictions, in units of the noise and in the measurement's."""
+    """A fitted model with the errors of its predictions, in units of the noise and in the measurement's, and its free parameters."""
 
     trial: Trial
     kind: Kind
     found: CrossValidated
     error: Array
+    values: Mapping[str, float]
 
 
 def measured_errors(error: Array, rows: Rows) -> Array:
@@ -166,16 +174,26 @@ def measured_errors(error: Array, rows: Rows) -> Array:
     for length in lengths:
         made.append(rows.noise.colour(error[first : first + length]))
         first += length
-    return np.concatenate(made)
+    return rows.spread * np.concatenate(made)
 
 
 def contend(
-    trials: Sequence[tuple[Trial, Kind]], series: Sequence[Series], rows: Rows, step: float
+    trials: Sequence[tuple[Trial, Kind]],
+    series: Sequence[Series],
+    rows: Rows,
+    step: float,
+    reach: float = math.inf,
+    tell: Tell = silent,
 ) -> list[Contender]:
-    """Contenders of these trials, in their order; those that diverge are left out."""
+    """Contenders of these trials, in their order; those that diverge are left out.
 
-    def one(case: tuple[Trial, Kind]) -> tuple[CrossValidated, Array]:
-        fit = whole_fit(case[0], series, rows.noise, step)
+    Chi2 of those that matter comes to `reach`; what does not is weighed as far as it has come. The nominal model is a measure for
+    all and always fitted whole.
+    """
+
+    def one(case: tuple[Trial, Kind]) -> tuple[CrossValidated, Array, dict[str, float]]:
+        needed = math.inf if case[1] == "nominal" else reach
+        fit = whole_fit(case[0], series, rows.noise, step, reach=needed)
         found = cross_validate(linearised(fit, rows), rows.blocks)
         state_steps = fit.linearisation.state_steps
         free = start_freedom(
@@ -183,9 +201,11 @@ def contend(
         )
         if free > 0.0:  # spread over what the fit saw
             found = replace(found, penalty=free / max(rows.fitted, 1))
-        return found, measured_errors(found.error, rows)
+        values = dict(zip(fit.names, fit.values.tolist(), strict=True))
+        return found, measured_errors(found.error, rows), values
 
-    done = {i: r for i, r in fork_map(one, list(trials)) if not isinstance(r, Exception)}
+    results = counted(fork_map(one, list(trials)), len(trials), "hypotheses", tell)
+    done = {i: r for i, r in results if not isinstance(r, Exception)}
     return [Contender(*trials[i], *done[i]) for i in sorted(done)]
 
 
@@ -202,6 +222,7 @@ def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> 
             heldout_error(one.error, rows),
             shape(one.trial) if one.kind == "effects" else {},
             richer_of(one.trial.model, one.trial.added),
+            one.values,
         )
         for one in contenders
     ]

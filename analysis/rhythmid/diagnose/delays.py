@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from rhythmid.identify.output_error import Fit
+from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 
-NAMES = {"input": "input_delay.delay", "measurement": "measurement_delay.delay"}
+NAMES = {"input": INPUT_DELAY, "measurement": MEASUREMENT_DELAY}
 
 
 def delays_of(fit: Fit) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from rhythmid.diagnose.baseline import causal, check_free
 from rhythmid.diagnose.case import Budget, Case
 from rhythmid.diagnose.constants import LEFT
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
-from rhythmid.diagnose.effort.search import MOST
+from rhythmid.diagnose.effort.search import MOST_EFFECTS
 from rhythmid.diagnose.free_map import without_free_maps
 from rhythmid.diagnose.free_run import FreeRunResult, free_run
 from rhythmid.diagnose.replay import ledger
@@ -152,7 +152,7 @@ def _answers(case: Case, effort: Applicability, notes: Sequence[str]) -> Iterato
         yield _by_effort(case, effort, notes)
 
 
-def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST) -> Answer:
+def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST_EFFECTS) -> Answer:
     result = effort_run(case, effort, most)
     return Answer(compose_effort(case, result, notes), result.chosen.model, result)
 

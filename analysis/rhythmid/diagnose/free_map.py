@@ -16,7 +16,7 @@ from rhythmid.model import Model
 Array = NDArray[np.float64]
 COEFFICIENTS = 10
 MARGIN = 0.05  # of the range of its quantity, by which a map reaches further on either side
-LEAST = 1e-9  # range of a map whose quantity never changes, as a share of its size
+LEAST_RANGE = 1e-9  # range of a map whose quantity never changes, as a share of its size
 
 
 def _force(x, v, t, f, low, high, share, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9):
@@ -77,7 +77,7 @@ FREE_MAPS: Mapping[str, Element] = {
 def first_guess(values: Array) -> dict[str, float]:
     """Values of a map over the range of a quantity (n,), zero everywhere."""
     low, high = (float(end) for end in np.quantile(values, [0.0, 1.0]))
-    margin = max(MARGIN * (high - low), LEAST * max(abs(low), abs(high)), LEAST**2)
+    margin = max(MARGIN * (high - low), LEAST_RANGE * max(abs(low), abs(high)), LEAST_RANGE**2)
     return {"low": low - margin, "high": high + margin} | {f"c{i}": 0.0 for i in range(COEFFICIENTS)}
 
 

@@ -26,7 +26,7 @@ from rhythmid.diagnose.intervals import profiled
 from rhythmid.diagnose.location import Dependence, dependences
 from rhythmid.diagnose.scoring import Scoring
 from rhythmid.diagnose.search.forward import Search, search
-from rhythmid.diagnose.search.refit import whole_fit
+from rhythmid.diagnose.search.refit import reach_of, whole_fit
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories, under
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest, Selection, select
@@ -73,7 +73,8 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     step = found.fit.run.max_step
     rows = rows_of(seen, unseen, found.noise)
     kinds: list[tuple[Trial, Kind]] = [(t, "effects" if t.added else "nominal") for t in found.trials]
-    contenders = contend(kinds, seen, rows, step)
+    reach = reach_of(found.fit.chi2, found.fit.samples)
+    contenders = contend(kinds, seen, rows, step, reach, case.tell)
     run = trajectories(found.fit)
     sizes = scales(seen, found.fit.model)
     chosen = select(_contest(contenders, {}, rows, found, run, sizes)).chosen
@@ -83,8 +84,10 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     if not case.budget.spent and chosen.kind != "freed_value":
         nominal = next(one.trial for one in contenders if one.kind == "nominal")
         weighed = [one.trial for one in contenders]
-        others = alternatives(nominal, trial, seen, known, found.noise, step, run, found.rounds, weighed)
-        contenders += contend(others, seen, rows, step)
+        others = alternatives(
+            nominal, trial, seen, known, found.noise, step, run, found.rounds, weighed, reach
+        )
+        contenders += contend(others, seen, rows, step, reach, case.tell)
     case.tell("locating what is left")
     after = dependences(run, rows, case.pool)
     contest = _contest(contenders, _maps(after, contenders, rows), rows, found, run, sizes)

@@ -55,6 +55,7 @@ class Hypothesis:
     heldout_nrmse : error on held-out data, as a share of the motion or the effort; None where there are none.
     shape : statistics of the fitted effects themselves, by the name of the rule that looks at them.
     richer : of each name, the laws that contain it.
+    values : the free parameters as fitted.
     """
 
     elements: tuple[str, ...]
@@ -65,6 +66,7 @@ class Hypothesis:
     heldout_nrmse: float | None = None
     shape: Mapping[str, float] = field(default_factory=dict)
     richer: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    values: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def key(self) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 END = 2.0  # standard deviations at which chi2 should have risen by their square
-FAR = 8.0, 32.0  # further ones at which it is looked whether it has
+FURTHER_DEVIATIONS = 8.0, 32.0  # further ones at which it is looked whether it has
 ODD = 2.0  # times more or less than that rise, from which on the others are fitted again;
 LITTLE = 8.0  # times less further on, where few likelihoods are parabolas
 FLAT = 0.25  # of that rise with the others fitted, below which an interval is too narrow
@@ -82,7 +82,7 @@ def _reach(fit: Fit, places: Sequence[int], pool: ThreadPoolExecutor | None) -> 
     """How far from the fit each parameter (p,) is still likely, as far as the covariance does not say so: infinite where it
     is undetermined, 0 without such a finding. And the model where chi2 falls, if there is one."""
     ways = [
-        [_Way(place, sign * deviations) for deviations in (END, *FAR)]
+        [_Way(place, sign * deviations) for deviations in (END, *FURTHER_DEVIATIONS)]
         for place in places
         for sign in (-1.0, 1.0)
     ]

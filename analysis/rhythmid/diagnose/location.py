@@ -8,7 +8,7 @@ whether the names leave something that another explanation would predict. It als
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -21,6 +21,7 @@ from rhythmid.diagnose.contenders import Rows, linearised
 from rhythmid.diagnose.evidence import CrossValidated, Linearised, cross_validate
 from rhythmid.diagnose.search.score_tests import Trajectories, residual_line
 from rhythmid.identify.output_error import Fit
+from rhythmid.identify.series import Series
 from rhythmid.simulation.signal import first_order_hold
 
 Array = NDArray[np.float64]
@@ -112,11 +113,10 @@ def _simulated(
     return tuple(pool.map(one, functions)) if pool else tuple(one(function) for function in functions)
 
 
-def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> list[FreeMap]:
-    """The free functions beside a fitted model."""
+def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:
+    """The free functions beside a fitted model, each made when it is asked for: over long records each is large."""
     fit = known.fit
     none, nowhere = np.empty(0), np.empty((0, 0))
-    found: list[FreeMap] = []
     moving = any(np.ptp(p.effort) > 0 for p in known.paths)
     quantities: dict[str, list[Array]] = {
         "position": [p.position for p in known.legs],
@@ -128,29 +128,26 @@ def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> li
     for name, values in quantities.items():
         functions, grid, basis = _splines(values, SPLINES)
         if functions:
-            found.append(FreeMap(name, _simulated(known, functions, pool), grid, basis))
+            yield FreeMap(name, _simulated(known, functions, pool), grid, basis)
     both = [_splines(quantities[name], SPLINES_OF_TWO)[0] for name in ("position", "velocity")]
     if all(both):
         products = [[a * b for a, b in zip(x, v)] for x in both[0] for v in both[1]]
-        found.append(FreeMap("position and velocity", _simulated(known, products, pool), none, nowhere))
+        yield FreeMap("position and velocity", _simulated(known, products, pool), none, nowhere)
     times = [p.time for p in known.paths]
     frequency = _frequency(known)
     past = {"past velocity": [p.velocity for p in known.legs]}
     if moving:
         past["past actuator force"] = [p.effort for p in known.paths]
     for name, values in past.items():
-        found.append(
-            FreeMap(name, _simulated(known, _remembered(values, times, frequency), pool), none, nowhere)
-        )
+        yield FreeMap(name, _simulated(known, _remembered(values, times, frequency), pool), none, nowhere)
     line = residual_line(fit)
     if line > 0.0:
         waves = [[wave(2.0 * np.pi * line * t) for t in times] for wave in (np.cos, np.sin)]
-        found.append(FreeMap(f"a vibration at {line:.3g} Hz", _simulated(known, waves, pool), none, nowhere))
+        yield FreeMap(f"a vibration at {line:.3g} Hz", _simulated(known, waves, pool), none, nowhere)
     functions, grid, basis = _splines(list(known.outputs), SPLINES)
     if functions:
         columns = tuple(tuple(s.of_block(f) for s, f in zip(fit.run.series, one)) for one in functions)
-        found.append(FreeMap("measured position (sensor error)", columns, grid, basis))
-    return found
+        yield FreeMap("measured position (sensor error)", columns, grid, basis)
 
 
 def _frequency(known: Trajectories) -> float:
@@ -180,8 +177,9 @@ class Reach:
         return hidden - self.starts / norms @ taken
 
 
-def _white(rows: Rows, values: Array, parts: Sequence[slice]) -> Array:
-    return np.concatenate([rows.noise.whiten(values[part]) for part in parts] or [values[:0]])
+def _white(rows: Rows, one: Series, values: Array, parts: Sequence[slice]) -> Array:
+    white = [rows.noise.whiten(one.levelled(values[part], part)) for part in parts]
+    return np.concatenate(white or [values[:0]])
 
 
 def reach_of(fit: Fit, rows: Rows, pool: ThreadPoolExecutor | None = None) -> list[Reach]:
@@ -198,7 +196,7 @@ def reach_of(fit: Fit, rows: Rows, pool: ThreadPoolExecutor | None = None) -> li
         for column, output in enumerate(outputs):
             if output is not None:
                 change[:, column] = (output[index] - series.averaged - residual) / scale[column]
-        seen, hidden = (_white(rows, change, which[index]) for which in (rows.seen, rows.hidden))
+        seen, hidden = (_white(rows, series, change, which[index]) for which in (rows.seen, rows.hidden))
         plain = Reach(hidden[:, :p], hidden[:, p:], seen[:, p:])
         found.append(Reach(plain.refitted(seen[:, :p], hidden[:, :p]), plain.starts, plain.seen))
     return found
@@ -218,9 +216,10 @@ def beside(fit: Fit, base: Linearised, one: FreeMap, rows: Rows, reach: Sequence
     seen, hidden = [], []
     for index, basis in enumerate(fit.linearisation.bases):
         columns = np.column_stack([column[index] for column in one.columns])
-        white = _white(rows, columns, rows.seen[index])
+        series = fit.run.series[index]
+        white = _white(rows, series, columns, rows.seen[index])
         seen.append(white - basis @ (basis.T @ white))
-        hidden.append(reach[index].refitted(white, _white(rows, columns, rows.hidden[index])))
+        hidden.append(reach[index].refitted(white, _white(rows, series, columns, rows.hidden[index])))
     added = np.concatenate([*seen, *hidden])
     wide = np.zeros((len(base.residual), added.shape[1]))
     wide[: len(added)] = added

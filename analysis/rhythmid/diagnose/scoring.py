@@ -16,16 +16,16 @@ from rhythmid.diagnose.baseline import FOLLOWS, Calibration, calibrate, reconstr
 from rhythmid.diagnose.hypothesis import ScoringKind
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
-from rhythmid.identify.multiple_shooting import LEAST, forgets, periods_long
+from rhythmid.identify.multiple_shooting import LEAST_BLOCKS, forgets, periods_long
 from rhythmid.identify.multiple_shooting import windows as cut_up
 from rhythmid.identify.output_error import Fit
 from rhythmid.identify.series import Series, hold_out_tail
 from rhythmid.model import Model
 from rhythmid.progress import Tell
 
-GAIN = 0.9  # share to which a step to shorter windows has to lower the error
+BETTER_STEP = 0.9  # share to which a step to shorter windows has to lower the error
 PATIENCE = 2  # steps without such a gain before no more are tried
-BETTER = 0.6  # share to which all steps together have to: an error that adds up, not one made at once by noise or effect
+BETTER_TOGETHER = 0.6  # share to which all steps together have to: an error that adds up, not one made at once by noise or effect
 HOPELESS = 0.8  # error, as a share of the motion, of a free run along which a score says nothing
 SHORTER = 2.0  # factor from one length of windows to the next
 INTEGRATES = (
@@ -83,7 +83,7 @@ def settle(
         except InputError as error:
             failure = failure or error
             continue
-        if tried and _error(calibration.fit) > GAIN * tried[-1].error:
+        if tried and _error(calibration.fit) > BETTER_STEP * tried[-1].error:
             idle += 1
             if idle == PATIENCE:
                 break
@@ -99,7 +99,7 @@ def settle(
         assert failure is not None
         raise failure
     longest, best = tried[0], tried[-1]
-    if best.error >= BETTER * longest.error:
+    if best.error >= BETTER_TOGETHER * longest.error:
         return (longest,)
     near = longest.kind == "free_run" and longest.calibration.fit.nrmse() < HOPELESS
     return (best, longest) if near and best is not longest else (best,)
@@ -123,7 +123,7 @@ def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
     if free:
         yield _Way("free_run", FREE_RUN, list)
     length = float(np.median([periods_long(one) for one in series]))
-    shortest = LEAST * max(one.period * one.block for one in series)
+    shortest = LEAST_BLOCKS * max(one.period * one.block for one in series)
     while length >= shortest:
         yield _Way("windows", _words(length, LOSES if free else INTEGRATES), partial(cut_up, length=length))
         length /= SHORTER

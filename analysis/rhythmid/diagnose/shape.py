@@ -19,9 +19,9 @@ from rhythmid.model import Model, Term
 from rhythmid.simulation.effect import Path, effect_along
 
 Array = NDArray[np.float64]
-POINTS = 400  # instants at which an effect is tried
+INSTANTS = 400  # instants at which an effect is tried
 REACH = 1.2  # times the ranges of the motion, which no part of it exceeds, nor of what a limit has cut off
-FAR = 1e3  # times these ranges, where every kink shows
+FAR_RANGES = 1e3  # times these ranges, where every kink shows
 DAMPING = "damping_ratio"  # of a resonance: it is as wide as this share of its frequency
 
 
@@ -51,7 +51,7 @@ def _acts_within(known: Trajectories, model: Model, term: Term) -> float:
         return math.inf
     values = {name: value.value for name, value in term.values.items()}
     bent: list[float] = []
-    for times in (REACH, FAR):
+    for times in (REACH, FAR_RANGES):
         path = _instants(_met(known, element), times)
         effect = effect_along(element, values, model, path)
         left = curved(effect, path.position, path.velocity, path.effort, path.signal, path.time)
@@ -103,9 +103,9 @@ def _instants(met: Path, times: float) -> Path:
 
     def drawn(values: Array) -> Array:
         low, high = float(values.min()), float(values.max())
-        return 0.5 * (low + high) + times * 0.5 * (high - low) * rng.uniform(-1.0, 1.0, POINTS)
+        return 0.5 * (low + high) + times * 0.5 * (high - low) * rng.uniform(-1.0, 1.0, INSTANTS)
 
     return Path(
-        np.linspace(met.time.min(), met.time.max(), POINTS),
+        np.linspace(met.time.min(), met.time.max(), INSTANTS),
         *(drawn(values) for values in (met.position, met.velocity, met.effort, met.leg, met.signal)),
     )

@@ -16,7 +16,7 @@ from rhythmid.model import Model
 from rhythmid.simulation.effect import Path, effect_along
 
 Array = NDArray[np.float64]
-POINTS = 400  # instants at which an effect is tried
+INSTANTS = 400  # instants at which an effect is tried
 SPREAD = 3.0  # standard deviations of velocity and force that they cover
 MOSTLY = 0.3  # change, as a share of the effect, below which other quantities only correct it, as the damping of a stop
 SAME = 1e-9  # share of the effect below which what is left of it is rounding
@@ -34,7 +34,7 @@ def law_of(
     element: Element, values: Mapping[str, float], model: Model, sizes: Scales
 ) -> tuple[str, Array] | None:
     """The one quantity of which the effect is a curved function: position, velocity, effort (the actuator's force) or
-    signal (what enters a command, actuator or sensor element), and the curved part of it (POINTS,), at the same instants
+    signal (what enters a command, actuator or sensor element), and the curved part of it (INSTANTS,), at the same instants
     for every effect. None where the effect is straight, remembers, or takes several quantities. Raises nothing of its own.
 
     `values` and `sizes` are in SI units (those of the sensor for a sensor element), the curved part in the unit of the
@@ -43,10 +43,10 @@ def law_of(
         return None
     rng = np.random.default_rng(0)
     width = {"velocity": SPREAD * sizes.velocity, "effort": SPREAD * sizes.effort, "leg": sizes.force}
-    drawn = {name: rng.uniform(-half, half, POINTS) for name, half in width.items()}
-    drawn["position"] = rng.uniform(sizes.low, sizes.high, POINTS)
+    drawn = {name: rng.uniform(-half, half, INSTANTS) for name, half in width.items()}
+    drawn["position"] = rng.uniform(sizes.low, sizes.high, INSTANTS)
     drawn["signal"] = drawn["position" if element.slot == "sensor" else "effort"]
-    path = Path(time=np.linspace(0.0, sizes.duration, POINTS), **drawn)
+    path = Path(time=np.linspace(0.0, sizes.duration, INSTANTS), **drawn)
     effect = effect_along(element, values, model, path)
     size = float(np.abs(effect).max())
     for name in ("signal",) if element.slot != "force" else ("position", "velocity", "effort"):

@@ -265,8 +265,3 @@ class Element:
         Empty where the effect says that the motion does not show it. Raises NoGuess with the reason where there is no telling.
         """
         return self.starts(scales) if self.starts is not None else generic_guesses(self, scales)
-
-    @property
-    def deterministic(self) -> bool:
-        """Whether a noise-free simulation includes it."""
-        return self.sampler is None

@@ -2,12 +2,15 @@
 
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import AfterValidator, ValidationInfo
 
 from rhythmid.excitation.excitation import Array, Excitation
 from rhythmid.time_table import read_time_table
+
+IN_FOLDER = "folder"  # key of the validation's context
 
 
 @lru_cache(maxsize=8)
@@ -15,11 +18,16 @@ def _table(file: str) -> tuple[Array, Array]:
     return read_time_table(file, "force [N]")
 
 
+def _resolved(file: Path, info: ValidationInfo) -> Path:
+    """A file's name in a description is relative to the file that holds the description."""
+    return (info.context or {}).get(IN_FOLDER, Path()) / file
+
+
 class Samples(Excitation):
     """u(t) from a CSV file with columns time [s] and force [N]; each value holds until the next."""
 
     type: Literal["samples"] = "samples"
-    file: Path
+    file: Annotated[Path, AfterValidator(_resolved)]
     scale: float = 1.0
 
     @property

@@ -5,15 +5,16 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter
 
-from rhythmid.errors import InputError
+from rhythmid.document import as_node
 from rhythmid.excitation.chirp import Chirp
 from rhythmid.excitation.excitation import Array, Excitation
 from rhythmid.excitation.multisine import Multisine
 from rhythmid.excitation.profile import Profile
-from rhythmid.excitation.samples import Samples
+from rhythmid.excitation.samples import IN_FOLDER, Samples
 from rhythmid.excitation.silence import Silence
+from rhythmid.validation import validated
 
 
 class Sequence(Excitation):
@@ -50,28 +51,11 @@ Sequence.model_rebuild()
 _ADAPTER: TypeAdapter[Excitation] = TypeAdapter(AnyExcitation)
 
 
-def _resolve(spec: Any, folder: Path) -> Any:
-    """File names in the description are relative to the file that holds it."""
-    if isinstance(spec, Mapping):
-        return {
-            key: str(folder / value) if key == "file" else _resolve(value, folder)
-            for key, value in spec.items()
-        }
-    if isinstance(spec, (list, tuple)):
-        return [_resolve(item, folder) for item in spec]
-    return spec
-
-
 def build(spec: Mapping[str, Any], folder: str | Path = ".") -> Excitation:
     """The excitation that `spec` describes: {type: chirp | multisine | profile | samples | silence | sequence, …}.
 
-    Raises InputError, naming the key, for whatever is wrong.
+    File names in it are relative to `folder`. Raises InputError, naming the key, for whatever is wrong.
     """
-    try:
-        made = _ADAPTER.validate_python(_resolve(spec, Path(folder)))
-        _ = made.duration
-        return made
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"][1:]) or "excitation"
-        raise InputError(f"excitation: {where}: {first['msg'].removeprefix('Value error, ')}") from None
+    made = validated(as_node(spec, "excitation"), _ADAPTER, {IN_FOLDER: Path(folder)})
+    _ = made.duration  # reads the table of samples
+    return made

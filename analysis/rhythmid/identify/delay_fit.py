@@ -17,7 +17,7 @@ from rhythmid.ltp.regularised_least_squares import HAT, HtfEstimate
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 HIGHEST = 40.0  # [rad/s] upper limit of the integral in (16)
-LEAST = 4  # bins from which a phase can be read
+LEAST_BINS = 4  # bins from which a phase can be read
 LARGEST = 1.0  # [s] largest sum of the delays that is considered
 
 
@@ -90,12 +90,12 @@ def _legible(estimate: HtfEstimate, m: int) -> NDArray[np.bool_]:
     """Bins of harmonic m that the excitation reaches: those up to the limit of (16), or all where a machine works above it."""
     reached = estimate.reached[estimate.htf.row(m)]
     below = reached & (2.0 * np.pi * estimate.htf.frequency <= HIGHEST)
-    return below if below.sum() >= LEAST else reached
+    return below if below.sum() >= LEAST_BINS else reached
 
 
 def shows_delays(estimate: HtfEstimate, m: int) -> bool:
     """Whether the excitation reaches harmonic m at enough frequencies to read delays from its phase."""
-    return bool(_legible(estimate, m).sum() >= LEAST)
+    return bool(_legible(estimate, m).sum() >= LEAST_BINS)
 
 
 def _phase(estimate: HtfEstimate, model: Complex, m: int, weigh_by_noise: bool = False) -> _Phase:
@@ -103,7 +103,7 @@ def _phase(estimate: HtfEstimate, model: Complex, m: int, weigh_by_noise: bool =
     measured = estimate.htf.value[row]
     omega = 2.0 * np.pi * estimate.htf.frequency
     used = _legible(estimate, m)
-    if used.sum() < LEAST:
+    if used.sum() < LEAST_BINS:
         raise InputError(f"the excitation does not reach harmonic {m}: no delay can be read from its phase")
     weight = np.abs(measured)
     if weigh_by_noise:

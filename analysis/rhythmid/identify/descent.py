@@ -23,9 +23,10 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 WHITE = NoiseModel(np.empty(0), 1.0)
-LEAST = 1e-6  # damping up to which a step counts as a full one
+LEAST_DAMPING = 1e-6  # damping up to which a step counts as a full one
 STATES = 0.01  # damping beyond which a step holds every state back
 STAY = 0.1  # share of its distance from a lower bound that one step leaves a parameter: a width of zero is hard to leave
+PACE = 3  # iterations over which the present rate of decline is taken
 BRINK = 1e-3  # share of its first distance within which it may reach the bound
 
 
@@ -106,11 +107,13 @@ def descend(
     pool: ThreadPoolExecutor | None = None,
     tolerance: float = 1e-3,
     differences: tuple[Array, Array] | None = None,
+    reach: float = math.inf,
 ) -> Descent:
     """Levenberg-Marquardt from the model's own values.
 
     Stops when a further step lowers chi2, or promises to lower it, by less than `tolerance` (less where the noise model turns
-    out to be too wide) or 1e-7 of itself. `differences` are steps known from another descent of the same structure; without
+    out to be too wide) or 1e-7 of itself; and when chi2, falling on as it did in the last `PACE` iterations, would not come to
+    `reach` in those that are left. `differences` are steps known from another descent of the same structure; without
     them they are sought. Raises InputError when the model diverges at its initial values.
     """
     problem = Problem(run, names, noise, pool)
@@ -131,7 +134,7 @@ def descend(
     else:
         steps, state_steps = differences
     held = np.array([float(place in run.compiled.layout.memories) for place in range(run.states)])
-    damping, converged, searched = LEAST, False, not held.any()
+    damping, converged, searched = LEAST_DAMPING, False, not held.any()
     low = np.array([model.parameters[name].bounds[0] for name in names])
     high = np.array([model.parameters[name].bounds[1] for name in names])
     brink = [a + BRINK * (model.value(n) - a) if math.isfinite(a) else math.inf for n, a in zip(names, low)]
@@ -139,7 +142,10 @@ def descend(
     blocked = np.zeros(len(names), bool)
     here: Linearisation | None = None
     samples = sum(len(problem.whitened(i, r)) for i, r in enumerate(residuals))
-    for _ in range(iterations):
+    costs = [cost]
+    for done in range(iterations):
+        if done >= PACE and out_of_reach(costs[-1 - PACE], cost, (iterations - done) / PACE, reach):
+            break
         here, states, steps, state_steps_next = problem.linearise(
             model, current, residuals, steps, state_steps
         )
@@ -172,7 +178,7 @@ def descend(
                 moved.append(start + change * state_steps)
                 promised += float(np.sum((ahead + state @ change) ** 2))
             enough = max(tolerance * min(1.0, cost / samples), 1e-7 * cost)
-            if whole and damping <= LEAST and cost - promised < enough:
+            if whole and damping <= LEAST_DAMPING and cost - promised < enough:
                 converged = True
                 break
             trial_residuals = problem.residuals(trial, moved)
@@ -185,7 +191,7 @@ def descend(
                 improved = True
                 converged = gain < enough
                 break
-            damping = max(damping * 10.0, LEAST)
+            damping = max(damping * 10.0, LEAST_DAMPING)
             if damping > 1e8:
                 break
         converged = converged or not improved  # no direction lowers the cost any more
@@ -199,10 +205,11 @@ def descend(
                     trial_cost,
                     trial_residuals,
                     None,
-                    LEAST,
+                    LEAST_DAMPING,
                     False,
                 )
         state_steps = state_steps_next
+        costs.append(cost)
         assert residuals is not None
         if converged:
             break
@@ -220,6 +227,11 @@ def descend(
         differences=(steps, state_steps),
         linearisation=here,
     )
+
+
+def out_of_reach(before: float, now: float, left: float, reach: float) -> bool:
+    """Whether chi2 that has come from `before` to `now` stays above `reach` when it falls by the same share `left` times more."""
+    return now > reach and now * (now / before) ** left > reach
 
 
 def _prior_cost(priors: Sequence, values: Array) -> float:

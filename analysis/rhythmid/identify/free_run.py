@@ -11,43 +11,33 @@ from scipy.interpolate import PPoly
 from rhythmid.elements.element import STEP
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model
+from rhythmid.identify.inputs import Inputs
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import Compiled, compile_model
-from rhythmid.simulation.generated_source import InputKind, OutputKind
-from rhythmid.simulation.signal import impulse_preserving, pieces
-from rhythmid.simulation.simulate import physical_times, start_states
+from rhythmid.simulation.generated_source import InputKind, OutputKind, Variant
+from rhythmid.simulation.signal import pieces
+from rhythmid.simulation.simulate import start_states
+from rhythmid.simulation.transport import command_delay, physical_times
 
 Array = NDArray[np.float64]
 DIVERGED = 1e100  # of any unit; squares of what is larger would overflow
 NO_SIGNAL = pieces(None)
-Pieces = tuple[Array, Array]
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """A series' command and forcing as the compiled loop takes them; the command's knots are before any delay.
-
-    `smooth` is the command's impulse-preserving stand-in, where there is one.
-    """
-
-    command: Pieces
-    smooth: Pieces | None
-    forcing: Pieces
 
 
 @dataclass(frozen=True)
 class FreeRun:
     """A structure and the series that it is run over.
 
-    `stopping` is the structure whose steps end at the command's knots, `compiled` the one that is used while every
-    command has a smooth stand-in and a constant delay.
+    `stopping` is the structure whose steps end at the command's knots, `compiled` the one that is used while the delay is
+    constant: it takes the `smooth` surrogates of the commands where every one has one.
     """
 
     compiled: Compiled
     stopping: Callable[[], Compiled]
     series: tuple[Series, ...]
     inputs: tuple[Inputs, ...]
+    smooth: bool
     max_step: float
 
     @property
@@ -64,11 +54,11 @@ class FreeRun:
         one, given = self.series[index], self.inputs[index]
         model = own_model(model, one)
         times = np.ascontiguousarray(physical_times(model, one.centres))
-        late = _delay_of(model, given.command[0][1:-1])
+        late = command_delay(model, given.stamps)
         varies = late is not None and len(late) > 0 and np.ptp(late) > 0.0
-        compiled, (knots, coefficients) = self.compiled, given.smooth or given.command
-        if given.smooth is not None and varies:
-            compiled, (knots, coefficients) = self.stopping(), given.command
+        smooth = given.smooth if self.smooth else None
+        compiled = self.compiled if smooth is None or not varies else self.stopping()
+        knots, coefficients = given.command if smooth is None or varies else smooth
         if late is not None and len(late):
             knots = knots.copy()
             knots[1:-1] += late if varies else late[0]
@@ -97,37 +87,8 @@ class FreeRun:
         return list(pool.map(lambda case: self.outputs(*case), cases))
 
 
-def _delay_of(model: Model, stamps: Array) -> Array | None:
-    """Delays (n,) [s] that the command path adds to these stamps, one element after another; None where it adds none.
-
-    A command cannot overtake an earlier one.
-    """
-    now, shift, found, varies = stamps, 0.0, False, False
-    for term in model.terms:
-        if term.element.slot == "command" and term.element.delay is not None:
-            late = term.element.delay(now, **{n: v.value for n, v in term.values.items()})
-            found = True
-            if len(late) and np.ptp(late) > 0.0:
-                now, varies = np.maximum.accumulate(now + late), True
-            elif len(late):
-                now, shift = now + late[0], shift + float(late[0])
-    if not found:
-        return None
-    return now - stamps if varies else np.full(len(stamps), shift)
-
-
-def _stand_in(one: Series) -> Pieces | None:
-    """Smooth stand-in for a held command that changes about as often as the measurement is sampled, or more often."""
-    command = one.command
-    if command is None or command.c.shape[0] > 1 or len(command.x) <= 16 or one.block == 1:
-        return None
-    if float(np.median(np.diff(command.x[:-1]))) > 2.0 * one.period * (1.0 + 1e-6):
-        return None
-    return _contiguous(pieces(impulse_preserving(command)))
-
-
 def _sees_steps(model: Model) -> bool:
-    """Whether an element of the command's path takes a held command otherwise than its smooth stand-in: one with memory
+    """Whether an element of the command's path takes a held command otherwise than its smooth surrogate: one with memory
     of extremes, or with a limit of rate."""
     path = [term.element for term in model.terms if term.element.slot in ("command", "actuator")]
     return any(
@@ -139,10 +100,6 @@ def _ticks(series: Sequence[Series]) -> list[float]:
     """Usual time [s] between the knots of each series' command."""
     knots = [one.command.x[:-1] for one in series if one.command is not None]
     return [float(np.median(np.diff(times))) for times in knots if len(times) > 2]
-
-
-def _inputs(one: Series) -> Inputs:
-    return Inputs(_contiguous(pieces(one.command)), _stand_in(one), _contiguous(pieces(one.forcing)))
 
 
 def prepare_run(
@@ -164,15 +121,16 @@ def prepare_run(
             f"records that measure different things ({', '.join(sorted(sensors))}) cannot be fitted together"
         )
     measured: OutputKind = sensors.pop() if sensors else "position"
-    inputs = tuple(_inputs(one) for one in series)
-    smooth = not _sees_steps(model) and all(i.smooth is not None or len(i.command[0]) <= 2 for i in inputs)
-    if not smooth:
-        inputs = tuple(replace(i, smooth=None) for i in inputs)
+    smooth = not _sees_steps(model) and all(
+        one.command is None or one.inputs.smooth is not None for one in series
+    )
+    variant = Variant(excited, measured, smooth, disturbed)
     return FreeRun(
-        compile_model(model, disturbed, excited, smooth, measured),
-        lambda: compile_model(model, disturbed, excited, measured=measured),
+        compile_model(model, variant),
+        lambda: compile_model(model, replace(variant, smooth=False)),
         tuple(series),
-        inputs,
+        tuple(one.inputs for one in series),
+        smooth,
         max_step or min([*(one.period * one.block for one in series), *([] if smooth else _ticks(series))]),
     )
 
@@ -183,7 +141,7 @@ def start_of(model: Model, run: FreeRun, index: int, position: float, velocity: 
     one = run.series[index]
     model = own_model(model, one)
     begin = physical_times(model, one.centres[:1])
-    late = _delay_of(model, begin)
+    late = command_delay(model, begin)
     command = _value(one.command, begin[0] - (0.0 if late is None else late[0]))
     return start_states(model, run.compiled, position, velocity, command, _value(one.forcing, begin[0]))
 
@@ -195,14 +153,9 @@ def _value(signal: PPoly | None, time: float) -> float:
 
 def with_series(run: FreeRun, index: int, series: Series) -> FreeRun:
     """The run with one series exchanged, such as for one with another command; its steps end at the command's knots."""
-    inputs = [replace(one, smooth=None) for one in run.inputs]
-    inputs[index] = replace(_inputs(series), smooth=None)
     every = (*run.series[:index], series, *run.series[index + 1 :])
-    return replace(run, compiled=run.stopping(), series=every, inputs=tuple(inputs))
-
-
-def _contiguous(pair: Pieces) -> Pieces:
-    return np.ascontiguousarray(pair[0]), np.ascontiguousarray(pair[1])
+    inputs = (*run.inputs[:index], series.inputs, *run.inputs[index + 1 :])
+    return replace(run, compiled=run.stopping(), series=every, inputs=inputs, smooth=False)
 
 
 def accurate(

@@ -23,16 +23,16 @@ from rhythmid.ltp.spectra import Spectra, spectra
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.simulation.generated_source import InputKind
+from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-INPUT_DELAY = "input_delay.delay"
-MEASUREMENT_DELAY = "measurement_delay.delay"
 DELAYS = (INPUT_DELAY, MEASUREMENT_DELAY)
 CYCLE = 4  # harmonics of the limit cycle that are used
 PARTS = 8  # into which the record is cut to see how much the limit cycle is disturbed
 LINES = 1500  # that a search looks at
-LONGEST = 0.6  # [s] largest delay on either side that a search considers
+LONGEST_DELAY = 0.5  # [s] largest delay on either side that is looked for
+SIDEBANDS = 3  # on either side that are compared
 TIME = 0.02  # [s] size of a delay that begins at none
 NEAR = 0.05  # unexplained share of the power from which a descent finds the rest of the way
 FACTORS = np.geomspace(0.4, 2.5, 25)  # on each parameter when a search starts far off
@@ -60,17 +60,15 @@ class HarmonicFit:
 class _Comparison:
     """A record's spectra beside those of a model."""
 
-    def __init__(
-        self, record: Record, model: Model, pumping: Pumping, sidebands: int, cycle: bool, ring_down: float
-    ) -> None:
+    def __init__(self, record: Record, model: Model, pumping: Pumping, cycle: bool, ring_down: float) -> None:
         self.model, self.pumping = model, pumping
         self.kind: InputKind = record.input_kind
         self.cycle = cycle and pumping.active
         self.names = [n for n in model.free if n not in DELAYS]
-        self.m = np.arange(-sidebands, sidebands + 1) if pumping.active else np.zeros(1, dtype=np.int64)
-        self.spectra: Spectra = spectra(record, pumping, ring_down, sidebands + 1)
+        self.m = np.arange(-SIDEBANDS, SIDEBANDS + 1) if pumping.active else np.zeros(1, dtype=np.int64)
+        self.spectra: Spectra = spectra(record, pumping, ring_down, SIDEBANDS + 1)
         self._guess: Array | None = None
-        highest = (self.spectra.band[1] + sidebands * pumping.frequency) / self.spectra.resolution
+        highest = (self.spectra.band[1] + SIDEBANDS * pumping.frequency) / self.spectra.resolution
         bins = np.arange(1, min(int(highest), len(self.spectra.output) - 1) + 1)
         if pumping.active:
             bins = bins[bins % self.spectra.window.periods != 0]
@@ -135,7 +133,7 @@ class _Comparison:
             parts += [np.real(gap)[:1], np.sqrt(2.0) * np.real(gap)[1:], np.sqrt(2.0) * np.imag(gap)[1:]]
         return np.concatenate(parts)
 
-    def best_delays(self, model: LinearisedModel, longest: float) -> tuple[float, float, float]:
+    def best_delays(self, model: LinearisedModel) -> tuple[float, float, float]:
         """Unexplained share of the power, and the delays that leave least of it, from a grid.
 
         The sum of the delays turns the response with ω, the input delay turns the sidebands: all pairs of a grid are
@@ -145,8 +143,8 @@ class _Comparison:
         measured = self.spectra.output[self.bins]
         omega = 2 * np.pi * self.spectra.resolution * self.bins
         step = min(0.01, 0.25 / (self.spectra.band[1] + 1e-9) / 2)
-        one = np.arange(0.0, longest + 0.5 * step, step)
-        total = np.arange(0.0, 2.0 * longest + 0.5 * step, step)
+        one = np.arange(0.0, LONGEST_DELAY + 0.5 * step, step)
+        total = np.arange(0.0, 2.0 * LONGEST_DELAY + 0.5 * step, step)
         turned = np.exp(1j * self.pumping.omega * np.multiply.outer(one, self.m)) @ parts
         cross = ((turned * measured.conj()) @ np.exp(-1j * np.multiply.outer(omega, total))).real
         left = (
@@ -154,7 +152,7 @@ class _Comparison:
         )
         left = left / float(np.sum(np.abs(measured) ** 2))
         later = total[None, :] - one[:, None]
-        possible = (later > -step) & (later < longest + step)
+        possible = (later > -step) & (later < LONGEST_DELAY + step)
         if self.cycle:
             period = self.pumping.period
             shown = np.angle(self.spectra.cycle[1] / model.cycle.harmonics(1)[1])
@@ -165,24 +163,24 @@ class _Comparison:
         i, j = np.unravel_index(int(np.argmin(left)), left.shape)
         return float(left[i, j]), float(one[i]), float(max(later[i, j], 0.0))
 
-    def reach(self, values: Array, longest: float) -> tuple[float, Array]:
+    def reach(self, values: Array) -> tuple[float, Array]:
         """Unexplained share at these parameters under the best delays, and the delays."""
         try:
             model = self.linearised(values)
         except InputError:
             self._guess = None
             return math.inf, np.zeros(2)
-        left, *delays = self.best_delays(model, longest)
+        left, *delays = self.best_delays(model)
         if self.cycle:
             size = np.abs(self.spectra.cycle[1])
             left += 0.3 * float((np.abs(model.cycle.harmonics(1)[1]) / size - 1.0) ** 2)
         return left, np.array(delays)
 
 
-def _scan(comparison: _Comparison, start: Array, longest: float) -> tuple[Array, Array, float]:
+def _scan(comparison: _Comparison, start: Array) -> tuple[Array, Array, float]:
     """Best of a multiplicative grid over the parameters, one after the other, twice around, with the best delays."""
     values = start.copy()
-    best, delays = comparison.reach(values, longest)
+    best, delays = comparison.reach(values)
     for _ in range(2):
         before = best
         for i in range(len(values)):
@@ -192,7 +190,7 @@ def _scan(comparison: _Comparison, start: Array, longest: float) -> tuple[Array,
             for factor in FACTORS if centre != 0.0 else ():
                 trial = values.copy()
                 trial[i] = np.clip(centre * factor, *comparison.model.parameters[comparison.names[i]].bounds)
-                left, found = comparison.reach(trial, longest)
+                left, found = comparison.reach(trial)
                 if left < best - 1e-9:
                     best, values, delays = left, trial, found
                 elif left == before:
@@ -202,10 +200,10 @@ def _scan(comparison: _Comparison, start: Array, longest: float) -> tuple[Array,
     return values, delays, best
 
 
-def _descend(comparison: _Comparison, start: Array, longest: float, tolerance: float = 1e-8) -> Array:
+def _descend(comparison: _Comparison, start: Array, tolerance: float = 1e-8) -> Array:
     bounds = [comparison.model.parameters[name].bounds for name in comparison.names]
     low = np.array([b[0] for b in bounds] + [-0.05, -0.05])
-    high = np.array([b[1] for b in bounds] + [longest + 0.1, longest + 0.1])
+    high = np.array([b[1] for b in bounds] + [LONGEST_DELAY + 0.1, LONGEST_DELAY + 0.1])
     units = [comparison.model.parameters[name].unit for name in comparison.names]
     own = [abs(v) or (TIME if unit == "s" else 1.0) for v, unit in zip(start, units)]
     scale = np.array([*own, TIME, TIME])
@@ -228,22 +226,19 @@ def harmonic_likelihood(
     record: Record,
     model: Model,
     pumping: Pumping,
-    sidebands: int = 3,
     cycle: bool = True,
-    longest: float = LONGEST,
     search: bool = False,
 ) -> HarmonicFit:
     """Estimate the model's free parameters and both delays from one record, wherever the model's values start.
 
     `model` has no forcing of its own: the `pumping` is. With `cycle` False the limit cycle is not used as data. With
-    `search` True only a start for another fit is wanted: few lines are looked at, once. `longest` [s] is the largest
-    delay on either side. Raises InputError when the record has no input or the model no limit cycle.
+    `search` True only a start for another fit is wanted: few lines are looked at, once. Raises InputError when the record has no input or the model no limit cycle.
     """
     if record.input is None:
         raise InputError(f"{record.name}: has no input, so there is no transfer function to fit")
     plain = model.with_values({name: 0.0 for name in DELAYS if name in model.parameters})
     ring_down = 2.0
-    comparison = _Comparison(record, plain, pumping, sidebands, cycle, ring_down)
+    comparison = _Comparison(record, plain, pumping, cycle, ring_down)
     if search:
         comparison.thinned(LINES)
     # while the search is far off, the cycle must not outweigh the response, nor its small harmonics count at all
@@ -252,15 +247,15 @@ def harmonic_likelihood(
     comparison.cycle_variance = np.full(CYCLE + 1, (0.03 * size) ** 2 + 1e-30)
     comparison.variance = np.full(len(response), 3e-4 * float(np.sum(response)))
     start = np.array([plain.value(name) for name in comparison.names])
-    own, delays, _ = _scan(comparison, start, longest)
-    values = _descend(comparison, np.concatenate([own, delays]), longest, 1e-4 if search else 1e-8)
+    own, delays, _ = _scan(comparison, start)
+    values = _descend(comparison, np.concatenate([own, delays]), 1e-4 if search else 1e-8)
     for _ in range(0 if search else 2):
         comparison.cycle_variance = exact
         left = np.abs(_left(comparison, values)) ** 2
         wide = max(9, len(left) // 60)
         local = np.convolve(left, np.ones(wide) / wide, mode="same")
         comparison.variance = np.maximum(local, 1e-16 * float(np.mean(response)))
-        values = _descend(comparison, values, longest)
+        values = _descend(comparison, values)
     left = _left(comparison, values)
     measured = comparison.spectra.output[comparison.bins]
     names = (*comparison.names, *DELAYS)

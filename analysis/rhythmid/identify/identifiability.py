@@ -26,12 +26,12 @@ from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.undetermined import sum_of, undetermined
 from rhythmid.ltp.limit_cycle import limit_cycle
 from rhythmid.ltp.pumping import pumping_of
-from rhythmid.simulation.simulate import physical_times
+from rhythmid.simulation.transport import physical_times
 from rhythmid.statistics import NORMAL_95
 
 Array = NDArray[np.float64]
 Forcing = Literal["on_robot", "delayed", "clock_unknown"]
-CERTAIN = 4.0  # standard deviations
+SEPARATE_BY = 4.0  # standard deviations
 SEEN = 1e-3  # of the limit cycle's fundamental, from which a harmonic of it counts
 
 
@@ -224,8 +224,8 @@ def _of_paths(
         return only_sum(words, _intervals(first, second, total, known))
     step = max(record.output.period for record in joint.records)
     assert first.value is not None and second.value is not None
-    zero = abs(first.value) < CERTAIN * first.std + step
-    if told is None and zero and second.value > CERTAIN * second.std + 2.0 * step:
+    zero = abs(first.value) < SEPARATE_BY * first.std + step
+    if told is None and zero and second.value > SEPARATE_BY * second.std + 2.0 * step:
         return only_sum(
             "the input delay comes out at zero, which is also what a forcing through the same delayed channel looks like; "
             "state --forcing on_robot if the forcing is made on the robot, or --forcing delayed if it is not",

@@ -18,7 +18,7 @@ from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.identifiability import Forcing, Offset, delays_of
 from rhythmid.identify.identification import Delays, Estimate, Identification, Shown
 from rhythmid.identify.inner_delays import dead_times
-from rhythmid.identify.joint import POOR, JointFit, best_fit
+from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit
 from rhythmid.identify.large_shifts import large_shifts
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
 from rhythmid.identify.paper_conditions import LEAKAGE, lacks_paper_method, lacks_transfer_functions
@@ -29,8 +29,9 @@ from rhythmid.ltp.harmonic_estimate import HarmonicEstimates
 from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, smoothed
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
+from rhythmid.progress import Tell, counted, silent
 from rhythmid.record.gaps import cut_at_gaps
-from rhythmid.record.outlier import without_stray
+from rhythmid.record.outlier import without_outliers
 from rhythmid.record.record import Record
 from rhythmid.simulation.signal import continuous, spline
 from rhythmid.simulation.simulate import simulate
@@ -103,6 +104,7 @@ def identify(
     forcing: Forcing | None = None,
     offset: Offset | None = None,
     htf: HtfMethod = "auto",
+    tell: Tell = silent,
 ) -> Identification:
     """Identify a model's free parameters and its delays from records.
 
@@ -115,6 +117,7 @@ def identify(
     forcing, offset : how the forcing reaches the machine, and what is known of its clock; see `delays_of`.
     htf : how the harmonic transfer functions of the first record are found; see `harmonic_transfer_functions`. The paper's
         method brings its own, equation (5), where this is `auto`.
+    tell : is told what begins.
 
     A fit that leaves more than a fifth of the motion is returned as not `usable`. Raises InputError when a channel seems to be in
     another unit, to have its sign turned round or to be exchanged with another, and by the paper's method when a record has no
@@ -123,9 +126,11 @@ def identify(
     given = (records,) if isinstance(records, Record) else tuple(records)
     if not given:
         raise InputError("nothing to identify from: give at least one record")
-    tidy = [without_stray(record) for record in given]
+    tidy = [without_outliers(record) for record in given]
     cut = [note for record, _ in tidy for note in cut_at_gaps(record).notes]
-    found = _identified(tuple(record for record, _ in tidy), model, harmonics, method, forcing, offset, htf)
+    found = _identified(
+        tuple(record for record, _ in tidy), model, harmonics, method, forcing, offset, htf, tell
+    )
     return replace(found, notes=(*(note for _, said in tidy for note in said), *cut, *found.notes))
 
 
@@ -137,11 +142,13 @@ def _identified(
     forcing: Forcing | None,
     offset: Offset | None,
     htf: HtfMethod,
+    tell: Tell,
 ) -> Identification:
     nominal = with_declared(model or paper_hopper(), given)
     pumpings: list[Pumping] = []
     results: list[PaperResult | str] = []
-    for record in given:
+    tell("transfer functions, record by record")
+    for record in counted(given, len(given), "records", tell):
         own, pumping = forced_by(own_model(nominal, record), record)
         pumpings.append(pumping)
         try:
@@ -151,7 +158,7 @@ def _identified(
                 raise
             results.append(str(error))
     seen = _Seen(given, nominal, tuple(pumpings), tuple(results))
-    found = _by_likelihood(seen, forcing, offset, htf) if method == "joint" else None
+    found = _by_likelihood(seen, forcing, offset, htf, tell) if method == "joint" else None
     return found or _by_paper(
         seen, htf if method == "joint" or htf != "auto" else "regularised_least_squares", method
     )
@@ -204,13 +211,13 @@ class _Seen:
         """What should keep a user from believing the estimates. Raises InputError where a channel is in another unit."""
         stuck = joint is not None and not joint.search.arrived
         cautions = large_shifts(self.nominal, parameters, delays, self.records[0].output.period)
-        if not stuck and nrmse <= POOR and shift(self.nominal, fitted) <= SHIFTED:
+        if not stuck and nrmse <= POOR_MOTION and shift(self.nominal, fitted) <= SHIFTED:
             return cautions
         mend = check_plausible(self.nominal, self.records)
         told = () if mend is None else (other_unit(mend),)
-        if not stuck and nrmse <= POOR:
+        if not stuck and nrmse <= POOR_MOTION:
             return (*told, *cautions)
-        response = joint.search.response if joint is not None and nrmse <= POOR else None
+        response = joint.search.response if joint is not None and nrmse <= POOR_MOTION else None
         return (not_identified(nrmse, response), *told, *cautions)
 
 
@@ -240,7 +247,7 @@ def _by_paper(seen: _Seen, htf: HtfMethod, method: Method) -> Identification:
 
 
 def _by_likelihood(
-    seen: _Seen, forcing: Forcing | None, offset: Offset | None, htf: HtfMethod
+    seen: _Seen, forcing: Forcing | None, offset: Offset | None, htf: HtfMethod, tell: Tell
 ) -> Identification | None:
     """Parameters and delays by joint maximum likelihood; HTFs without a model.
 
@@ -248,6 +255,7 @@ def _by_likelihood(
     """
     records, paper = seen.records, seen.paper
     unforced = paper and not any(pumping.active for pumping in seen.pumpings)
+    tell("fitting the model to all records at once")
     try:
         found = best_fit(records, seen.nominal)
     except InputError:
@@ -257,6 +265,7 @@ def _by_likelihood(
         raise
     if unforced and not found.search.arrived and paper[0].fit.misfit < MISFIT:
         return None
+    tell("looking for clocks that drift and commands that are held")
     joint, notes = compensated(found) if found.search.arrived else (found, ())
     joint = replace(joint, fit=with_discretisation_error(joint.fit))
     fit = joint.fit

@@ -15,10 +15,10 @@ from rhythmid.identify.sensitivity import Linearisation, Problem
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-FAINT = 1e-3  # singular value of the scaled sensitivities, relative to the largest, from which a direction is looked at
+ILL_CONDITIONED = 1e-3  # singular value of the scaled sensitivities, relative to the largest, from which a direction is looked at
 
 
-def faint(jacobian: Array) -> list[Array]:
+def ill_conditioned(jacobian: Array) -> list[Array]:
     """Directions (p,), as changes of the parameters that would move the outputs by one if they did not cancel; empty where
     the sensitivities (n, p) are well conditioned."""
     norms = np.linalg.norm(jacobian, axis=0)
@@ -28,23 +28,23 @@ def faint(jacobian: Array) -> list[Array]:
     _, singular, right = np.linalg.svd(jacobian[:, live] / norms[live], full_matrices=False)
     found = []
     for value, direction in zip(singular, right):
-        if value < FAINT * singular[0]:
+        if value < ILL_CONDITIONED * singular[0]:
             change = np.zeros(len(norms))
             change[live] = direction / norms[live]
             found.append(change)
     return found
 
 
-def with_faint_directions(
+def with_ill_conditioned_directions(
     linearisation: Linearisation, problem: Problem, model: Model, starts: Sequence[Array]
 ) -> Linearisation:
-    """The linearisation with its sensitivities along faint directions replaced by differences along these directions."""
+    """The linearisation with its sensitivities along ill-conditioned directions replaced by differences along these directions."""
     jacobian = linearisation.jacobian
     norms = np.linalg.norm(jacobian, axis=0)
     size = (
         float(np.median((norms * np.abs(linearisation.steps))[norms > 0.0])) if np.any(norms > 0.0) else 0.0
     )
-    for change in faint(jacobian):
+    for change in ill_conditioned(jacobian):
         slope = _slope(linearisation, problem, model, starts, change, size)
         if slope is not None:
             dual = change * norms**2  # its product with `change` is one, with the other directions zero

@@ -7,7 +7,6 @@ data, and the judgement whether the search arrived.
 """
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +15,13 @@ from numpy.typing import NDArray
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model, with_declared
-from rhythmid.identify.harmonic_likelihood import DELAYS, INPUT_DELAY, MEASUREMENT_DELAY, harmonic_likelihood
+from rhythmid.identify.harmonic_likelihood import (
+    DELAYS,
+    INPUT_DELAY,
+    LONGEST_DELAY,
+    MEASUREMENT_DELAY,
+    harmonic_likelihood,
+)
 from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
 from rhythmid.identify.series import Series, dominant_frequency, prepare
@@ -26,9 +31,8 @@ from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-LONGEST = 0.5  # [s] delays that are looked for on either side, if not told otherwise
 STUCK = 0.5  # unexplained share (rms) of the response to the command, beyond which a fit is no answer
-POOR = 0.2  # the same of the whole motion: what leaves more than a fifth of it is not identified
+POOR_MOTION = 0.2  # the same of the whole motion: what leaves more than a fifth of it is not identified
 CYCLE_HARMONICS = 24  # that are projected out where the limit cycle is not to be used
 STEP, FINE_STEP = (
     0.2,
@@ -48,7 +52,7 @@ class Search:
 
     @property
     def arrived(self) -> bool:
-        return self.motion < POOR and (self.response < STUCK or self.over_noise < 2.0)
+        return self.motion < POOR_MOTION and (self.response < STUCK or self.over_noise < 2.0)
 
     def __str__(self) -> str:
         return (
@@ -162,9 +166,7 @@ def _silent(one: Series) -> bool:
     return one.command is None or float(np.ptp(one.command(one.centres))) == 0.0
 
 
-def _start(
-    model: Model, records: Sequence[Record], pumping: Pumping | None, longest: float, cycle: bool
-) -> list[Model]:
+def _start(model: Model, records: Sequence[Record], pumping: Pumping | None) -> list[Model]:
     """Models with values from the harmonic likelihood of each record, best first; empty where it has nothing to see."""
     found: list[tuple[float, Model]] = []
     plain = without_forcing(model)
@@ -177,9 +179,7 @@ def _start(
             continue
         try:
             own = (pumping_of(record) or pumping) if pumping is not None else NO_PUMPING
-            fit = harmonic_likelihood(
-                record, own_model(plain, record), own or NO_PUMPING, 3, cycle, longest, search=True
-            )
+            fit = harmonic_likelihood(record, own_model(plain, record), own or NO_PUMPING, search=True)
         except InputError:
             continue
         values = {name: v for name, v in zip(fit.names, fit.values) if name in model.free}
@@ -191,9 +191,7 @@ def _start(
     return [start for _, start in sorted(found, key=lambda pair: pair[0])]
 
 
-def _search_in_time(
-    model: Model, series: Sequence[Series], longest: float, pool: ThreadPoolExecutor | None
-) -> Fit:
+def _search_in_time(model: Model, series: Sequence[Series]) -> Fit:
     """Fit without a start from the harmonics: short windows with starts of their own first, then delays far apart."""
     length = 2.0 / max(dominant_frequency(one) for one in series)
     windows = [part for one in series for part in split(one, length)]
@@ -204,7 +202,7 @@ def _search_in_time(
         lambda: estimate(model, windows[:: max(1, len(windows) // 60)], iterations=12).model,
     ):
         try:
-            trial = estimate(attempt(), series, pool=pool)
+            trial = estimate(attempt(), series)
         except InputError as error:
             failure = error
             continue
@@ -217,37 +215,30 @@ def _search_in_time(
         raise failure
     reached = best
     for name in (n for n in DELAYS if n in best.names):
-        for delay in np.linspace(0.0, longest, 9)[1:]:
+        for delay in np.linspace(0.0, LONGEST_DELAY, 9)[1:]:
             try:
                 trial = minimise(
                     reached.model.with_values({name: delay}), reached.run, reached.names, reached.noise,
-                    reached.starts, 12, pool,
+                    reached.starts, 12,
                 )  # fmt: skip
             except InputError:
                 continue
             if trial.chi2 < best.chi2:
                 best = trial
-    return best if best is reached else estimate(best.model, series, pool=pool)
+    return best if best is reached else estimate(best.model, series)
 
 
 def _sum_of_squares(fit: Fit) -> float:
     return sum(float(r @ r) for r in fit.residuals)
 
 
-def joint_likelihood(
-    records: Record | Sequence[Record],
-    model: Model,
-    cycle: bool = True,
-    longest: float = LONGEST,
-    block: int | None = None,
-    pool: ThreadPoolExecutor | None = None,
-) -> JointFit:
+def joint_likelihood(records: Record | Sequence[Record], model: Model) -> JointFit:
     """The estimate that `best_fit` finds.
 
     Arguments as there. Raises InputError when the records have nothing to fit, and when the search did not arrive: a fit that is
     stuck is never returned.
     """
-    found = best_fit(records, model, cycle, longest, block, pool)
+    found = best_fit(records, model)
     if found.search.arrived:
         return found
     raise InputError(
@@ -256,23 +247,13 @@ def joint_likelihood(
     )
 
 
-def best_fit(
-    records: Record | Sequence[Record],
-    model: Model,
-    cycle: bool = True,
-    longest: float = LONGEST,
-    block: int | None = None,
-    pool: ThreadPoolExecutor | None = None,
-) -> JointFit:
+def best_fit(records: Record | Sequence[Record], model: Model) -> JointFit:
     """Estimate all free parameters of the model and its delays from all records at once.
 
     Parameters
     ----------
     records : recordings of the same machine.
     model : what is known of it; its values may be far off.
-    cycle : whether the limit cycle is used as data; without it only the response to the command is.
-    longest : largest delay on either side [s] that is looked for.
-    block : samples that are averaged into one; None chooses by the bandwidth.
 
     The best that was found, whose `search` tells whether it arrived. Raises InputError when the records have nothing to fit.
     """
@@ -280,14 +261,14 @@ def best_fit(
     if not given:
         raise InputError("nothing to identify from: give at least one record")
     model, pumping = prepared_model(with_declared(model, given), given)
-    starts = _start(model, given, pumping, longest, cycle)
+    starts = _start(model, given, pumping)
     given = _stretches(given)
     best: JointFit | None = None
     for start in starts:
         late = sum(max(start.value(name), 0.0) for name in DELAYS if name in start.parameters)
         try:
-            series = _series(given, late, block, cycle, pumping)
-            trial = _judged(estimate(start, series, pool=pool, max_step=step_of(series)), pumping, given)
+            series = _series(given, late)
+            trial = _judged(estimate(start, series, max_step=step_of(series)), pumping, given)
         except InputError:
             continue
         if (
@@ -297,22 +278,25 @@ def best_fit(
             best = trial
         if trial.search.arrived:
             return trial
-    series = _series(given, 0.0 if pumping is None else 0.2, block, cycle, pumping)
-    trial = _judged(_search_in_time(model, series, longest, pool), pumping, given)
+    series = _series(given, 0.0 if pumping is None else 0.2)
+    trial = _judged(_search_in_time(model, series), pumping, given)
     if trial.search.arrived or best is None or trial.search.motion < best.search.motion:
         return trial
     return best
 
 
-def fit_from(
-    model: Model, records: Record | Sequence[Record], cycle: bool = True, block: int | None = None
-) -> Fit:
-    """The fit that the model's own values lead to, without a search: for values that are known to be near."""
+def fit_from(model: Model, records: Record | Sequence[Record], cycle: bool = True) -> Fit:
+    """The fit that the model's own values lead to, without a search: for values that are known to be near.
+
+    With `cycle` the limit cycle is used as data; without it only the response to the command is.
+    """
     given = (records,) if isinstance(records, Record) else tuple(records)
     ready, pumping = prepared_model(with_declared(model, given), given)
     given = _stretches(given)
     late = sum(max(ready.value(name), 0.0) for name in DELAYS if name in ready.parameters)
-    series = _series(given, late, block, cycle, pumping)
+    series = _series(given, late)
+    if not cycle and pumping is not None:
+        series = [replace(one, ignored=cycle_columns(one, pumping)) for one in series]
     return estimate(ready, series, max_step=step_of(series))
 
 
@@ -331,13 +315,8 @@ def _stretches(records: Sequence[Record]) -> tuple[Record, ...]:
     return tuple(stretch for record in records for stretch in cut_at_gaps(record).stretches)
 
 
-def _series(
-    records: Sequence[Record], delay: float, block: int | None, cycle: bool, pumping: Pumping | None
-) -> list[Series]:
-    series = prepare([_begun(record, delay + 0.05 if delay > 0.0 else 0.0) for record in records], block)
-    if not cycle and pumping is not None:
-        series = [replace(one, ignored=cycle_columns(one, pumping)) for one in series]
-    return series
+def _series(records: Sequence[Record], delay: float) -> list[Series]:
+    return prepare([_begun(record, delay + 0.05 if delay > 0.0 else 0.0) for record in records])
 
 
 def _judged(fit: Fit, pumping: Pumping | None, records: Sequence[Record]) -> JointFit:

@@ -13,7 +13,7 @@ TIMES = 4.0  # ratio of a value to the nominal one from which the shift is told
 SAMPLES = (
     10.0  # sample periods by which a delay may exceed the nominal one: a longer one is seldom transport alone
 )
-CERTAIN = 2.0  # standard deviations by which a limit has to be passed
+PASSED_BY = 2.0  # standard deviations by which a limit has to be passed
 AGREES = 5.0  # standard deviations of the closure within which limit cycle and response see the same delays
 ABSORBING = "the fit may be absorbing missing physics"
 
@@ -30,7 +30,7 @@ def _values(nominal: Model, parameters: Mapping[str, Estimate]) -> Iterator[Caut
         found, given = parameters.get(name), nominal.value(name)
         if found is None or found.value is None or found.std is None:
             continue
-        ratio, spread = found.value / given, CERTAIN * found.std / abs(given)
+        ratio, spread = found.value / given, PASSED_BY * found.std / abs(given)
         low, high = ratio - spread, ratio + spread
         facts = (name, found.value, given, found.unit)
         told = f"{rounded(found.value, found.std)} {found.unit}"
@@ -68,7 +68,7 @@ def _delays(nominal: Model, delays: Delays, period: float) -> Iterator[Caution]:
     for side, found, expected in pairs:
         if found.value is None or found.std is None:
             continue
-        if found.value - expected - CERTAIN * found.std <= SAMPLES * period:
+        if found.value - expected - PASSED_BY * found.std <= SAMPLES * period:
             continue
         what = "the delays of command and measurement together" if side == "sum" else f"the {side} delay"
         samples = math.floor((found.value - expected) / period)

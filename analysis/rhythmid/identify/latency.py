@@ -12,12 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
+from pydantic import TypeAdapter
 
 from rhythmid.document import read
 from rhythmid.errors import InputError
 from rhythmid.identify.identification import Estimate, Identification
 from rhythmid.model import Model
 from rhythmid.output import write_text
+from rhythmid.validation import Number, validated
 
 
 @dataclass(frozen=True)
@@ -33,18 +35,34 @@ class Latency:
     @classmethod
     def load(cls, path: str | Path) -> "Latency":
         """The latency file at `path`. Raises InputError when it is not one."""
-        content = read(path).value
-        if not isinstance(content, Mapping):
+        document = read(path)
+        if not isinstance(document.value, Mapping) or not {"delays", "model"} <= document.value.keys():
             raise InputError(f"{path}: not a latency file; `rhythmid identify --save` writes one")
-        plain = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-        try:
-            delays, model = plain["delays"], plain["model"]
-            return cls(
-                delays["input"]["value"], delays["measurement"]["value"], float(delays["sum"]["value"]),
-                delays["sum"]["std"], Model.from_text(yaml.safe_dump(model), str(path)),
-            )  # fmt: skip
-        except (KeyError, TypeError):
-            raise InputError(f"{path}: not a latency file; `rhythmid identify --save` writes one") from None
+        delays = validated(document.at("delays"), _DELAYS)
+        model = Model.from_document(document.at("model"))
+        return cls(delays.input.value, delays.measurement.value, delays.sum.value, delays.sum.std, model)
+
+
+@dataclass(frozen=True)
+class _Delay:
+    value: Number | None
+    std: Number | None = None
+
+
+@dataclass(frozen=True)
+class _Sum:
+    value: Number
+    std: Number | None = None
+
+
+@dataclass(frozen=True)
+class _Delays:
+    input: _Delay
+    measurement: _Delay
+    sum: _Sum
+
+
+_DELAYS: TypeAdapter[_Delays] = TypeAdapter(_Delays)
 
 
 def save_latency(found: Identification, path: Path) -> None:

@@ -20,8 +20,8 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-POOR = 0.5  # relative misfit of the magnitudes above which other starts are tried
-ROUGH = 200  # frequencies at which a first look is taken
+POOR_MAGNITUDE = 0.5  # relative misfit of the magnitudes above which other starts are tried
+FIRST_LOOK = 200  # frequencies at which a first look is taken
 SCAN = np.geomspace(0.4, 2.5, 17)
 
 
@@ -124,7 +124,7 @@ class _Comparison:
         except InputError:
             self.guess = None
             return math.inf
-        some = slice(None, None, max(1, self.measured.shape[1] // ROUGH))
+        some = slice(None, None, max(1, self.measured.shape[1] // FIRST_LOOK))
         there = np.abs(model.htf(self.operator.harmonics, self.estimate.htf.frequency[some]))
         difference = self.weight[:, some] * (there - self.measured[:, some])
         return float(np.sqrt(np.mean(difference**2)) / self.size)
@@ -173,7 +173,7 @@ def fit_magnitude(estimate: HtfEstimate, model: Model) -> MagnitudeFit:
     comparison = _Comparison(estimate, model, names)
     start = np.array([model.value(name) for name in names])
     comparison.linearised(start)  # says why when even these values do not work
-    if comparison.rough(start) > POOR:
+    if comparison.rough(start) > POOR_MAGNITUDE:
         start = _scan(comparison.rough, start)
     values, residual = _descend(comparison, start) if names else (start, comparison.residual(start))
     fitted = model.with_values(dict(zip(names, values)))

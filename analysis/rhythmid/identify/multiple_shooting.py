@@ -20,10 +20,10 @@ from rhythmid.simulation.signal import first_order_hold
 MARGIN = 1.0  # [s] of a command kept before a window, for delays
 # of the response to a constant force, from the middle to the end of a record, that calls for windows
 GROWTH = 1.5
-PERIODS = 2.0  # of the dominant motion in a window
-FEWEST = 4  # windows a record
-LEAST = 24  # blocks in a window
-MOST = 200  # windows of all records; every one costs a run
+WINDOW_PERIODS = 2.0  # of the dominant motion in a window
+FEWEST_WINDOWS = 4  # windows a record
+LEAST_BLOCKS = 24  # blocks in a window
+MOST_WINDOWS = 200  # windows of all records; every one costs a run
 
 
 def _around(signal: PPoly | None, begin: float, end: float) -> PPoly | None:
@@ -47,7 +47,8 @@ def split(series: Series, length: float) -> list[Series]:
             replace(
                 series, name=f"{record_of(series)}@{time[0]:.2f}s", record=record_of(series), time=time,
                 value=series.value[window],
-                used=series.used[blocks], ignored=None if series.ignored is None else series.ignored[blocks],
+                used=series.used[blocks], spread=None if series.spread is None else series.spread[blocks],
+                ignored=None if series.ignored is None else series.ignored[blocks],
                 command=_around(series.command, time[0], time[-1]), forcing=_around(series.forcing, time[0], time[-1]),
             )
         )  # fmt: skip
@@ -57,8 +58,8 @@ def split(series: Series, length: float) -> list[Series]:
 def periods_long(series: Series) -> float:
     """Length [s] of windows that hold a few periods of the motion."""
     step = series.period * series.block
-    length = max(PERIODS / dominant_frequency(series), LEAST * step)
-    return min(length, series.blocks * step / FEWEST)
+    length = max(WINDOW_PERIODS / dominant_frequency(series), LEAST_BLOCKS * step)
+    return min(length, series.blocks * step / FEWEST_WINDOWS)
 
 
 def windows(series: Sequence[Series], length: float) -> list[Series]:
@@ -68,7 +69,7 @@ def windows(series: Sequence[Series], length: float) -> list[Series]:
     for one in series:
         parts = split(one, length)
         found += [part for part in parts if part.blocks >= parts[0].blocks // 2]
-    return found[:: max(1, math.ceil(len(found) / MOST))]
+    return found[:: max(1, math.ceil(len(found) / MOST_WINDOWS))]
 
 
 def forgets(model: Model, series: Sequence[Series]) -> bool:

@@ -12,7 +12,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.covariance import covariance_of, on_the_edge
 from rhythmid.identify.descent import WHITE, Descent, descend, first_guess
 from rhythmid.identify.free_run import FreeRun, accurate, prepare_run
-from rhythmid.identify.ill_conditioned import faint, with_faint_directions
+from rhythmid.identify.ill_conditioned import ill_conditioned, with_ill_conditioned_directions
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.sensitivity import Linearisation, Problem
 from rhythmid.identify.series import Series
@@ -91,13 +91,14 @@ def minimise(
     pool: ThreadPoolExecutor | None = None,
     tolerance: float = 1e-3,
     differences: tuple[Array, Array] | None = None,
+    reach: float = math.inf,
 ) -> Fit:
     """The fit that `descend` leads to, with its sensitivities and covariance.
 
     A parameter that the records cannot tell from its bound is put there: what else it would be drags others along.
     """
     fit = _fit(
-        descend(model, run, names, noise, starts, iterations, pool, tolerance, differences),
+        descend(model, run, names, noise, starts, iterations, pool, tolerance, differences, reach),
         run,
         names,
         noise,
@@ -107,7 +108,17 @@ def minimise(
     if edge:
         put = fit.model.with_values(edge)
         try:
-            end = descend(put, run, names, noise, fit.starts, max(iterations, 3), pool, tolerance)
+            end = descend(
+                put,
+                run,
+                names,
+                noise,
+                fit.starts,
+                max(iterations, 3),
+                pool,
+                tolerance,
+                reach=fit.chi2 + FALSE_EDGE,
+            )
         except InputError:
             # such as without inertia: a value far from its bound, but undetermined together with others
             return fit
@@ -120,12 +131,12 @@ def _fit(
     end: Descent, run: FreeRun, names: Sequence[str], noise: NoiseModel, pool: ThreadPoolExecutor | None
 ) -> Fit:
     linearisation = end.linearisation
-    if linearisation is None or faint(linearisation.jacobian):
+    if linearisation is None or ill_conditioned(linearisation.jacobian):
         problem = Problem(run, names, noise, pool)
         problem.learn_hidden(end.model, end.starts)
         if linearisation is None:
             linearisation, *_ = problem.linearise(end.model, end.starts, end.residuals, *end.differences)
-        linearisation = with_faint_directions(linearisation, problem, end.model, end.starts)
+        linearisation = with_ill_conditioned_directions(linearisation, problem, end.model, end.starts)
     model = end.model.unwound()
     return Fit(
         model=model,
@@ -154,7 +165,7 @@ def noise_of(residuals: Sequence[Array], series: Sequence[Series], floor: float 
         if one.ignored is not None:
             columns = one.ignored[one.used]
             residual = residual - one.ignored @ np.linalg.lstsq(columns, residual[one.used], rcond=1e-12)[0]
-        stretches += [residual[s] for s in runs(one.used)]
+        stretches += [one.levelled(residual[s], s) for s in runs(one.used)]
     return estimate_noise(stretches, floor=floor)
 
 

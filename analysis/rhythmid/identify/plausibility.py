@@ -19,7 +19,7 @@ from rhythmid.identify.channel_change import Change, guess, instruction, likely_
 from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.descent import WHITE
 from rhythmid.identify.free_run import with_series
-from rhythmid.identify.joint import POOR, Search, explained, prepared_model
+from rhythmid.identify.joint import POOR_MOTION, Search, explained, prepared_model
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.series import Series, dominant_frequency, prepare
 from rhythmid.model import INERTIA, Model
@@ -28,14 +28,18 @@ from rhythmid.record.record import Record
 STRETCH = 15.0  # periods that are looked at: enough for a resonance of 2 % damping to ring down
 SHORT = 4.0  # the same where a search may lose its way over a longer stretch, such as in large swings
 ITERATIONS = 12  # of each refit: a right change arrives in fewer
-BETTER = 0.4  # share of what is unexplained as declared that a change may leave, besides being below `POOR`
+BETTER_UNIT = (
+    0.4  # share of what is unexplained as declared that a change may leave, besides being below `POOR_MOTION`
+)
 TRIED = 3  # records that are looked at until one speaks: a motion that does not repeat, such as a whirling pendulum, cannot
 SHIFTED, BACK = (
     math.log(4.0),
     math.log(2.0),
 )  # mean |log| ratio of the values to the given ones, as declared and with the change
 EQUAL, SAME = 1.2, 0.01  # ratio of errors, and difference of them, within which two changes do the same
-FAR = 4.0  # factor below which a gain is physics (a gain element, a wrong nominal value) and no unit
+LEAST_UNIT_FACTOR = (
+    4.0  # factor below which a gain is physics (a gain element, a wrong nominal value) and no unit
+)
 STEP = 0.01  # relative step by which the effect of a gain is taken
 GAINS = (0.01, 0.03, 0.1, 10.0, 30.0, 100.0)  # from which the scale of an input in a foreign unit is sought
 
@@ -87,7 +91,7 @@ def likely_mend(
     for record in sorted(driven, key=lambda one: -float(np.std(one.output.value)))[:TRIED]:
         tried = partial(_tried, record=record, model=own_model(model, record), pool=pool)
         declared = _declared(record, own_model(model, record), pool)
-        if declared.unexplained < POOR:
+        if declared.unexplained < POOR_MOTION:
             return _shift(record, declared, model, tried) if declared.shift > SHIFTED else None
         mend = _misfit(record, declared, model, tried, pool)
         if mend is not None:
@@ -134,13 +138,13 @@ def _searched_again(
     for values, periods in ((rescaled, STRETCH), (found, STRETCH), ({}, SHORT), (found, SHORT)):
         within = {n: float(np.clip(v, *known[n].bounds)) for n, v in values.items()}
         again = _tried(AS_DECLARED, record, model.with_values(within), pool, model, periods)
-        if again is not None and again.unexplained < POOR:
+        if again is not None and again.unexplained < POOR_MOTION:
             return again
     return None
 
 
 def _convinces(trial: Trial, declared: Trial) -> bool:
-    return trial.unexplained < min(POOR, BETTER * declared.unexplained)
+    return trial.unexplained < min(POOR_MOTION, BETTER_UNIT * declared.unexplained)
 
 
 def _shift(record: Record, declared: Trial, model: Model, tried: partial[Trial | None]) -> Mend | None:
@@ -205,7 +209,7 @@ def _foreign(tried: partial[Trial | None]) -> Trial | None:
         if better is None or better.unexplained >= best.unexplained:
             break
         best = better
-    if best is None or 1.0 / FAR < abs(best.change.factor) < FAR:
+    if best is None or 1.0 / LEAST_UNIT_FACTOR < abs(best.change.factor) < LEAST_UNIT_FACTOR:
         return None
     return best
 
@@ -232,7 +236,7 @@ def _declared(record: Record, model: Model, pool: ThreadPoolExecutor | None) -> 
     """The record as it is declared, from several delays: a late start of the response must not look like a turned sign."""
     best = _tried(AS_DECLARED, record, model, pool) or Trial(AS_DECLARED, math.inf, 0.0)
     label = "input_delay.delay"
-    if best.unexplained < POOR or best.fit is None or label not in best.fit.names:
+    if best.unexplained < POOR_MOTION or best.fit is None or label not in best.fit.names:
         return best
     period = 1.0 / dominant_frequency(best.fit.run.series[0])
     for share in (0.25, 0.5):
@@ -298,7 +302,7 @@ def _words(record: Record, model: Model, declared: Trial, alike: Sequence[Trial]
     others = [instruction(one.change) for one in alike[1:] if one.change.role != best.change.role][:1]
     if others:
         said += f" (or {others[0]}: the record does not tell which)"
-    if declared.unexplained >= POOR:
+    if declared.unexplained >= POOR_MOTION:
         before = f"{100 * declared.unexplained:.0f} %" if declared.unexplained < 1.0 else "all of it"
         return f"{said}; with it the nominal model misses {100 * best.unexplained:.2g} % of the motion, without it {before}"
     return (

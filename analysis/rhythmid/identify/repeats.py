@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from rhythmid.identify.noise import NoiseModel, estimate_noise
 from rhythmid.identify.series import Series
+from rhythmid.simulation.signal import FOR_EVER
 
 Array = NDArray[np.float64]
 ENOUGH = 400  # differences below which a noise level is not worth quoting
@@ -18,7 +19,7 @@ def _sampled(series: Series, which: str) -> Array | None:
     if signal is None:
         return None
     centres = series.centres
-    inside = np.clip(centres, signal.x[0], min(signal.x[-1], 1e200))
+    inside = np.clip(centres, signal.x[0], min(signal.x[-1], FOR_EVER))
     return np.asarray(signal(inside))
 
 

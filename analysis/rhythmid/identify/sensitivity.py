@@ -48,7 +48,8 @@ class Problem:
         ]
 
     def _white(self, index: int, samples: Array) -> Array:
-        parts = [self.noise.whiten(samples[s]) for s in self.stretches[index]]
+        one = self.run.series[index]
+        parts = [self.noise.whiten(one.levelled(samples[s], s)) for s in self.stretches[index]]
         return np.concatenate(parts) if parts else samples[:0]
 
     def whitened(self, index: int, samples: Array) -> Array:

@@ -15,14 +15,16 @@ from scipy.interpolate import PPoly
 
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
+from rhythmid.identify.inputs import Inputs
+from rhythmid.identify.spread import relative_spreads
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.simulation.generated_source import InputKind, OutputKind
-from rhythmid.simulation.signal import continuous, fast_length, spline
+from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, spline
 
 REACH = 2  # blocks on either side from which `of_block` takes differences
 REST_LENGTH = "linear_spring.rest_length"
-FAINT = 1e-4  # of the inertia's own stiffness m ω², below which a spring sets no scale
+NO_SPRING = 1e-4  # of the inertia's own stiffness m ω², below which a spring sets no scale
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -37,7 +39,8 @@ class Series:
     `ignored` (n // block, q) are signals any multiple of which the averages may contain, so that nothing is learnt from
     them (the limit cycle's harmonics, where the cycle is not to be used).
     `parameters` are values of the model's parameters that the record declares; see `own_model`. `record` is the record that the
-    series is a stretch of, empty for a whole one.
+    series is a stretch of, empty for a whole one. `spread` (n // block,) is the standard deviation of each average's noise over its
+    root mean square, where it is not the same throughout: jitter of the stamps makes it grow with the slope of the signal.
     """
 
     name: str
@@ -54,6 +57,7 @@ class Series:
     hidden: Mask | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
     record: str = ""
+    spread: Array | None = None
 
     @property
     def blocks(self) -> int:
@@ -105,6 +109,11 @@ class Series:
         return 0.5 * (away**2).reshape(self.blocks, self.block).mean(axis=1)
 
     @cached_property
+    def inputs(self) -> Inputs:
+        """Command and forcing as the compiled loop takes them."""
+        return Inputs(self.command, self.forcing, self.period, self.block > 1)
+
+    @cached_property
     def averaged(self) -> Array:
         """Block averages of the measurement."""
         return self.average(self.value)
@@ -114,6 +123,17 @@ class Series:
         if not hidden:
             return self.used
         return np.zeros(self.blocks, bool) if self.hidden is None else self.hidden
+
+    def spread_of(self, part: slice) -> Array:
+        """Relative standard deviation of the noise of the averages `part`, (m,)."""
+        return np.ones(self.blocks)[part] if self.spread is None else self.spread[part]
+
+    def levelled(self, samples: Array, part: slice = slice(None)) -> Array:
+        """Samples of the averages `part`, (m,) or (m, q), over the relative standard deviation of their noise: what is whitened
+        and weighed. The samples themselves where the noise is the same throughout."""
+        if self.spread is None:
+            return samples
+        return samples / self.spread[part].reshape(-1, *[1] * (samples.ndim - 1))
 
     def power(self, chosen: Mask) -> float:
         """Sum of squares of the motion over the chosen averages, which an error is a share of."""
@@ -212,7 +232,9 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
         )
     if block is None:
         block = min(block_length(s.value, s.period) for s in longest_of_each(made))
-    return [replace(s, block=block, used=_whole_blocks(s, block)) for s in made]
+    made = [replace(s, block=block, used=_whole_blocks(s, block)) for s in made]
+    spreads = relative_spreads([(record_of(s), s.time, s.value) for s in made], block)
+    return [replace(s, spread=spread) for s, spread in zip(made, spreads)]
 
 
 def record_of(series: Series) -> str:
@@ -283,14 +305,14 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     velocity = max(float(np.std(v)) for _, v in motions)
     inertial = model.mass.value * (2 * np.pi * frequency) ** 2
     spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
-    stiffness = spring if spring > FAINT * inertial else inertial
+    stiffness = spring if spring > NO_SPRING * inertial else inertial
     effort, peak, pumping, reference = 0.0, 0.0, 0.0, 0.0
     fed = any(term.element.takes for term in model.terms)  # by a voltage, say: what is recorded is no force
     for one in series:
         total = np.zeros(len(one.time))
         for signal in (one.command, one.forcing):
             if signal is not None:
-                inside = (one.time >= signal.x[0]) & (one.time <= min(signal.x[-1], 1e200))
+                inside = (one.time >= signal.x[0]) & (one.time <= min(signal.x[-1], FOR_EVER))
                 total[inside] += signal(one.time[inside])
         if one.kind == "reference":
             reference = max(reference, float(np.std(total)))

@@ -24,15 +24,19 @@ from rhythmid.identify.sample_clock.clock import clock_of
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.series import Series, scales
 from rhythmid.model import Model
+from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
 DRIFTS = ("clock_skew", "input_delay_drift")
 DRIFT_PARAMETER = {"clock_skew": "skew", "input_delay_drift": "rate"}
 ALIKE = {"clock_skew": ("delay_drift",)}  # the same to first order
-CERTAIN = 5.0  # standard deviations from which a timing effect becomes part of the model
+EVIDENT_BY = 5.0  # standard deviations from which a timing effect becomes part of the model
 SMEARS = 3  # widths of command jitter that are tried
+ROLL_OFF_SAMPLES = (
+    1_000_000  # samples that tell of a roll-off what there is to be told: further records are not asked
+)
 UNEXPLAINED = 1.5  # times the noise floor, beyond which a hold is looked for
-GAIN = 25.0  # in chi2 that a hold must bring
+HOLD_GAIN = 25.0  # in chi2 that a hold must bring
 SLOWER = 3.0  # sample periods from which a hold can be told from the commands' own
 LONGEST_HOLD = 0.25  # seconds between two commands that the drive takes
 REACH = 0.05  # share of a rough period around it in which the true one is looked for, at least
@@ -83,7 +87,7 @@ def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tupl
             if not any(t.element.name in (name, *ALIKE.get(name, ())) for t in fit.model.terms)
             and (name != "input_delay_drift" or fit.model.term("input_delay") is not None)
         }
-        shown = {name: value / std for name, (value, std) in scores.items() if abs(value) > CERTAIN * std}
+        shown = {name: value / std for name, (value, std) in scores.items() if abs(value) > EVIDENT_BY * std}
         if not shown:
             break
         name = max(shown, key=lambda n: abs(shown[n]))
@@ -93,7 +97,7 @@ def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tupl
         parameter = f"{name}.{DRIFT_PARAMETER[name]}"
         value, std = fit.model.value(parameter), fit.std[parameter]
         small = abs(value) * max(float(np.ptp(one.time)) for one in fit.run.series) < 1e-6
-        if abs(value) < CERTAIN * std or small or fit.noise.variance > before.noise.variance:
+        if abs(value) < EVIDENT_BY * std or small or fit.noise.variance > before.noise.variance:
             fit = before
             break
         told = "the clocks of measurement and command run apart, or the measurement delay drifts"
@@ -184,25 +188,37 @@ def smeared(command: PPoly, width: float, period: float) -> PPoly:
     return PPoly(fitted.c, fitted.x, extrapolate=True)
 
 
+def _received(fit: Fit, width: float) -> tuple[Fit, list[Series]]:
+    """The fit with a delay that is shorter by half of `width` [s], and its series, whose commands are smeared over it."""
+    step = fit.run.series[0].period
+    series = [
+        one if one.command is None else replace(one, command=smeared(one.command, width, step))
+        for one in fit.run.series
+    ]
+    start = fit.model.value(INPUT_DELAY) - 0.5 * width
+    return replace(fit, model=fit.model.with_values({INPUT_DELAY: start})), series
+
+
+def _first_samples(fit: Fit, enough: int) -> Fit:
+    """The fit as it stands on its first series, with `enough` samples or more; all of it where there are not so many."""
+    ends = np.cumsum([len(one.time) for one in fit.run.series])
+    count = int(np.searchsorted(ends, enough)) + 1
+    if count >= len(ends):
+        return fit
+    run = replace(fit.run, series=fit.run.series[:count], inputs=fit.run.inputs[:count])
+    return replace(fit, run=run, starts=fit.starts[:count], residuals=fit.residuals[:count])
+
+
 def _smear(fit: Fit, largest: float, pool: ThreadPoolExecutor | None) -> tuple[float, float] | None:
     """Variance [s²] of a delay that is uniform over an interval and smears the command; and its standard deviation.
 
     The profile likelihood over the variance is a parabola. None where the response does not roll off at all.
     """
-    step = fit.run.series[0].period
+    fit = _first_samples(fit, ROLL_OFF_SAMPLES)
     at = np.linspace(0.0, largest, SMEARS + 1) ** 2
     best = spread = 0.0
     for _ in range(3):
-        chi2 = []
-        for variance in at:
-            width = math.sqrt(12.0 * variance)
-            series = [
-                one if one.command is None else replace(one, command=smeared(one.command, width, step))
-                for one in fit.run.series
-            ]
-            start = fit.model.value("input_delay.delay") - 0.5 * width
-            moved = replace(fit, model=fit.model.with_values({"input_delay.delay": start}))
-            chi2.append(_refitted(moved, series, pool).chi2)
+        chi2 = [_refitted(*_received(fit, math.sqrt(12.0 * variance)), pool).chi2 for variance in at]
         curve = np.polyfit(at / at[-1], chi2, 2)
         if curve[0] <= 0.0:
             return None
@@ -246,26 +262,21 @@ def command_hold(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tup
     (an element with a clock of its own); such periods are tried as finely as that takes, the usual rates among them. Each step must
     lower chi2 by more than 25.
     """
-    fit, name = joint.fit, "input_delay.delay"
+    fit, name = joint.fit, INPUT_DELAY
     none = Estimate(None, None, "s")
     element = next((one for one in load_catalogue().values() if one.clock and one.slot == "command"), None)
     smear = None
     if clock_of(fit.model) is None and name in fit.names:
         smear = _smear(fit, LONGEST_HOLD / math.sqrt(12.0), pool)
     step = fit.run.series[0].period
-    if element is None or smear is None or smear[0] < CERTAIN * smear[1]:
+    if element is None or smear is None or smear[0] < EVIDENT_BY * smear[1]:
         return joint, none
     rough = math.sqrt(12.0 * smear[0])
     if rough < SLOWER * step:
         return joint, none
     spread = 6.0 * smear[1] / rough
-    series = [
-        one if one.command is None else replace(one, command=smeared(one.command, rough, step))
-        for one in fit.run.series
-    ]
-    start = fit.model.with_values({name: fit.model.value(name) - 0.5 * rough})
-    best, period = _refitted(replace(fit, model=start), series, pool), Estimate(rough, spread, "s")
-    if best.chi2 > fit.chi2 - GAIN:
+    best, period = _refitted(*_received(fit, rough), pool), Estimate(rough, spread, "s")
+    if best.chi2 > fit.chi2 - HOLD_GAIN:
         return joint, none
     own = step / math.sqrt(12.0)  # a tick cannot tell the age of a command that is itself held
     best = _widened(best, name, math.hypot(0.5 * spread, own))
@@ -288,7 +299,7 @@ def command_hold(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tup
         problem.learn_hidden(model, fit.starts)
         return problem.cost(model, problem.residuals(model, fit.starts), fit.starts)
 
-    gain = GAIN
+    gain = HOLD_GAIN
     for ticks in sorted(tried, key=unrefined)[:REFITTED]:
         model, run = held(ticks)
         try:

@@ -16,6 +16,7 @@ from rhythmid.ltp.linearisation import linearise
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
 from rhythmid.simulation.generated_source import InputKind
+from rhythmid.simulation.transport import MEASUREMENT, delays
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -106,17 +107,11 @@ def linearised(
 def transport_delays(model: Model, at: float = 0.0) -> tuple[float, float]:
     """Delays (τ_u, τ_y) [s] of the model's command and measurement paths, for stamps near `at` [s]."""
     stamps = np.array([at])
-    command = measurement = 0.0
-    for term in model.terms:
-        if term.element.delay is not None:
-            late = float(
-                term.element.delay(stamps, **{name: value.value for name, value in term.values.items()})[0]
-            )
-            if term.element.slot == "command":
-                command += late
-            else:
-                measurement += late
-    return command, measurement
+
+    def total(*slots: str) -> float:
+        return sum((float(late[0]) for _, late in delays(model, stamps, *slots)), 0.0)
+
+    return total("command"), total(*MEASUREMENT)
 
 
 def theoretical_htf(

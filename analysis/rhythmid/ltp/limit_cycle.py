@@ -16,7 +16,7 @@ from rhythmid.errors import InputError
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import Compiled, compile_model, compile_rates
-from rhythmid.simulation.generated_source import InputKind
+from rhythmid.simulation.generated_source import InputKind, Variant
 from rhythmid.simulation.signal import pieces
 from rhythmid.simulation.simulate import MAX_STEP, start_states
 
@@ -114,7 +114,7 @@ class PeriodMap:
     """x(0) -> x(T) of the forced, uncommanded model, and what lies between."""
 
     def __init__(self, model: Model, pumping: Pumping, excited: InputKind, max_step: float) -> None:
-        self.compiled = compile_model(model, excited=excited, rational=True)
+        self.compiled = compile_model(model, Variant(excited, rational=True))
         self.parameters = self.compiled.layout.vector(model)
         self.still = tuple(np.ascontiguousarray(part) for part in pieces(None))
         self.forcing = tuple(np.ascontiguousarray(part) for part in pieces(pumping.signal()))

@@ -9,7 +9,7 @@ from rhythmid.errors import InputError
 from rhythmid.ltp.excited_lines import ExcitedLines, excited_lines
 from rhythmid.ltp.harmonic_estimate import HarmonicEstimate, HarmonicEstimates
 from rhythmid.ltp.local_rational import LEAKAGE, highest_local, local_rational, oversampling
-from rhythmid.ltp.number_of_harmonics import FALSE_ALARM, chosen, significance
+from rhythmid.ltp.number_of_harmonics import TOO_LARGE, chosen, significance
 from rhythmid.ltp.regularised_least_squares import HtfEstimate, estimate_htf, regularised_least_squares
 from rhythmid.ltp.separated_lines import highest_separated, read_off
 from rhythmid.ltp.spectra import Spectra
@@ -24,7 +24,7 @@ def harmonic_transfer_functions(
     ring_down: float,
     method: HtfMethod = "auto",
     harmonics: int | None = None,
-    false_alarm: float = FALSE_ALARM,
+    false_alarm: float = TOO_LARGE,
 ) -> HarmonicEstimates:
     """Transfer functions −M … M of the machine behind the record whose `spectra` these are.
 

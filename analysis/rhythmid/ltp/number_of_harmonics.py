@@ -7,11 +7,11 @@ from scipy.stats import f as f_distribution
 
 from rhythmid.ltp.harmonic_estimate import HarmonicEstimate, Significance
 
-FALSE_ALARM = 0.01  # probability that the chosen M is too large
+TOO_LARGE = 0.01  # probability that the chosen M is too large
 
 
 def significance(
-    functions: Sequence[HarmonicEstimate], every: int = 1, false_alarm: float = FALSE_ALARM
+    functions: Sequence[HarmonicEstimate], every: int = 1, false_alarm: float = TOO_LARGE
 ) -> tuple[Significance, ...]:
     """Test each pair ±m, m = 1 … M: where there is nothing but Gaussian noise, the mean of |Ĥ_m|²/std² is F-distributed.
 

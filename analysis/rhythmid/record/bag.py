@@ -2,12 +2,11 @@
 
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import yaml
-
+from rhythmid import document
 from rhythmid.errors import InputError
 from rhythmid.record.block import Block, Topic, Wanted
 from rhythmid.record.compression import decompress_file
@@ -31,13 +30,16 @@ class Bag:
     files : storage files in the order of recording.
     topics : all topics by name, with or without messages.
     truncated : whether the recording breaks off (its recorder was killed or is still running).
-    notes : what a user should know about the state of the files, one line each.
+    notes : what a user should know about the state of the files, one line each; empty for a whole recording.
+    stated : messages by topic, as metadata.yaml or the end of the files count them; empty where they do not.
 
-    Raises InputError when there is no such recording.
+    With `verify` the checksums of the files are compared, too. Raises InputError when there is no such recording.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(self, path: str | Path, verify: bool = False) -> None:
         self.path = Path(path)
+        self.stated: dict[str, int] = {}
+        self._verify = verify
         self.topics: dict[str, Topic] = {}
         self.truncated = False
         self.notes: list[str] = []
@@ -59,22 +61,31 @@ class Bag:
 
     def _files_of_directory(self) -> list[Path]:
         metadata = self.path / "metadata.yaml"
-        present = [file for file in self.path.iterdir() if file.name.endswith(SUFFIXES)]
+        present = [file for file in self.path.iterdir() if file.name.endswith(SUFFIXES) and file.is_file()]
         if not present:
             raise InputError(f"{self.path}: holds no recording (no {' or '.join(SUFFIXES[:2])} file)")
         present.sort(
-            key=lambda file: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", file.name)]
+            key=lambda file: [
+                int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", file.name)
+            ]
         )
         if not metadata.is_file():
             self.notes.append("metadata.yaml is missing: the recorder was not closed")
             return present
         try:
-            listed = yaml.safe_load(metadata.read_text(encoding="utf-8"))["rosbag2_bagfile_information"]
+            listed = document.read(metadata).plain["rosbag2_bagfile_information"]
             files = [self.path / Path(name).name for name in listed["relative_file_paths"]]
-        except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError):
+            if not all(file.name.endswith(SUFFIXES) for file in files):
+                raise ValueError("names other files than recordings")
+            missing = [file.name for file in files if not file.is_file()]
+            self.stated = {
+                str(topic["topic_metadata"]["name"]): int(topic["message_count"])
+                for topic in listed["topics_with_message_count"]
+            }
+        except (OSError, ValueError, KeyError, TypeError):
             self.notes.append("metadata.yaml is damaged: all storage files of the directory were read")
             return present
-        if missing := [file.name for file in files if not file.is_file()]:
+        if missing:
             raise InputError(f"{self.path}: {missing[0]}, which metadata.yaml lists, is missing")
         return files
 
@@ -102,6 +113,19 @@ class Bag:
             raise InputError(f"{file}: is damaged: {error}") from None
         self.topics.update(reader.topics)
         self.notes += [f"{file.name}: {note}" for note in reader.damage]
+        if self._verify:
+            self.notes += [f"{file.name}: {note}" for note in reader.wrong_checksums()]
+            if not (self.path / "metadata.yaml").is_file():
+                for name, count in reader.counted().items():
+                    self.stated[name] = self.stated.get(name, 0) + count
         if reader.truncated:
             self.truncated = True
             self.notes.append(f"{file.name}: breaks off; what precedes the break was read")
+
+    def lost(self, counts: Mapping[str, int]) -> dict[str, int]:
+        """Messages by topic that are missing from `counts`, as far as the bag states how many there were."""
+        return {
+            name: missing
+            for name, stated in self.stated.items()
+            if (missing := stated - counts.get(name, 0)) > 0
+        }

@@ -62,7 +62,8 @@ class BagReport:
     topics : one report each, in order of name; empty for tables.
     channels : quality of the mapped channels by role; empty if they cannot be read.
     problems : why the recording cannot be used as mapped, one line each; empty if it can.
-    notes : what is wrong with the files, one line each.
+    notes : what a user should know of the recording, one line each.
+    damage : those of the notes that tell damage of the files; empty for a whole recording.
     """
 
     path: Path
@@ -73,6 +74,7 @@ class BagReport:
     truncated: bool = False
     problems: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    damage: tuple[str, ...] = ()
 
     @property
     def usable(self) -> bool:
@@ -91,6 +93,7 @@ class BagReport:
             "channels": {role: channel.to_dict() for role, channel in self.channels.items()},
             "problems": list(self.problems),
             "notes": list(self.notes),
+            "damage": list(self.damage),
         }
 
     def lines(self) -> list[str]:
@@ -107,10 +110,11 @@ class BagReport:
                 f"  {topic.name:{width}}  {topic.type}  {timing.count} messages, {timing.rate:.4g} Hz, "
                 f"jitter {1e6 * timing.jitter_std:.3g} us, {timing.gaps} gaps, {timing.duplicates} duplicates{late}"
             )
+        verdict = "what could be read is flawless, but files are damaged" if self.damage else "flawless"
         for role, channel in self.channels.items():
             facts = ", ".join(channel.facts())
             found.append(
-                f"  {role}: {channel.source}: {facts}: " + ("; ".join(channel.complaints()) or "flawless")
+                f"  {role}: {channel.source}: {facts}: " + ("; ".join(channel.complaints()) or verdict)
             )
         found += [f"  note: {note}" for note in self.notes]
         return found
@@ -139,9 +143,11 @@ def quality_report(source: str | Path, signals: Signals | str | Path | None = No
         problems.append(str(error))
     if not is_bag(source):
         return BagReport(source, source.stat().st_size, duration, (), channels, notes=tuple(notes))
-    bag = Bag(source)
+    bag = Bag(source, verify=True)
     received, stamped = _times(bag)
-    notes += [note for note in bag.notes if note not in notes]
+    lost = bag.lost({name: len(log_ns) for name, log_ns in received.items()})
+    damage = (*bag.notes, *(f"{name}: {count} messages are missing" for name, count in lost.items()))
+    notes += [note for note in damage if note not in notes]
     times = [log_ns for log_ns in received.values() if len(log_ns)]
     if times:
         duration = (
@@ -152,7 +158,9 @@ def quality_report(source: str | Path, signals: Signals | str | Path | None = No
         for name, topic in sorted(bag.topics.items())
     )
     size = sum(file.stat().st_size for file in bag.files)
-    return BagReport(source, size, duration, topics, channels, bag.truncated, tuple(problems), tuple(notes))
+    return BagReport(
+        source, size, duration, topics, channels, bag.truncated, tuple(problems), tuple(notes), damage
+    )
 
 
 def _times(bag: Bag) -> tuple[dict[str, NDArray[np.int64]], dict[str, Columns]]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces import (
     Connection,
+    ConnectionExtRosbag2,
     Qos,
     QosDurability,
     QosHistory,
@@ -22,26 +23,71 @@ from rosbags.interfaces import (
     QosTime,
 )
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.rosbag2.errors import WriterError
 
 from rhythmid.errors import InputError
 from rhythmid.record.mcap_writer import McapWriter
 from rhythmid.record.message_types import standard_types
 from rhythmid.record.messages import Messages, string_message
+from rhythmid.record.metadata import VERSION, FileContent, bag_information, metadata_text, qos_text
 from rhythmid.record.sqlite_writer import SqliteWriter
 
 Storage = Literal["mcap", "sqlite3"]
+_FILES = {StoragePlugin.MCAP: McapWriter, StoragePlugin.SQLITE3: SqliteWriter}
 STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
 FOREVER = QosTime(9223372036, 854775807)  # how rosbag2 writes an infinite duration
 
 
 class BagWriter(Writer):
-    """rosbags' Writer with storages that also take arrays."""
+    """rosbags' Writer with storages that also take arrays, and with files that can be split.
 
-    STORAGE_PLUGINS = {StoragePlugin.MCAP: McapWriter, StoragePlugin.SQLITE3: SqliteWriter}
+    `numbered` names the files as rosbag2's recorder does (`bag_0.mcap`, …); without it there is one, `bag.mcap`.
+    """
+
+    def __init__(self, path: Path | str, storage: Storage, numbered: bool = False) -> None:
+        super().__init__(path, version=VERSION, storage_plugin=STORAGES[storage])
+        self.files: list[FileContent] = []
+        self._numbered = numbered
+
+    @property
+    def file(self) -> FileContent:
+        """What has been written to the present file."""
+        return self.files[-1]
+
+    def open(self) -> None:
+        """Create the folder and the first file. Raises WriterError if the folder exists, OSError or sqlite3.Error."""
+        try:
+            self.path.mkdir(parents=True)
+        except FileExistsError:
+            raise WriterError(f"{self.path} exists already and is not overwritten") from None
+        self._open_file()
+
+    def _open_file(self) -> None:
+        name = f"{self.path.name}_{len(self.files)}" if self._numbered else self.path.name
+        storage = _FILES[self.storage_plugin](self.path, self.compression_mode, name)
+        self.storage = storage
+        self.files.append(FileContent(storage.path.name))
+
+    def split(self) -> None:
+        """Close the present file and go on in another."""
+        self._close_file([self.file])
+        self._open_file()
+        assert self.storage is not None
+        for msgtype in {connection.msgtype: connection for connection in self.connections}.values():
+            self.storage.add_msgtype(msgtype)
+        for connection in self.connections:
+            assert isinstance(connection.ext, ConnectionExtRosbag2)
+            self.storage.add_connection(connection, qos_text(connection.ext.offered_qos_profiles))
 
     def flush(self) -> None:
         """Make everything written so far readable, should the process be killed."""
         cast(McapWriter | SqliteWriter, self.storage).flush()
+
+    def write(self, connection: Connection, timestamp: int, data: bytes | memoryview) -> None:
+        """Write one message with its receive time [ns]."""
+        assert self.storage is not None
+        self.storage.write(connection, timestamp, data)
+        self.file.add(connection.id, timestamp, timestamp, 1, len(data))
 
     def write_arrays(self, parts: Sequence[tuple[Connection, NDArray[np.int64], NDArray[np.uint8]]]) -> None:
         """Write whole topics in order of receive time: connection, times int64[n] [ns], messages uint8[n, size]."""
@@ -49,11 +95,26 @@ class BagWriter(Writer):
             return
         arrays = [(connection.id, log_ns, data) for connection, log_ns, data in parts]
         cast(McapWriter | SqliteWriter, self.storage).write_arrays(arrays)
-        for number, log_ns, _ in arrays:
+        for number, log_ns, data in arrays:
             if len(log_ns):
-                self.counts[number] += len(log_ns)
-                self.min_timestamp = min(self.min_timestamp, int(log_ns.min()))
-                self.max_timestamp = max(self.max_timestamp, int(log_ns.max()))
+                self.file.add(number, int(log_ns.min()), int(log_ns.max()), len(log_ns), data.size)
+
+    def close(self) -> None:
+        """Close the last file and write metadata.yaml, with which the bag is complete."""
+        self._close_file(self.files)
+        text = metadata_text(self._information(self.files))
+        unfinished = self.metapath.with_suffix(".yaml.tmp")
+        unfinished.write_text(text, encoding="utf-8")
+        unfinished.replace(self.metapath)
+
+    def _close_file(self, described: Sequence[FileContent]) -> None:
+        assert self.storage is not None
+        self.storage.close(VERSION, json.dumps(self._information(described)))  # JSON is YAML
+        self.storage = None
+
+    def _information(self, files: Sequence[FileContent]) -> dict[str, Any]:
+        name = self.storage_plugin.name.lower()
+        return bag_information(name, files, self.connections, self.custom_data)
 
 
 def qos(transient_local: bool = False, depth: int = 100) -> Qos:
@@ -86,7 +147,7 @@ def new_bag(path: str | Path, storage: Storage = "mcap", compress: bool = False)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         folder = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
-        writer = BagWriter(folder / path.name, version=9, storage_plugin=STORAGES[storage])
+        writer = BagWriter(folder / path.name, storage)
         if compress:
             writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
         writer.open()

@@ -25,8 +25,10 @@ Wanted = Callable[[Topic], bool]
 
 
 def gather(buffer: bytes | memoryview, at: NDArray[np.int64], dtype: DTypeLike) -> NDArray:
-    """Numbers of `dtype` at the byte offsets `at`, int64[n], aligned or not."""
+    """Numbers of `dtype` at the byte offsets `at`, int64[n], aligned or not. Raises ValueError where one is outside."""
     item = np.dtype(dtype)
+    if len(at) and not 0 <= at.min() <= at.max() <= len(buffer) - item.itemsize:
+        raise ValueError("a number would lie outside of the file")
     windows = np.ndarray((len(buffer) - item.itemsize + 1,), item, buffer, 0, (1,))
     return windows[at]
 

@@ -1,16 +1,24 @@
 """What the times of channels tell of their clocks, and what has to be assumed."""
 
+import math
 from collections.abc import Mapping
 
 from rhythmid.record.quality import ChannelQuality
 
 # seconds between the ages at receipt of two channels, from which their stamps hardly share a clock
 CLOCKS_APART = 1.0
+APART_BY = 5.0  # standard deviations from which two clocks are said to run apart
+WORTH_TELLING = 0.1  # of a sample period by which they do over a record, below which it matters to no delay
 
 
 def clock_notes(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) -> tuple[str, ...]:
     """Notes on the clocks of channels by role; `clocks` says whether their times are those of `header` or `receive`."""
-    return (*_different(channels), *_assumed(channels, clocks))
+    return (
+        *_different(channels),
+        *_assumed(channels, clocks),
+        *_running_apart(channels, clocks),
+        *_jittered(channels),
+    )
 
 
 def _different(channels: Mapping[str, ChannelQuality]) -> tuple[str, ...]:
@@ -34,4 +42,41 @@ def _assumed(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) 
     return (
         f"assumed: {received} (time of receipt) and {' and '.join(stamped)} (stamps) share one clock; the stamps are at least "
         f"{1e3 * least:.3g} ms older than their receipt, and an offset between the clocks counts as delay",
+    )
+
+
+def _running_apart(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) -> tuple[str, ...]:
+    """Notes on channels whose times run apart from those of the output, as their arrivals tell."""
+    rates = {role: _rate(channel, clocks.get(role)) for role, channel in channels.items()}
+    own = rates.get("output")
+    if own is None:
+        return ()
+    timing, found = channels["output"].timing, []
+    for role, other in rates.items():
+        if role == "output" or other is None:
+            continue
+        apart, std = own[0] - other[0], math.hypot(own[1], other[1])
+        grown = abs(apart) * (timing.end - timing.start)
+        if abs(apart) > APART_BY * std and grown > WORTH_TELLING * timing.period:
+            found.append(
+                f"the times of the output run {1e6 * apart:+.3g} ± {1e6 * std:.1g} µs/s against those of the {role}, as their arrivals "
+                f"tell ({1e3 * grown:.3g} ms over the record); use  time: receive  for both"
+            )
+    return tuple(found)
+
+
+def _rate(channel: ChannelQuality, clock: str | None) -> tuple[float, float] | None:
+    """By how much faster than the clock of receipt a channel's times run [s/s], with the standard deviation."""
+    if clock == "receive":
+        return 0.0, 0.0
+    return None if channel.skew is None or channel.skew_std is None else (channel.skew, channel.skew_std)
+
+
+def _jittered(channels: Mapping[str, ChannelQuality]) -> tuple[str, ...]:
+    """A note for a channel whose stamps are out by so much that its noise grows with the slope of the signal."""
+    return tuple(
+        f"{role}: the stamps jitter by {1e3 * channel.stamp_jitter:.3g} ± {1e3 * channel.stamp_jitter_std:.1g} ms; samples count for "
+        "less the faster the signal changes"
+        for role, channel in channels.items()
+        if channel.stamp_jitter is not None and channel.stamp_jitter_std is not None
     )

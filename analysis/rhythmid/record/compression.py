@@ -1,6 +1,5 @@
 """Compressed parts of bags: MCAP chunks (zstd, lz4), single messages and whole files (zstd)."""
 
-import shutil
 import sys
 from pathlib import Path
 
@@ -12,6 +11,14 @@ else:
     from backports import zstd
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+HARMLESS = 256 << 20  # bytes that any file may hold, however small it is when packed
+EXPANSION = 200  # times its packed size that a larger one may hold; recordings of constants reach some 50
+_PIECE = 1 << 20  # bytes written at once
+
+
+def largest(packed: int) -> int:
+    """How many bytes may come out of `packed` compressed ones: what holds more was made to fill the memory."""
+    return max(HARMLESS, EXPANSION * packed)
 
 
 def compress(data: bytes) -> bytes:
@@ -22,24 +29,34 @@ def compress(data: bytes) -> bytes:
 def decompress(data: bytes, method: str) -> bytes:
     """Decompress a chunk; `method` as MCAP names it: '' (none), 'zstd' or 'lz4'.
 
-    A frame that breaks off gives what precedes the break. Raises ValueError when `data` is no such frame.
+    A frame that breaks off gives what precedes the break. Raises ValueError when `data` is no such frame, or holds more than
+    `largest` allows.
     """
     if method == "":
         return data
+    most = largest(len(data))
     try:
         if method == "zstd":
-            return zstd.ZstdDecompressor().decompress(data)
-        if method == "lz4":
-            return lz4.frame.LZ4FrameDecompressor().decompress(data)
-    except (zstd.ZstdError, RuntimeError, EOFError) as error:
-        raise ValueError(str(error)) from None
-    raise ValueError(f"unknown compression {method!r}")
+            plain = zstd.ZstdDecompressor().decompress(data, most + 1)
+        elif method == "lz4":
+            plain = lz4.frame.LZ4FrameDecompressor().decompress(data, most + 1)
+        else:
+            raise ValueError(f"unknown compression {method!r}")
+    except (zstd.ZstdError, RuntimeError, EOFError, MemoryError) as error:
+        raise ValueError(str(error) or "it is too large") from None
+    if len(plain) > most:
+        raise ValueError(f"it holds more than {most} bytes in {len(data)}")
+    return plain
 
 
 def decompress_file(source: Path, target: Path) -> None:
-    """Decompress a zstd file. Raises ValueError when it is damaged."""
+    """Decompress a zstd file. Raises ValueError when it is damaged, or holds more than `largest` allows."""
+    most = largest(source.stat().st_size)
     try:
         with zstd.open(source, "rb") as packed, target.open("wb") as plain:
-            shutil.copyfileobj(packed, plain)
+            while piece := packed.read(_PIECE):
+                plain.write(piece)
+                if plain.tell() > most:
+                    raise ValueError(f"it holds more than {most} bytes")
     except (zstd.ZstdError, EOFError) as error:
         raise ValueError(str(error)) from None

@@ -11,6 +11,7 @@ from rosbags.interfaces import Nodetype
 from rhythmid.errors import InputError
 
 _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[\s*([^\[\]]+?)\s*\]")
+LONGEST_POSITION = 10  # digits of a position in a list, whose length is a number of 32 bits
 NAMES = ("name", "names", "joint_names")  # lists that name the entries of the lists beside or below them
 
 TypeFields = Mapping[
@@ -37,7 +38,11 @@ class Field:
                     f"field {text!r} is not a path such as effort[leg], data[3] or wrench.force.z"
                 )
             name, entry = match.groups()
-            steps.append(name if name else int(entry) if entry.isdigit() else (entry,))
+            if name:
+                steps.append(name)
+            else:
+                position = entry.isdecimal() and len(entry) <= LONGEST_POSITION
+                steps.append(int(entry) if position else (entry,))
             at = match.end()
         if not steps:
             raise InputError(

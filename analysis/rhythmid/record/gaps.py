@@ -16,7 +16,7 @@ from rhythmid.record.timing import gaps_between
 
 Array = NDArray[np.float64]
 PAST = 0.05  # s of a command that are known before the first measurement behind a gap: it may act so late
-LEAST = 32  # measurements of a stretch, below which its initial state takes all that it tells
+LEAST_SAMPLES = 32  # measurements of a stretch, below which its initial state takes all that it tells
 EXACT = (
     1e-4  # of the motion, below which an error of the command counts for nothing however small the noise is
 )
@@ -124,7 +124,7 @@ def _between(record: Record, spans: list[tuple[float, float]]) -> Iterable[Recor
     for begin, end in zip(begins, ends, strict=True):
         past = min(PAST, 0.25 * (min(end, time[-1]) - begin)) if np.isfinite(begin) else 0.0
         inside = (time >= begin + past) & (time <= end)
-        if np.count_nonzero(inside) < LEAST:
+        if np.count_nonzero(inside) < LEAST_SAMPLES:
             continue
         parts = {role: _part(channel, begin, end) for role, channel in record.channels.items()}
         parts["output"] = replace(

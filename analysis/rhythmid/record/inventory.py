@@ -111,6 +111,7 @@ def inventory(source: str | Path, rate: float | None = None) -> Inventory:
     return _of_bag(Bag(source))
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of numbers near the largest, and NaN of every kind
 def _of_table(table: Table, rate: float | None) -> Inventory:
     columns = list(_vectors(table))
     if not columns:

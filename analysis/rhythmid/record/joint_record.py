@@ -16,14 +16,19 @@ reference for the controllers, see `kind` of the one axis' signals.yaml; `feedfo
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, cast
+from typing import Literal
+
+from pydantic import TypeAdapter
 
 from rhythmid.document import Node, read
 from rhythmid.record.read import read_record, read_tables
 from rhythmid.record.record import Record
 from rhythmid.record.signals import Signals
+from rhythmid.validation import validated
 
 Taken = Literal["before_actuator", "after_actuator"]
+_TAKEN: TypeAdapter[Taken] = TypeAdapter(Taken)
+_TEXT: TypeAdapter[str] = TypeAdapter(str)
 SHARED = ("topic", "file", "time")  # what a channel takes from the output's where it says nothing
 
 
@@ -95,7 +100,7 @@ def _joint_signals(document: Node, path: Path) -> JointSignals:
     if "effort" in keys:
         options = dict(keys["effort"].mapping())
         if "taken" in options:
-            taken = cast(Taken, options.pop("taken").choice(["before_actuator", "after_actuator"]))
+            taken = validated(options.pop("taken"), _TAKEN)
         keys["effort"] = replace(keys["effort"], value=options)
     if "input" in keys and isinstance(keys["input"].value, dict):
         options = dict(keys["input"].value)
@@ -125,9 +130,9 @@ def _joint_signals(document: Node, path: Path) -> JointSignals:
 def _names(node: Node) -> dict[str, str]:
     """By the joint's name in the model, the one in the recording."""
     if isinstance(node.value, dict):
-        found = {name: one.text() for name, one in node.mapping().items()}
+        found = {name: validated(one, _TEXT) for name, one in node.mapping().items()}
     else:
-        listed = [one.text() for one in node.items()]
+        listed = [validated(one, _TEXT) for one in node.items()]
         if len(set(listed)) < len(listed):
             node.fail("names a joint twice")
         found = {name: name for name in listed}

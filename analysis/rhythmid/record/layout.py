@@ -19,9 +19,9 @@ from rhythmid.record.field import NAMES, Field, TypeFields
 
 HEAD = 4  # bytes of encapsulation in front of every message; alignment counts from behind it
 LITTLE_ENDIAN = 0x0100  # the first two of them, plain CDR in little-endian byte order, read as a number
-_PARTS_AT_MOST = 1000  # a message with longer lists of sub-messages is not laid out
+_PARTS_AT_MOST = 1000  # a message with more sub-messages and strings in its lists is not laid out
 NUMBERS = {
-    "bool": "u1", "byte": "u1", "char": "u1", "octet": "u1", "int8": "i1", "uint8": "u1", "int16": "<i2", "uint16": "<u2",
+    "bool": "?", "byte": "u1", "char": "u1", "octet": "u1", "int8": "i1", "uint8": "u1", "int16": "<i2", "uint16": "<u2",
     "int32": "<i4", "uint32": "<u4", "int64": "<i8", "uint64": "<u8", "float32": "<f4", "float64": "<f8",
 }  # fmt: skip
 
@@ -65,6 +65,7 @@ class Layout:
         self._message = message
         self._types = types
         self._at = HEAD
+        self._parts = 0
         self.words: list[tuple[int, int]] = []  # place and value of every length word
         try:
             self.root: dict[str, Any] = self._part(msgtype)
@@ -84,6 +85,8 @@ class Layout:
         return length
 
     def _part(self, msgtype: str) -> dict[str, Any]:
+        if self._at > len(self._message):
+            raise Unsupported("the message is too short")
         return {name: self._walk(kind) for name, kind in self._types[msgtype][1]}
 
     def _walk(self, kind: Any) -> Any:
@@ -94,8 +97,9 @@ class Layout:
         element, count = kind[1][0], kind[1][1] if kind[0] == Nodetype.ARRAY else self._length()
         if element[0] == Nodetype.BASE and element[1][0] != "string":
             return self._numbers(element[1][0], count)
-        if count > _PARTS_AT_MOST:
-            raise Unsupported("a long list of sub-messages")
+        self._parts += count
+        if self._parts > _PARTS_AT_MOST:
+            raise Unsupported("long lists of sub-messages")
         return [self._walk(element) for _ in range(count)]
 
     def _numbers(self, base: str, count: int | None) -> Number | Numbers:

@@ -16,10 +16,22 @@ import numpy as np
 from rhythmid.errors import InputError
 from rhythmid.record.block import Block, Topic, Wanted, by_topic, gather
 from rhythmid.record.compression import decompress
+from rhythmid.record.mcap_damage import (
+    FOOTER_SIZE,
+    counted,
+    find_chunk,
+    is_chunk,
+    is_record,
+    messages_in_chunk,
+    summary_start,
+    wrong_checksums,
+)
 from rhythmid.record.mcap_writer import CHANNEL, CHUNK, FOOTER, MAGIC, MESSAGE, SCHEMA
 
 _head = struct.Struct("<BQ")
-_FOOTER_SIZE = 9 + 8 + 8 + 4
+_MESSAGE_HEAD = (
+    2 + 4 + 8 + 8
+)  # bytes of channel, sequence number and two times in front of the message's data
 _MESSAGE_BATCH = 100_000  # messages that lie outside of chunks are handed out in blocks of at most this many
 
 
@@ -50,19 +62,36 @@ class McapReader:
         while at < end:
             loose, at = self._scan(self._data, at, end)
             yield from self._split(self._data, loose, wanted)
-            if at + 9 > end or (size := _head.unpack_from(self._data, at)[1]) > end - at - 9:
-                break
-            op = self._data[at]
-            if op == FOOTER:
+            whole = at + 9 <= end and (size := _head.unpack_from(self._data, at)[1]) <= end - at - 9
+            if whole and self._data[at] == FOOTER:
                 return
-            if op == 0:
-                break
-            if op == CHUNK:
+            if whole and self._data[at] == MESSAGE:  # the scan hands out so many at a time
+                continue
+            if is_chunk(self._data, at, end):
                 yield from self._chunk(at + 9, at + 9 + size, wanted, whole=True)
                 at += 9 + size
+                continue
+            following = find_chunk(self._data, at + 1)
+            if following is None:
+                break
+            self.damage.append(f"bytes {at} to {following} are damaged and were skipped")
+            at = following
         self.truncated = True
         if at + 9 <= end and self._data[at] == CHUNK:
             yield from self._chunk(at + 9, end, wanted, whole=False)
+
+    def wrong_checksums(self) -> list[str]:
+        """What the checksums of a finished file say against it, one phrase each."""
+        return [] if self.truncated else wrong_checksums(self._data)
+
+    def counted(self) -> dict[str, int]:
+        """Messages by topic, as the end of the file counts them; empty if it does not."""
+        names = {number: topic.name for number, topic in self._channels.items()}
+        found: dict[str, int] = {}
+        for number, count in counted(self._data).items():
+            if number in names:
+                found[names[number]] = found.get(names[number], 0) + count
+        return found
 
     def _scan(self, data: bytes | memoryview, at: int, end: int) -> tuple[list[int], int]:
         """Offsets of message records from `at` up to a chunk, the footer, a record that breaks off, or the end."""
@@ -74,12 +103,13 @@ class McapReader:
             if following > end or (len(found) >= _MESSAGE_BATCH and data is self._data):
                 break
             if op == MESSAGE:
-                add(at)
+                if size >= _MESSAGE_HEAD:  # a shorter one is none
+                    add(at)
             elif op == SCHEMA:
                 self._declare_schema(bytes(data[at + 9 : following]))
             elif op == CHANNEL:
                 self._declare_channel(bytes(data[at + 9 : following]))
-            elif op in (0, FOOTER, CHUNK):  # 0 is no record: zeros where a file system lost the tail
+            elif op in (FOOTER, CHUNK) or not is_record(data, at, end):
                 break
             at = following
         return found, at
@@ -89,7 +119,7 @@ class McapReader:
             return
         at = np.array(found, dtype=np.int64)
         topics = {number: topic for number, topic in self._channels.items() if wanted(topic)}
-        size = gather(data, at + 1, "<i8") - 22
+        size = gather(data, at + 1, "<i8") - _MESSAGE_HEAD
         log_ns = gather(data, at + 15, "<i8")
         yield from by_topic(topics, gather(data, at + 9, "<u2"), data, at + 31, size, log_ns)
 
@@ -109,8 +139,13 @@ class McapReader:
             if whole and checksum and zlib.crc32(plain) != checksum:
                 raise ValueError("its checksum is wrong")
         except (ValueError, struct.error) as error:
-            self.damage.append(f"chunk at byte {at - 9} is damaged and was skipped: {error}")
             self._declare_from_summary()  # the chunk may have been the one that did
+            held = ", ".join(
+                f"{count} of {self._channels[number].name}" if number in self._channels else f"{count} others"
+                for number, count in (messages_in_chunk(self._data, end) if whole else {}).items()
+            )
+            held = f"; lost messages: {held}" if held else ""
+            self.damage.append(f"chunk at byte {at - 9} is damaged and was skipped: {error}{held}")
             return
         found, stop = self._scan(plain, 0, len(plain))
         if whole and stop < len(plain):
@@ -121,14 +156,9 @@ class McapReader:
 
     def _declare_from_summary(self) -> None:
         """Declare the topics that the summary at the end of the file repeats, where there is one."""
-        end = len(self._data) - len(MAGIC)
-        footer = end - _FOOTER_SIZE
-        if footer < 0 or bytes(self._data[end:]) != MAGIC or self._data[footer] != FOOTER:
-            return
-        (at,) = struct.unpack_from("<Q", self._data, footer + 9)
-        if 0 < at < footer:
+        if at := summary_start(self._data):
             with suppress(struct.error):  # it may be damaged, too
-                self._scan(self._data, at, footer)
+                self._scan(self._data, at, len(self._data) - len(MAGIC) - FOOTER_SIZE)
 
     def _declare_schema(self, body: bytes) -> None:
         (number,) = struct.unpack_from("<H", body)

@@ -20,6 +20,7 @@ from rhythmid.record.compression import compress
 MAGIC = b"\x89MCAP0\r\n"
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = range(1, 9)
 STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END = 0x0B, 0x0C, 0x0D, 0x0E, 0x0F
+_FOOTER_SIZE = 8 + 8 + 4  # bytes after opcode and length
 CHUNK_SIZE = 2**20  # bytes of messages in one chunk
 MESSAGE_HEAD = np.dtype(
     [
@@ -58,19 +59,25 @@ def message_records(channel: int, log_ns: NDArray[np.int64], data: NDArray[np.ui
 class McapWriter:
     """Storage plugin for `rosbags.rosbag2.Writer`: one indexed MCAP file in chunks with checksums."""
 
-    def __init__(self, path: Path, compression: CompressionMode) -> None:
-        self.path = path / f"{path.name}.mcap"
+    def __init__(self, path: Path, compression: CompressionMode, name: str) -> None:
+        self.path = path / f"{name}.mcap"
         self._file = self.path.open("xb")
+        self._checksum = 0  # of all bytes written so far
         self._method = "zstd" if compression == CompressionMode.STORAGE else ""
         self._schemas: dict[str, int] = {}
         self._declared: list[bytes] = []  # schema and channel records, which the summary repeats
         self._undeclared = bytearray()  # those that wait for the next chunk
         self._counts: dict[int, int] = {}
         self._chunk_index: list[bytes] = []
-        self._range: list[tuple[int, int]] = []
+        self._first_ns, self._last_ns = 2**63 - 1, 0
         self._single = bytearray()  # message records that wait for the next chunk
         self._single_rows: list[tuple[int, int, int]] = []  # their log times, channels and offsets
-        self._file.write(MAGIC + record(HEADER, text("ros2"), text("rhythmid")))
+        self._write(MAGIC + record(HEADER, text("ros2"), text("rhythmid")))
+        self._file.flush()
+
+    def _write(self, data: bytes | bytearray) -> int:
+        self._checksum = zlib.crc32(data, self._checksum)
+        return self._file.write(data)
 
     def add_msgtype(self, connection: Connection) -> None:
         """Declare a message type."""
@@ -173,13 +180,13 @@ class McapWriter:
             packed,
         )
         at = self._file.tell()
-        self._file.write(chunk)
+        self._write(chunk)
         offsets = b""
         for number in np.unique(channel).tolist():
             mine = channel == number
             index = np.column_stack([log_ns[mine], start[mine] + head]).astype("<u8").tobytes()
             offsets += struct.pack("<HQ", number, self._file.tell())
-            self._file.write(record(MESSAGE_INDEX, struct.pack("<HI", number, len(index)), index))
+            self._write(record(MESSAGE_INDEX, struct.pack("<HI", number, len(index)), index))
             self._counts[number] += int(mine.sum())
         self._chunk_index.append(
             record(
@@ -191,17 +198,17 @@ class McapWriter:
                 struct.pack("<QQ", len(packed), len(plain)),
             )
         )
-        self._range.append(span)
+        self._first_ns, self._last_ns = min(self._first_ns, span[0]), max(self._last_ns, span[1])
 
     def close(self, version: int, metadata: str) -> None:
         """Write what is pending, the metadata and the summary, and close the file."""
         del version
         self.close_chunk()
-        self._file.write(self._undeclared)  # topics that never carried a message
+        self._write(self._undeclared)  # topics that never carried a message
         entry = text("serialized_metadata") + text(metadata)
         at = self._file.tell()
-        written = self._file.write(record(METADATA, text("rosbag2"), struct.pack("<I", len(entry)), entry))
-        self._file.write(record(DATA_END, bytes(4)))
+        written = self._write(record(METADATA, text("rosbag2"), struct.pack("<I", len(entry)), entry))
+        self._write(record(DATA_END, struct.pack("<I", self._checksum)))
         counts = b"".join(struct.pack("<HQ", *item) for item in sorted(self._counts.items()))
         statistics = struct.pack(
             "<QHIIIIQQI",
@@ -211,8 +218,8 @@ class McapWriter:
             0,  # attachments
             1,  # metadata records
             len(self._chunk_index),
-            min((first for first, _ in self._range), default=0),
-            max((last for _, last in self._range), default=0),
+            self._first_ns if self._chunk_index else 0,
+            self._last_ns,
             len(counts),
         )
         groups = [
@@ -222,14 +229,16 @@ class McapWriter:
             (CHUNK_INDEX, b"".join(self._chunk_index)),
             (METADATA_INDEX, record(METADATA_INDEX, struct.pack("<QQ", at, written), text("rosbag2"))),
         ]
-        summary = self._file.tell()
+        summary, self._checksum = self._file.tell(), 0
         offsets = b""
         for op, group in groups:
             if group:
                 offsets += record(SUMMARY_OFFSET, struct.pack("<BQQ", op, self._file.tell(), len(group)))
-                self._file.write(group)
+                self._write(group)
         offset_start = self._file.tell()
-        self._file.write(offsets + record(FOOTER, struct.pack("<QQI", summary, offset_start, 0)) + MAGIC)
+        self._write(offsets)
+        self._write(struct.pack("<BQQQ", FOOTER, _FOOTER_SIZE, summary, offset_start))
+        self._write(struct.pack("<I", self._checksum) + MAGIC)
         self._file.close()
 
     def abort(self) -> None:

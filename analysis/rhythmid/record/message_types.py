@@ -10,6 +10,11 @@ from rhythmid.errors import InputError
 from rhythmid.record.block import Topic
 from rhythmid.record.field import TypeFields
 
+TIME_PARTS = (("sec", "int32"), ("nanosec", "uint32"))
+LENGTH_WORD = 4  # bytes in front of a string or list
+LEAST_TEXT = LENGTH_WORD + 1  # with the closing zero
+LARGEST_FIXED = 1 << 28  # bytes that a type may need at least; a message that large is not sent
+MOST_FIXED_PARTS = 10_000  # strings or messages in a fixed array: each becomes lines of code of its own
 _SEPARATOR = "=" * 80 + "\n"
 
 
@@ -27,14 +32,51 @@ def type_fields(topic: Topic) -> TypeFields:
             f"{topic.name}: its messages are encoded as {topic.encoding!r}; only 'cdr' can be read"
         )
     own = _own_types(topic)
-    if topic.type in own and _parts(own) <= own.keys():
-        return own
-    types = {**standard_types().fielddefs, **own}
+    types = own
+    if topic.type not in own or not _parts(own) <= own.keys():
+        types = {**standard_types().fielddefs, **own}
     if topic.type not in types or not _parts(own) <= types.keys():
         raise InputError(
             f"{topic.name}: the bag does not define its type {topic.type!r}, which is not a standard type"
         )
+    try:
+        _check_size(types, topic.type, {})
+    except (InputError, RecursionError) as error:
+        raise InputError(f"{topic.name}: its type {topic.type!r} cannot be read: {error}") from None
     return types
+
+
+def _check_size(types: TypeFields, name: str, sizes: dict[str, int | None]) -> int:
+    """Least size [bytes] of a message, padding left out; `sizes` collects those of its parts, None while one is being worked out.
+
+    Raises InputError for types that no message could have: that hold themselves, that need more bytes than any message, or none,
+    so that a few bytes would claim billions of them.
+    """
+    if name in sizes:
+        if (known := sizes[name]) is None:
+            raise InputError(f"{name} holds itself")
+        return known
+    sizes[name] = None
+    size = sum(_least(types, kind, sizes) for _, kind in types[name][1])
+    if not 0 < size <= LARGEST_FIXED:
+        raise InputError(f"every {name} would take {size} bytes")
+    sizes[name] = size
+    return size
+
+
+def _least(types: TypeFields, kind: Any, sizes: dict[str, int | None]) -> int:
+    if kind[0] == Nodetype.NAME:
+        return _check_size(types, kind[1], sizes)
+    if kind[0] == Nodetype.BASE:
+        return LEAST_TEXT if "string" in kind[1][0] else 1
+    element, count = kind[1]
+    each = _least(types, element, sizes)
+    if kind[0] == Nodetype.SEQUENCE:
+        return LENGTH_WORD
+    single = element[0] == Nodetype.BASE and "string" not in element[1][0]
+    if not single and count > MOST_FIXED_PARTS:
+        raise InputError(f"it holds a fixed array of {count} parts")
+    return count * each
 
 
 def _own_types(topic: Topic) -> dict[str, Any]:
@@ -48,7 +90,7 @@ def _own_types(topic: Topic) -> dict[str, Any]:
                 topic.definition
             ]
             return {name: fields for text in texts for name, fields in get_types_from_idl(text).items()}
-    except (TypesysError, KeyError, IndexError, ValueError):
+    except (TypesysError, LookupError, ValueError, RecursionError):
         pass
     return {}
 
@@ -69,14 +111,23 @@ def _parts(types: TypeFields) -> set[str]:
 def typestore(topic: Topic) -> Any:
     """A rosbags Typestore that deserialises the topic's messages."""
     store = get_typestore(Stores.EMPTY)
-    store.register(dict(type_fields(topic)))
+    try:
+        store.register(dict(type_fields(topic)))
+    except (TypesysError, SyntaxError) as error:
+        raise InputError(f"{topic.name}: its type {topic.type!r} cannot be read: {error}") from None
     return store
 
 
 def stamp_path(topic: Topic) -> str | None:
     """Path of the time stamp in the topic's messages: of its header, else its own; None if there is none."""
     types = type_fields(topic)
+    time = (Nodetype.NAME, "builtin_interfaces/msg/Time")
     fields = dict(types[topic.type][1])
+    path = "stamp"
     if fields.get("header") == (Nodetype.NAME, "std_msgs/msg/Header"):
-        return "header.stamp"
-    return "stamp" if fields.get("stamp") == (Nodetype.NAME, "builtin_interfaces/msg/Time") else None
+        path, fields = "header.stamp", dict(types["std_msgs/msg/Header"][1])
+    if fields.get("stamp") != time:
+        return None
+    kinds = dict(types["builtin_interfaces/msg/Time"][1])
+    whole = all(kinds.get(part) == (Nodetype.BASE, (base, 0)) for part, base in TIME_PARTS)
+    return path if whole else None  # a bag may define its own types, under the names of standard ones

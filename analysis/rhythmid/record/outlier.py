@@ -1,4 +1,4 @@
-"""Samples that do not say where the machine was: strays, which a smooth signal cannot have taken, such as a bit that fell
+"""Samples that do not say where the machine was: outliers, which a smooth signal cannot have taken, such as a bit that fell
 over or a lost echo, and repeats, where a sensor is read more often than it measures or has stood still for a while."""
 
 from dataclasses import replace
@@ -10,12 +10,12 @@ from scipy.ndimage import median_filter
 from rhythmid.record.quality import clipped_samples, resolution
 from rhythmid.record.record import Record
 
-WIDEST = 3  # samples in a row that may be stray
-FAR = 12.0  # times the usual unevenness, from which a sample is suspected
-# of its distance, that the slopes before and after may differ from the line past a stray sample
+WIDEST = 3  # samples in a row that may be outliers
+FAR_OFF = 12.0  # times the usual unevenness, from which a sample is suspected
+# of its distance, that the slopes before and after may differ from the line past an outlier
 PASSING = 0.25
 NEAR = 101  # samples over which the usual unevenness is taken
-MOST = 0.02  # share of a signal beyond which such samples are no exception and belong to it
+LARGEST_SHARE = 0.02  # share of a signal beyond which such samples are no exception and belong to it
 USUAL = 1.4826  # standard deviations in a median absolute deviation
 LEAP = 1.5  # times the steps before and after, that the step out of repeats is at least: the motion went on meanwhile
 OFTEN = 0.3  # share of repeats, from which a sensor may be read more often than it measures
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-def stray_samples(value: Array) -> Mask:
+def outlying_samples(value: Array) -> Mask:
     """Whether samples (n,) stand far off the line that the samples before and after them make, at most three in a row.
 
     A kink in the signal, such as an impact makes, changes the slope and is none; nor is what happens too often.
@@ -36,7 +36,7 @@ def stray_samples(value: Array) -> Mask:
         return found
     uneven = np.abs(value[1:-1] - 0.5 * (value[:-2] + value[2:]))
     usual = USUAL * np.maximum(median_filter(uneven, NEAR), np.median(uneven))
-    limit = FAR * np.maximum(np.concatenate([usual[:1], usual, usual[-1:]]), resolution(value))
+    limit = FAR_OFF * np.maximum(np.concatenate([usual[:1], usual, usual[-1:]]), resolution(value))
     for width in range(1, WIDEST + 1):
         first = np.arange(2, len(value) - width - 1)  # between two good samples on either side
         last = first + width
@@ -46,10 +46,10 @@ def stray_samples(value: Array) -> Mask:
         bent = np.maximum(
             np.abs(value[first - 1] - value[first - 2] - slope), np.abs(value[last + 1] - value[last] - slope)
         )
-        stray = (least > limit[first]) & (bent < PASSING * least)
+        lone = (least > limit[first]) & (bent < PASSING * least)
         for k in range(width):
-            found[first[stray] + k] = True
-    return found if found.mean() <= MOST else np.zeros(len(value), dtype=bool)
+            found[first[lone] + k] = True
+    return found if found.mean() <= LARGEST_SHARE else np.zeros(len(value), dtype=bool)
 
 
 def repeated_samples(value: Array) -> Mask:
@@ -70,7 +70,7 @@ def repeated_samples(value: Array) -> Mask:
     fresh = (len(step) - lengths.sum()) / len(runs)  # values in a row that are new
     even = share > OFTEN and fresh < FRESH and np.mean(np.abs(lengths - np.median(lengths)) <= 1) > EVEN
     for begin, end in runs:
-        if end < len(step) and (even or (share <= MOST and _leaps(step, int(begin), int(end)))):
+        if end < len(step) and (even or (share <= LARGEST_SHARE and _leaps(step, int(begin), int(end)))):
             found[begin + 1 : end + 1] = True
     return found & ~clipped_samples(value)
 
@@ -82,19 +82,19 @@ def _leaps(step: Array, begin: int, end: int) -> bool:
     return abs(step[end]) > LEAP * max(abs(step[begin - 1]), abs(step[end + 1]))
 
 
-def without_stray(record: Record) -> tuple[Record, tuple[str, ...]]:
-    """The record without stray and repeated samples of the output, and what there is to say of them.
+def without_outliers(record: Record) -> tuple[Record, tuple[str, ...]]:
+    """The record without outliers and repeated samples of the output, and what there is to say of them.
 
-    An acceleration keeps its strays: impacts do make such peaks there.
+    An acceleration keeps its outliers: impacts do make such peaks there.
     """
     notes: list[str] = []
     for find, said in (
-        (stray_samples, "stand far off their neighbours"),
+        (outlying_samples, "stand far off their neighbours"),
         (repeated_samples, "repeat the one before while the motion goes on"),
     ):
         channel = record.output
         bad = find(channel.value)
-        if not bad.any() or (find is stray_samples and record.output_kind == "acceleration"):
+        if not bad.any() or (find is outlying_samples and record.output_kind == "acceleration"):
             continue
         notes.append(
             f"{record.name}: samples of the output that {said} are left out, {int(bad.sum())} of {len(bad)}, the first at "

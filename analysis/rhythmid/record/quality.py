@@ -34,6 +34,10 @@ class ChannelQuality:
     conflicts : duplicates whose values differ.
     lateness_mean, lateness_max, lateness_min, lateness_std : receive time minus header stamp [s], the last its jitter; None
         where there is none.
+    skew, skew_std : by how much faster the clock of its stamps runs than that of receipt [s/s], and the standard deviation of that;
+        None where it cannot be seen. See `clock_skew`.
+    stamp_jitter, stamp_jitter_std : standard deviation of the jitter of the stamps that the samples themselves show [s], and how well
+        that is known [s] (a standard deviation); None where they show none. See `stamp_jitter`.
     resolution : step of the grid that its values are rounded to, in its unit; 0 where they lie on none.
     """
 
@@ -47,6 +51,10 @@ class ChannelQuality:
     lateness_max: float | None = None
     lateness_min: float | None = None
     lateness_std: float | None = None
+    skew: float | None = None
+    skew_std: float | None = None
+    stamp_jitter: float | None = None
+    stamp_jitter_std: float | None = None
     resolution: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
@@ -62,6 +70,8 @@ class ChannelQuality:
             found.append(f"jitter of its times {timing.jitter_std:.2g} s")
         if self.lateness_std is not None:
             found.append(f"jitter of its arrival {self.lateness_std:.2g} s")
+        if self.stamp_jitter is not None and self.stamp_jitter_std is not None:
+            found.append(f"jitter of its stamps {self.stamp_jitter:.2g} ± {self.stamp_jitter_std:.1g} s")
         if self.resolution > 0.0:
             found.append(f"rounded to {self.resolution:.4g}")
         return found

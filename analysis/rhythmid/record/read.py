@@ -10,16 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
+from rhythmid.progress import Tell, counted, silent
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block, Topic
 from rhythmid.record.clocks import clock_notes
 from rhythmid.record.columns import Columns, read_columns
+from rhythmid.record.judged import judged
 from rhythmid.record.punctuality import punctuality_notes
-from rhythmid.record.quality import ChannelQuality, Quality, clipped, resolution
+from rhythmid.record.quality import ChannelQuality, Quality
 from rhythmid.record.record import SHORTEST, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
 from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
-from rhythmid.record.timing import Timing, put_in_order
+from rhythmid.record.timing import put_in_order
 from rhythmid.record.unit_notes import unit_notes
 from rhythmid.simulation.signal import Hold
 
@@ -30,6 +32,7 @@ CALENDAR = (
     1e8  # seconds, three years: a clock that reads more counts from 1970, not from the start of a machine
 )
 SAMPLES_PER_CYCLE = 100  # of a forcing that is given by formula
+MOST_OF_FORMULA = 50_000_000  # samples of it, 400 MB: an hour at 100 Hz has 36 million
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +46,14 @@ class Samples:
     missing: int = 0
 
 
-def load_records(paths: Iterable[str | Path], signals: Signals | str | Path | None = None) -> list[Record]:
-    """Read several records; see `read_record`."""
+def load_records(
+    paths: Iterable[str | Path], signals: Signals | str | Path | None = None, tell: Tell = silent
+) -> list[Record]:
+    """Read several records, telling how far it has come; see `read_record`."""
     if isinstance(signals, (str, Path)):
         signals = Signals.load(signals)
-    return [read_record(path, signals) for path in paths]
+    given = list(paths)
+    return list(counted((read_record(path, signals) for path in given), len(given), "records read", tell))
 
 
 def read_record(source: str | Path, signals: Signals | str | Path | None = None) -> Record:
@@ -234,12 +240,11 @@ def _from_columns(
 def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str, quality: Quality) -> Record:
     """Channels in order of time without duplicates, and their quality as recorded."""
     channels: dict[str, Any] = {}
-    judged: dict[str, ChannelQuality] = {}
+    judgement: dict[str, ChannelQuality] = {}
     for role, samples in made.items():
         label = f"{samples.source.place}{samples.source}"
         if len(samples.time) == 0:
             raise InputError(f"{label}: is empty")
-        timing = Timing.of(samples.time)
         kept = put_in_order(samples.time, label, mend)
         time, value = samples.time[kept], samples.value[kept]
         conflicts = _conflicts(samples, time, value)
@@ -251,25 +256,18 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
                 f"{label}: {conflicts} of {len(samples.time)} samples have the time of another one with another value: "
                 f"two publishers, a clock set back or too coarse stamps; {mend}"
             )
-        judged[role] = ChannelQuality(
-            str(samples.source),
-            timing,
-            nan=int(absent.sum()),
-            clipped=clipped(value[~absent]),
-            missing=samples.missing,
-            conflicts=conflicts,
-            lateness_mean=None if samples.lateness is None else float(samples.lateness.mean()),
-            lateness_max=None if samples.lateness is None else float(samples.lateness.max()),
-            lateness_min=None if samples.lateness is None else float(samples.lateness.min()),
-            lateness_std=None if samples.lateness is None else float(samples.lateness.std()),
-            resolution=resolution(value[~absent]),
-        )
-        channels[role] = Channel(time[~absent], value[~absent], samples.source.unit, str(samples.source))
+        judgement[role] = judged(
+            str(samples.source), samples.time, samples.lateness, time, value, role == "output", samples.missing, conflicts
+        )  # fmt: skip
+        if absent.any():
+            time, value = time[~absent], value[~absent]
+        shared = next((c.time for c in channels.values() if np.array_equal(c.time, time)), time)
+        channels[role] = Channel(shared, value, samples.source.unit, str(samples.source))
     clocks = {role: samples.source.clock(signals.time).kind for role, samples in made.items()}
-    notes = (*quality.notes, *clock_notes(judged, clocks))
+    notes = (*quality.notes, *clock_notes(judgement, clocks))
     return Record(
         name, input_kind=signals.input_kind, output_kind=signals.output_kind, forcing_law=signals.forcing_law,
-        quality=replace(quality, channels=judged, notes=notes), parameters=signals.declared(name), **channels,
+        quality=replace(quality, channels=judgement, notes=notes), parameters=signals.declared(name), **channels,
     )  # fmt: skip
 
 
@@ -308,8 +306,13 @@ def _finish(record: Record, signals: Signals) -> Record:
         return record
     step = min(record.output.period, 1.0 / (SAMPLES_PER_CYCLE * frequency))
     ends = [(channel.time[0], channel.time[-1]) for channel in record.channels.values()]
-    start = min(first for first, _ in ends)
-    time = start + np.arange(np.ceil((max(last for _, last in ends) - start) / step) + 1) * step
+    start, end = min(first for first, _ in ends), max(last for _, last in ends)
+    count = np.ceil((end - start) / step) + 1
+    if not count <= MOST_OF_FORMULA:
+        raise InputError(
+            f"{record.name}: a forcing of {frequency:g} Hz cannot be followed over {end - start:g} s ({count:.3g} samples)"
+        )
+    time = start + np.arange(count) * step
     return replace(record, forcing=Channel(time, record.forcing_law(time), "N", "formula"))
 
 

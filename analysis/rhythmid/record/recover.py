@@ -19,11 +19,23 @@ from rhythmid.record.message_types import typestore
 
 @dataclass(frozen=True)
 class Recovered:
-    """The new bag, how many messages of each topic it holds, and what was found wrong with the old one."""
+    """The new bag, how many messages of each topic it holds, and what was found wrong with the old one.
+
+    `lost` counts the messages by topic that the old bag states and does not hold; empty where it states nothing.
+    """
 
     path: Path
     counts: Mapping[str, int]
     notes: tuple[str, ...]
+    lost: Mapping[str, int]
+
+    def lines(self) -> list[str]:
+        """The result as plain text."""
+        found = [f"  note: {note}" for note in self.notes]
+        for name in sorted({*self.counts, *self.lost}):
+            lost = f", {self.lost[name]} lost" if name in self.lost else ""
+            found.append(f"  {name}: {self.counts.get(name, 0)} messages{lost}")
+        return [f"{self.path}: {sum(self.counts.values())} messages recovered", *found]
 
 
 def recover(path: str | Path, out: str | Path, storage: Storage = "mcap") -> Recovered:
@@ -32,7 +44,7 @@ def recover(path: str | Path, out: str | Path, storage: Storage = "mcap") -> Rec
     Topics, types, receive times and QoS are kept; the old bag is not touched. Raises InputError when nothing can be
     read, or `out` exists or cannot be written.
     """
-    bag = Bag(path)
+    bag = Bag(path, verify=True)
     connections: dict[str, Connection] = {}
     counts: dict[str, int] = {}
     left_out: dict[str, str] = {}
@@ -59,7 +71,7 @@ def recover(path: str | Path, out: str | Path, storage: Storage = "mcap") -> Rec
                 counts[name] = counts.get(name, 0) + 1
         if not counts:
             raise InputError(f"{path}: holds no readable message; nothing was recovered")
-    return Recovered(Path(out), counts, (*bag.notes, *left_out.values()))
+    return Recovered(Path(out), counts, (*bag.notes, *left_out.values()), bag.lost(counts))
 
 
 def _declare(writer: BagWriter, topic: Topic) -> Connection:

@@ -22,16 +22,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal, cast
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, BeforeValidator, ConfigDict, Discriminator, Tag, TypeAdapter
+from pydantic import Field as Limits
 
 from rhythmid.document import Node, parse, read
 from rhythmid.errors import InputError
 from rhythmid.record.field import Field
 from rhythmid.record.heading import NOT_SI
 from rhythmid.simulation.signal import Hold
+from rhythmid.validation import ByShape, InKeys, Number, Plain, Range, validated
 
 InputKind = Literal["force", "base_displacement", "base_acceleration", "reference"]
 OutputKind = Literal["position", "velocity", "acceleration"]
@@ -41,7 +44,7 @@ INPUT_UNITS: dict[InputKind, str] = {
     "force": "N", "base_displacement": "m", "base_acceleration": "m/s^2", "reference": "m",
 }  # fmt: skip
 OUTPUT_UNITS: dict[OutputKind, str] = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
-HOLDS: tuple[Hold, ...] = ("zero", "linear", "band_limited")
+KEYS = ConfigDict(extra="forbid")
 
 
 @dataclass(frozen=True)
@@ -59,9 +62,10 @@ class Clock:
 class Sinusoid:
     """Forcing known by formula: amplitude * cos(2π frequency [Hz] t [s] + phase [rad])."""
 
-    amplitude: float
-    frequency: float
-    phase: float = 0.0
+    __pydantic_config__ = KEYS
+    amplitude: Annotated[Number, Limits(ge=-1e12, le=1e12)]
+    frequency: Annotated[Number, Limits(ge=1e-9, le=1e9)]
+    phase: Annotated[Number, Limits(ge=-1e6, le=1e6)] = 0.0
 
     def __call__(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.amplitude * np.cos(2.0 * np.pi * self.frequency * time + self.phase)
@@ -180,143 +184,178 @@ class Signals:
         return cls(channels, optional=frozenset({"forcing"}))
 
 
-def _signals(document: Node, path: Path) -> Signals:
-    keys = document.mapping(["time", *ROLES, "use", "tables", "parameters"])
-    file = _default_file(keys.get("tables"), path.parent)
-    channels: dict[str, Source] = {}
-    law: Sinusoid | None = None
+def _column(value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, (str, int)):
+        raise ValueError("a column's name, or its number counted from 0, is expected")
+    return value
+
+
+def _of_si(unit: str) -> str:
+    if unit in NOT_SI:
+        factor, si = NOT_SI[unit]
+        raise ValueError(f"{unit} is not an SI unit: write  scale: {factor:.10g}, unit: {si}")
+    return unit
+
+
+def _some(scale: float) -> float:
+    if scale == 0.0:
+        raise ValueError("a scale is other than 0")
+    return scale
+
+
+def _of_a_channel(_: Any) -> None:
+    raise ValueError("a column belongs to a channel, as in  input: {file: data.mat, column: V1}")
+
+
+Column = Annotated[str | int, BeforeValidator(_column)]
+
+
+@dataclass(frozen=True)
+class _Clock:
+    __pydantic_config__ = KEYS
+    column: Column | None = None
+    scale: Annotated[Number, Limits(ge=1e-12, le=1e6)] | None = None
+    sample_rate: Annotated[Number, Limits(ge=1e-6, le=1e12)] | None = None
+
+
+AnyClock = Annotated[Annotated[_Clock, InKeys] | Annotated[Literal["header", "receive"], Plain], ByShape]
+
+
+@dataclass(frozen=True)
+class _Channel:
+    """A channel as it is written."""
+
+    __pydantic_config__ = KEYS
+    topic: str | None = None
+    field: Annotated[str, BeforeValidator(str)] | None = None
+    file: str | None = None
+    column: Column | None = None
+    time: AnyClock | None = None
+    unit: Annotated[str, AfterValidator(_of_si)] | None = None
+    scale: Annotated[Number, AfterValidator(_some)] = 1.0
+    offset: Number = 0.0
+
+
+@dataclass(frozen=True)
+class _Input(_Channel):
     kind: InputKind = "force"
     hold: Hold | None = None
-    measured: OutputKind = "position"
-    for role in ROLES:
-        if role not in keys or keys[role].value in (None, "none"):
-            continue
-        node = keys[role]
-        options = node.mapping()
-        if role == "forcing" and "amplitude" in options:
-            law = _sinusoid(node)
-            continue
-        unit = UNITS[role]
-        if role == "input":
-            if "kind" in options:
-                kind = cast(InputKind, options["kind"].choice(INPUT_UNITS))
-            if "hold" in options:
-                hold = cast(Hold, options["hold"].choice(HOLDS))
-            unit = INPUT_UNITS[kind]
-        if role == "output" and "kind" in options:
-            measured = cast(OutputKind, options["kind"].choice(OUTPUT_UNITS))
-            unit = OUTPUT_UNITS[measured]
-        channels[role] = _source(node, role, unit, path.parent, file)
+
+
+@dataclass(frozen=True)
+class _Output(_Channel):
+    kind: OutputKind = "position"
+
+
+@dataclass(frozen=True)
+class _Tables:
+    __pydantic_config__ = KEYS
+    file: str
+    column: Annotated[Any, BeforeValidator(_of_a_channel)] = None
+
+
+def _of_forcing(value: Any) -> str:
+    return "formula" if isinstance(value, Mapping) and "amplitude" in value else "channel"
+
+
+def _not_none(value: Any) -> Any:
+    return None if value == "none" else value
+
+
+AnyForcing = Annotated[
+    Annotated[Sinusoid, Tag("formula")] | Annotated[_Channel, Tag("channel")], Discriminator(_of_forcing)
+]
+Absent = BeforeValidator(_not_none)
+
+
+@dataclass(frozen=True)
+class _Document:
+    """signals.yaml as it is written."""
+
+    __pydantic_config__ = KEYS
+    time: AnyClock | None = None
+    input: Annotated[_Input | None, Absent] = None
+    output: Annotated[_Output | None, Absent] = None
+    forcing: Annotated[AnyForcing | None, Absent] = None
+    velocity: Annotated[_Channel | None, Absent] = None
+    effort: Annotated[_Channel | None, Absent] = None
+    reference: Annotated[_Channel | None, Absent] = None
+    use: Range = (-math.inf, math.inf)
+    tables: _Tables | None = None
+    parameters: dict[
+        str, Annotated[Annotated[dict[str, Number], InKeys] | Annotated[Number, Plain], ByShape]
+    ] = field(default_factory=dict)
+
+
+_DOCUMENT: TypeAdapter[_Document] = TypeAdapter(_Document)
+
+
+def _signals(document: Node, path: Path) -> Signals:
+    given = validated(document, _DOCUMENT)
+    file = None if given.tables is None else path.parent / given.tables.file
+    kind: InputKind = "force" if given.input is None else given.input.kind
+    measured: OutputKind = "position" if given.output is None else given.output.kind
+    units = UNITS | {"input": INPUT_UNITS[kind], "output": OUTPUT_UNITS[measured]}
+    channels = {
+        role: _source(document.at(role), role, channel, units[role], path.parent, file)
+        for role in ROLES
+        if isinstance(channel := getattr(given, role), _Channel)
+    }
     if "output" not in channels:
         document.fail("'output:' is missing: which channel is the measured motion?")
     output = channels["output"]
     for role, source in channels.items():
         if bool(source.topic) != bool(output.topic):
-            keys[role].fail("topics and files cannot be mixed in one record")
-    if "use" in keys:
-        ends = [end.number() for end in keys["use"].items()]
-        if len(ends) != 2 or not ends[0] < ends[1]:
-            keys["use"].fail("two times [t0, t1] in seconds are expected, t0 < t1")
-        use = ends[0], ends[1]
-    else:
-        use = -math.inf, math.inf
-    if "time" not in keys and all(source.time is not None for source in channels.values()):
-        clock = Clock()
-    else:
-        clock = _clock(keys.get("time"), document, not output.topic)
-    parameters = _parameters(keys["parameters"]) if "parameters" in keys else {}
-    return Signals(channels, clock, law, kind, measured, hold, use, path=path, parameters=parameters)
+            document.at(role).fail("topics and files cannot be mixed in one record")
+    clock = Clock()
+    if given.time is not None:
+        clock = _clock(document.at("time"), given.time, not output.topic)
+    elif not output.topic and any(source.time is None for source in channels.values()):
+        document.fail("'time:' is missing; for a table it is {sample_rate: 1000} in Hz or {column: t}")
+    law = given.forcing if isinstance(given.forcing, Sinusoid) else None
+    hold = None if given.input is None else given.input.hold
+    return Signals(
+        channels, clock, law, kind, measured, hold, given.use, path=path, parameters=given.parameters
+    )
 
 
-def _parameters(node: Node) -> dict[str, float | Mapping[str, float]]:
-    return {
-        name: {record: one.number() for record, one in given.mapping().items()}
-        if isinstance(given.value, dict)
-        else given.number()
-        for name, given in node.mapping().items()
-    }
-
-
-def _default_file(node: Node | None, folder: Path) -> Path | None:
-    if node is None:
-        return None
-    keys = node.mapping(["file", "column"])
-    if "column" in keys:
-        keys["column"].fail("a column belongs to a channel, as in  input: {file: data.mat, column: V1}")
-    if "file" not in keys:
-        node.fail("'file:' is missing")
-    return folder / keys["file"].text()
-
-
-def _source(node: Node, role: str, unit: str, folder: Path, default_file: Path | None) -> Source:
-    known = ["topic", "field", "file", "column", "time", "unit", "scale", "offset"]
-    more = {"input": ["kind", "hold"], "output": ["kind"]}.get(role, [])
-    keys = node.mapping([*known, *more])
-    if "unit" in keys:
-        unit = keys["unit"].text()
-        if unit in NOT_SI:
-            factor, si = NOT_SI[unit]
-            keys["unit"].fail(f"{unit} is not an SI unit: write  scale: {factor:.10g}, unit: {si}")
-    scale = keys["scale"].number() if "scale" in keys else 1.0
-    offset = keys["offset"].number() if "offset" in keys else 0.0
-    if scale == 0.0 or not math.isfinite(scale) or not math.isfinite(offset):
-        node.fail("scale must be finite and other than 0, offset finite")
-    place = f"{node.place}: {role}: "
-    clock = _clock(keys["time"], node, "topic" not in keys) if "time" in keys else None
-    if "topic" in keys:
-        if "file" in keys or "column" in keys:
+def _source(
+    node: Node, role: str, given: _Channel, unit: str, folder: Path, default_file: Path | None
+) -> Source:
+    made = Source(
+        given.unit or unit, scale=given.scale, offset=given.offset, place=f"{node.place}: {role}: ",
+        time=None if given.time is None else _clock(node.at("time"), given.time, given.topic is None),
+    )  # fmt: skip
+    if given.topic is not None:
+        if given.file is not None or given.column is not None:
             node.fail("give either topic and field, or file and column")
-        if "field" not in keys:
+        if given.field is None:
             node.fail("'field:' is missing, such as  field: position[leg]  or  field: wrench.force.z")
-        topic = keys["topic"].text()
         try:
-            wanted = Field.parse(str(keys["field"].value))
+            wanted = Field.parse(given.field)
         except InputError as error:
-            keys["field"].fail(str(error))
-        return Source(
-            unit, "/" + topic.lstrip("/"), wanted, scale=scale, offset=offset, time=clock, place=place
-        )
-    if "field" in keys:
+            node.at("field").fail(str(error))
+        return replace(made, topic="/" + given.topic.lstrip("/"), field=wanted)
+    if given.field is not None:
         node.fail("'topic:' is missing: whose field is it?")
-    if "column" not in keys:
+    if given.column is None:
         node.fail("give topic and field (of a bag) or file and column (of a .mat, .csv or .npz table)")
-    file = folder / keys["file"].text() if "file" in keys else default_file
-    column = _column(keys["column"])
-    return Source(unit, file=file, column=column, scale=scale, offset=offset, time=clock, place=place)
+    return replace(
+        made, file=default_file if given.file is None else folder / given.file, column=given.column
+    )
 
 
-def _column(node: Node) -> str | int:
-    if isinstance(node.value, bool) or not isinstance(node.value, (str, int)):
-        node.fail("a column's name, or its number counted from 0, is expected")
-    return node.value
-
-
-def _sinusoid(node: Node) -> Sinusoid:
-    keys = node.mapping(["amplitude", "frequency", "phase"])
-    if "frequency" not in keys:
-        node.fail("'frequency:' [Hz] is missing")
-    phase = keys["phase"].number(-1e6, 1e6) if "phase" in keys else 0.0
-    return Sinusoid(keys["amplitude"].number(-1e12, 1e12), keys["frequency"].number(1e-9, 1e9), phase)
-
-
-def _clock(node: Node | None, document: Node, tables: bool) -> Clock:
-    if node is None:
+def _clock(node: Node, given: _Clock | Literal["header", "receive"], tables: bool) -> Clock:
+    if isinstance(given, str):
         if tables:
-            document.fail("'time:' is missing; for a table it is {sample_rate: 1000} in Hz or {column: t}")
-        return Clock()
-    if isinstance(node.value, dict):
-        keys = node.mapping(["column", "scale", "sample_rate"])
-        if not tables:
-            node.fail(
-                "column and sample_rate are for tables; the messages of a bag have times: header or receive"
-            )
-        if ("column" in keys) == ("sample_rate" in keys) or {"scale", "sample_rate"} <= keys.keys():
-            node.fail("either sample_rate, or column and perhaps its scale [s], is expected")
-        if "column" in keys:
-            scale = keys["scale"].number(1e-12, 1e6) if "scale" in keys else 1.0
-            return Clock("column", column=_column(keys["column"]), scale=scale)
-        return Clock("rate", rate=keys["sample_rate"].number(1e-6, 1e12))
-    kind = node.choice(["header", "receive"])
-    if tables:
-        node.fail("a table has no message times: give {sample_rate: 1000} in Hz or {column: t}")
-    return Clock("receive" if kind == "receive" else "header")
+            node.fail("a table has no message times: give {sample_rate: 1000} in Hz or {column: t}")
+        return Clock(given)
+    if not tables:
+        node.fail(
+            "column and sample_rate are for tables; the messages of a bag have times: header or receive"
+        )
+    if given.column is not None and given.sample_rate is None:
+        return Clock("column", column=given.column, scale=1.0 if given.scale is None else given.scale)
+    if given.sample_rate is None or given.column is not None or given.scale is not None:
+        node.fail("either sample_rate, or column and perhaps its scale [s], is expected")
+    return Clock("rate", rate=given.sample_rate)

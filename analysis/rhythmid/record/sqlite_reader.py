@@ -14,8 +14,11 @@ import numpy as np
 
 from rhythmid.errors import InputError
 from rhythmid.record.block import Block, Topic, Wanted, by_topic
+from rhythmid.record.sqlite_damage import next_readable, wrong_checksums
 
-_ROWS = 50_000  # rows fetched at once
+_ROWS = 50_000  # rows fetched at once,
+_BYTES = 64 << 20  # and bytes, behind which no further one is fetched
+_LARGEST_ROW = 256 << 20  # bytes; sqlite's own limit is larger, and a database may compute its rows
 
 
 class SqliteReader:
@@ -30,7 +33,7 @@ class SqliteReader:
         self.path = path
         self.topics: dict[str, Topic] = {}
         self.damage: list[str] = []
-        self._fetched = 0
+        self._last = 0
         self._journals = [
             journal for end in ("-journal", "-wal")
             if (journal := path.with_name(path.name + end)).is_file() and journal.stat().st_size
@@ -49,6 +52,7 @@ class SqliteReader:
             page, whole = _sizes_by_header(head)
             size = self.path.stat().st_size
             cut_off = size < whole and not self._journals
+            self.truncated = self.truncated or cut_off
             if not self._journals and not cut_off:
                 yield from self._read(self.path, "mode=ro", wanted)
                 return
@@ -70,38 +74,73 @@ class SqliteReader:
 
     def _read(self, path: Path, mode: str, wanted: Wanted) -> Iterator[Block]:
         with closing(sqlite3.connect(f"{path.absolute().as_uri()}?{mode}", uri=True)) as database:
+            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _LARGEST_ROW)
+            database.execute(
+                "PRAGMA trusted_schema = OFF"
+            )  # no function with side effects, should its schema call one
             numbered = _topics(database)
             self.topics = {topic.name: topic for topic in numbered.values()}
             chosen = {number: topic for number, topic in numbered.items() if wanted(topic)}
-            rows = database.execute(
-                f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({','.join(map(str, chosen))})"
-                " ORDER BY id"
-            )
-            while batch := self._fetch(rows):
+            rows = self._rows(database, ",".join(map(str, chosen)))
+            while batch := self._messages(_batch(rows)):
                 number, log_ns, data = zip(*batch, strict=True)
-                if {*map(type, number), *map(type, log_ns)} != {int} or {*map(type, data)} != {bytes}:
-                    raise sqlite3.DatabaseError("not every row of its table 'messages' is a message")
                 size = np.fromiter(map(len, data), dtype=np.int64, count=len(data))
                 start = np.cumsum(size) - size
                 yield from by_topic(
                     chosen, np.array(number), b"".join(data), start, size, np.array(log_ns, dtype=np.int64)
                 )
 
-    def _fetch(self, rows: sqlite3.Cursor) -> list[tuple[int, int, bytes]]:
-        """The next rows; where the file is cut off or damaged, those that precede the break."""
-        batch: list[tuple[int, int, bytes]] = []
-        if self.damage:
-            return batch
-        try:
-            for row in islice(rows, _ROWS):
-                batch.append(row)
-        except sqlite3.DatabaseError as error:
-            if not self._fetched and not batch:
-                raise
-            self.damage.append(f"is damaged after {self._fetched + len(batch)} messages: {error}")
-            self.truncated = True
-        self._fetched += len(batch)
-        return batch
+    def _rows(self, database: sqlite3.Connection, chosen: str) -> Iterator[tuple[int, int, bytes]]:
+        """The rows of the chosen topics; pages that cannot be read are passed over and told."""
+        query = f"SELECT id, topic_id, timestamp, data FROM messages WHERE topic_id IN ({chosen}) AND id > ? ORDER BY id"
+        while True:
+            try:
+                for number, *row in database.execute(query, (self._last,)):
+                    self._last = number
+                    yield row[0], row[1], row[2]
+                return
+            except sqlite3.DatabaseError as error:
+                following = next_readable(database, self._last)
+                if following is None:
+                    if not self._last:
+                        raise
+                    self.damage.append(f"is damaged behind message {self._last}: {error}")
+                    self.truncated = True
+                    return
+                self.damage.append(f"messages {self._last + 1} to {following - 1} are lost: {error}")
+                self._last = following - 1
+
+    def _messages(self, rows: list[tuple[int, int, bytes]]) -> list[tuple[int, int, bytes]]:
+        """Those of the rows that are messages."""
+        found = [row for row in rows if [*map(type, row)] == [int, int, bytes]]
+        if len(found) < len(rows):
+            if not found:
+                raise sqlite3.DatabaseError("not every row of its table 'messages' is a message")
+            self.damage.append(f"{len(rows) - len(found)} rows of its table 'messages' are no messages")
+        return found
+
+    def wrong_checksums(self) -> list[str]:
+        """What sqlite's own check and the checksums of a finished file say against it, one phrase each."""
+        if self.truncated:
+            return []
+        with closing(sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True)) as database:
+            return wrong_checksums(database)
+
+    def counted(self) -> dict[str, int]:
+        """Messages by topic, as the file counts them: not at all."""
+        return {}
+
+
+def _batch(rows: Iterator[tuple[int, int, bytes]]) -> list[tuple[int, int, bytes]]:
+    """The next rows, as many as memory may hold at once."""
+    batch: list[tuple[int, int, bytes]] = []
+    fetched = 0
+    for row in islice(rows, _ROWS):
+        batch.append(row)
+        fetched += len(row[2]) if isinstance(row[2], bytes) else 0
+        if fetched > _BYTES:
+            break
+    return batch
 
 
 def _sizes_by_header(head: bytes) -> tuple[int, int]:
@@ -120,7 +159,10 @@ def _topics(database: sqlite3.Connection) -> dict[int, Topic]:
     definitions: dict[str, tuple[str, str]] = {}
     if "message_definitions" in tables:
         query = "SELECT topic_type, encoded_message_definition, encoding FROM message_definitions"
-        definitions = {name: (definition, form) for name, definition, form in database.execute(query)}
+        rows = list(database.execute(query))
+        if any({*map(type, row)} != {str} for row in rows):
+            raise sqlite3.DatabaseError("its table 'message_definitions' holds no texts")
+        definitions = {name: (definition, form) for name, definition, form in rows}
     stored = {column[1] for column in database.execute("PRAGMA table_info(topics)")}
     qos = "offered_qos_profiles" if "offered_qos_profiles" in stored else "''"
     query = f"SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id"

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
+from rhythmid.record.compression import largest
+from rhythmid.record.own_process import arrays_in_own_process
 from rhythmid.record.text_table import COMPRESSED, TEXT, read_text
 
 SUFFIXES = (".mat", ".npz", ".parquet", *TEXT)
@@ -107,8 +109,12 @@ class Table:
 def _mat(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat
 
-    found = loadmat(path, simplify_cells=True)
-    return dict(_flat({name: value for name, value in found.items() if not name.startswith("__")}))
+    def read() -> dict[str, NDArray[Any]]:
+        found = loadmat(path, simplify_cells=True)
+        return dict(_flat({name: value for name, value in found.items() if not name.startswith("__")}))
+
+    with path.open("rb"):  # what cannot be opened is told as of any file
+        return dict(arrays_in_own_process(read, f"{path}: cannot be read as a table"))
 
 
 def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
@@ -125,18 +131,31 @@ def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
 
 def _npz(path: Path) -> dict[str, Any]:
     with np.load(path, allow_pickle=False) as file:
+        if not isinstance(file, np.lib.npyio.NpzFile) or file.zip is None:
+            raise ValueError("it is no archive of arrays")
+        _check_size(path, sum(member.file_size for member in file.zip.infolist()))
         return {name: file[name] for name in file.files}
+
+
+def _check_size(path: Path, size: int) -> None:
+    """Raise InputError where a file claims to hold more bytes than its own size allows."""
+    if size > largest(path.stat().st_size):
+        raise InputError(
+            f"{path}: claims to hold {size} bytes in {path.stat().st_size}: no such table is read"
+        )
 
 
 def _parquet(path: Path) -> dict[str, Any]:
     try:
-        from pyarrow.parquet import read_table
+        from pyarrow.parquet import read_metadata, read_table
     except ImportError:
         raise InputError(
             f"{path}: reading Parquet needs pyarrow: pip install pyarrow, or save the table as .csv"
         ) from None
     if not path.exists():
         raise FileNotFoundError
+    about = read_metadata(path)
+    _check_size(path, about.num_rows * about.num_columns * np.dtype(float).itemsize)
     table = read_table(path)
     found: dict[str, Any] = {}
     for name, column in zip(table.column_names, table.columns):

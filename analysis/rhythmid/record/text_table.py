@@ -16,6 +16,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from rhythmid.errors import InputError
+from rhythmid.record.compression import largest
 from rhythmid.record.heading import is_unit
 
 TEXT = (".csv", ".tsv", ".txt", ".dat")
@@ -54,6 +55,8 @@ def read_text(path: Path) -> dict[str, Any]:
     is damaged.
     """
     encoding = _encoding(path)
+    if path.suffix.lower() == COMPRESSED:
+        _check_size(path)
     with _opened(path, encoding) as file:
         dialect = dialect_of(list(islice(file, LOOKED_AT)), str(path))
     count = len(dialect.names)
@@ -67,7 +70,9 @@ def read_text(path: Path) -> dict[str, Any]:
         with _opened(path, encoding) as file:
             lines = (line for line in islice(file, dialect.first, None) if _content(line))
             cells = [_cells(line, dialect.separator) for line in lines]
-        found |= {dialect.names[place]: np.array([row[place] for row in cells]) for place in words}
+        found |= {
+            dialect.names[place]: np.array([row[place] for row in cells], dtype=object) for place in words
+        }  # fixed-width text would take the longest cell's size for each
     return {name: found[name] for name in dialect.names}
 
 
@@ -212,6 +217,19 @@ def _encoding(path: Path) -> str:
     except UnicodeDecodeError:
         return "cp1252"
     return "utf-8"
+
+
+def _check_size(path: Path) -> None:
+    """Raise InputError where a compressed table holds more than a table could."""
+    most = largest(path.stat().st_size)
+    size = 0
+    with gzip.open(path) as file:
+        while piece := file.read(SAMPLE):
+            size += len(piece)
+            if size > most:
+                raise InputError(
+                    f"{path}: holds more than {most} bytes in {path.stat().st_size}: no such table is read"
+                )
 
 
 def _opened(path: Path, encoding: str) -> TextIO:

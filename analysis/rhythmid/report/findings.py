@@ -17,12 +17,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ElementWords:
-    """What the catalogue says of an element; `parameters` are the meanings of its parameters by name, `contained_in` the
-    richer elements of which it is a special case."""
+    """What the catalogue says of an element; `parameters` are the meanings of its parameters by name."""
 
     title: str
     parameters: Mapping[str, str]
-    contained_in: tuple[str, ...] = ()
     also_known_as: tuple[str, ...] = ()
     reference: str = ""
 

@@ -9,7 +9,7 @@ from rhythmid.report.chart import Chart, Curve
 from rhythmid.report.quantity import number, percent, plus_minus, pretty_unit, scaled, with_unit
 from rhythmid.report.row_chart import Change, draw_changes
 from rhythmid.report.run import (
-    FEWEST,
+    FEWEST_SAMPLES,
     Compared,
     Error,
     Harmonic,
@@ -37,7 +37,7 @@ def residual_folds(runs: Sequence[Run], compared: Compared, position: str) -> li
         before, after = error_of([run], "before"), error_of([run], "after")
         return 0.0 if before is None else before.rms - (after.rms if after and run.after is not None else 0.0)
 
-    drawable = [run for run in runs if run.used.sum() >= FEWEST]
+    drawable = [run for run in runs if run.used.sum() >= FEWEST_SAMPLES]
     ranked = sorted(drawable, key=gain, reverse=True)[:MOST_SHOWN]
     blocks: list[Fold | Paragraph] = []
     for run in (r for r in drawable if r in ranked):

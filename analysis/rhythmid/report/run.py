@@ -17,7 +17,7 @@ Mask = NDArray[np.bool_]
 Which = Literal["before", "after"]
 SEGMENTS = 10  # a record is cut into for the uncertainty of its error
 PHASES = 48  # parts of a cycle
-FEWEST = 16  # samples below which a record is not drawn
+FEWEST_SAMPLES = 16  # samples below which a record is not drawn
 
 
 @dataclass(frozen=True)
@@ -207,7 +207,7 @@ class Place:
 
 def worst_place(runs: Sequence[Run]) -> Place | None:
     """Where the refitted nominal model departs most from the records."""
-    candidates = [run for run in runs if run.used.sum() >= FEWEST]
+    candidates = [run for run in runs if run.used.sum() >= FEWEST_SAMPLES]
     if not candidates:
         return None
     run = max(candidates, key=lambda one: float(np.mean(one.residual("before")[one.used] ** 2)))

@@ -11,7 +11,7 @@ from rhythmid.report.quantity import number
 Array = NDArray[np.float64]
 COLUMNS, ROWS = 28, 22
 SHADES = 4  # steps of colour on either side of zero
-FEWEST = 3  # samples that a cell needs to be shown
+FEWEST_IN_CELL = 3  # samples that a cell needs to be shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ def state_map(position: Array, velocity: Array, signal: Array) -> StateMap:
     total = np.histogram2d(velocity, position, (v, x), weights=signal)[0]
     count = np.histogram2d(velocity, position, (v, x))[0]
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.where(count >= FEWEST, total / count, np.nan)
+        mean = np.where(count >= FEWEST_IN_CELL, total / count, np.nan)
     return StateMap(x, v, mean)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.model import Model, Term
-from rhythmid.simulation.generated_source import InputKind, Layout, OutputKind, generate, generate_rates
+from rhythmid.simulation.generated_source import InputKind, Layout, Variant, generate, generate_rates
 from rhythmid.simulation.machine_code import Module, load_run
 
 
@@ -33,6 +33,7 @@ class Compiled:
 
 
 NO_HISTORY = np.empty((0, 0))
+USUAL = Variant()  # driven by a force, its position measured
 
 
 def _of(module: Module, layout: Layout) -> Compiled:
@@ -62,17 +63,8 @@ def _key(terms: tuple[Term, ...]) -> Hashable:
 
 
 @lru_cache(maxsize=512)
-def _structure(
-    key: Hashable,
-    terms: "_Terms",
-    disturbed: bool,
-    excited: InputKind,
-    smooth: bool,
-    measured: OutputKind,
-    rational: bool,
-) -> Compiled:
-    module, layout = generate(terms.terms, disturbed, excited, smooth, measured, rational)
-    return _of(module, layout)
+def _structure(key: Hashable, terms: "_Terms", variant: Variant) -> Compiled:
+    return _of(*generate(terms.terms, variant))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,27 +80,15 @@ class _Terms:
         return isinstance(other, _Terms)
 
 
-def compile_model(
-    model: Model,
-    disturbed: bool = False,
-    excited: InputKind = "force",
-    smooth: bool = False,
-    measured: OutputKind = "position",
-    rational: bool = False,
-) -> Compiled:
-    """The compiled structure of a model; parameter values play no part.
-
-    With `disturbed` the structure takes a further, arbitrary force on the mass as a signal; `excited`, `smooth`,
-    `measured` and `rational` as in `generate`.
-    """
+def compile_model(model: Model, variant: Variant = USUAL) -> Compiled:
+    """The compiled structure of a model; parameter values play no part."""
     terms = tuple(term for term in model.terms if term.element.kernel is not None)
-    return _structure(_key(terms), _Terms(terms), disturbed, excited, smooth, measured, rational)
+    return _structure(_key(terms), _Terms(terms), variant)
 
 
 @lru_cache(maxsize=256)
 def _rates(key: Hashable, terms: "_Terms", excited: InputKind) -> Compiled:
-    module, layout = generate_rates(terms.terms, excited)
-    return _of(module, layout)
+    return _of(*generate_rates(terms.terms, excited))
 
 
 def compile_rates(model: Model, excited: InputKind = "force") -> Compiled:

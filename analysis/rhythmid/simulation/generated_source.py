@@ -101,15 +101,32 @@ class _Writer:
         return f"past{m}"
 
 
-def _right_hand_side(
-    terms: tuple[Term, ...], excited: InputKind, disturbed: bool, measured: OutputKind, rational: bool
-) -> _Writer:
+@dataclass(frozen=True)
+class Variant:
+    """What decides the code besides the terms.
+
+    `excited` says what the command is: a force on the mass; the reference of a controller in the command path; the
+    displacement of the base that the leg stands on; or the base's acceleration, where position and velocity are
+    relative to the base. `measured` is what the sensor sees; an acceleration is the mass's own, whatever the base does.
+    Steps end at the command's knots, where a held command jumps, unless it is `smooth`. With `disturbed` the code takes a further,
+    arbitrary force on the mass as a signal. With `rational` dead times are approximated by states, see `rational_past`.
+    """
+
+    excited: InputKind = "force"
+    measured: OutputKind = "position"
+    smooth: bool = False
+    disturbed: bool = False
+    rational: bool = False
+
+
+def _right_hand_side(terms: tuple[Term, ...], variant: Variant) -> _Writer:
+    excited, disturbed = variant.excited, variant.disturbed
     if excited == "base_acceleration" and (room := [term for term in terms if term.against == "room"]):
         raise InputError(
             f"element {room[0].label!r} acts against the room, whose speed cannot be told where only the base's acceleration is "
             "known; give its displacement, or leave out 'against: room'"
         )
-    writer = _Writer(rational)
+    writer = _Writer(variant.rational)
     kernels = [term for term in terms if term.element.kernel is not None]
     force = [term for term in kernels if term.element.slot == "force"]
     writer.lines.append("f = u" if excited in DRIVES else "f = 0.0")
@@ -151,7 +168,7 @@ def _right_hand_side(
         "absolute = (f + leg + body + d) / p0" if disturbed else "absolute = (f + leg + body) / p0"
     )
     writer.lines.append(
-        {"position": "y = s0", "velocity": "y = s1", "acceleration": "y = absolute"}[measured]
+        {"position": "y = s0", "velocity": "y = s1", "acceleration": "y = absolute"}[variant.measured]
     )
     for term in (term for term in kernels if term.element.slot == "sensor"):
         writer.call(term, ["y", "t"], "y")
@@ -162,23 +179,12 @@ def _indent(lines: list[str], depth: int) -> str:
     return "\n".join("    " * depth + line for line in lines)
 
 
-def generate(
-    terms: tuple[Term, ...],
-    disturbed: bool = False,
-    excited: InputKind = "force",
-    smooth: bool = False,
-    measured: OutputKind = "position",
-    rational: bool = False,
-) -> tuple[Module, Layout]:
-    """The module for this list of terms, and the layout of its arrays.
-
-    `excited` says what the command is: a force on the mass; the reference of a controller in the command path; the
-    displacement of the base that the leg stands on; or the base's acceleration, where position and velocity are
-    relative to the base. Steps end at the command's knots, where a held command jumps, unless it is `smooth`.
-    With `rational` dead times are approximated by states, see `rational_past`. `measured` is what the sensor sees; an acceleration is the mass's own, whatever the base does.
-    """
-    writer = _right_hand_side(terms, excited, disturbed, measured, rational)
+def generate(terms: tuple[Term, ...], variant: Variant) -> tuple[Module, Layout]:
+    """The module for this list of terms, and the layout of its arrays."""
+    excited, disturbed = variant.excited, variant.disturbed
+    writer = _right_hand_side(terms, variant)
     n, memories = len(writer.states), writer.memories
+    smooth = variant.smooth
     history = HistoryLines(tuple(writer.delayed), smooth)
     p = ", ".join(f"p{i}" for i in range(len(writer.parameters)))
     p = ", ".join([p, *history.given])
@@ -339,8 +345,8 @@ def run(times, ku, cu, kw, cw, kd, cd, parameters, start, max_step, out{", past"
 
 def generate_rates(terms: tuple[Term, ...], excited: InputKind = "force") -> tuple[Module, Layout]:
     """A module whose `run` evaluates the right-hand side at given points, with dead times as states, and its arrays' layout."""
-    whole, layout = generate(terms, False, excited, rational=True)
-    writer = _right_hand_side(terms, excited, False, "position", rational=True)
+    variant = Variant(excited, rational=True)
+    (whole, layout), writer = generate(terms, variant), _right_hand_side(terms, variant)
     n, p = len(layout.states), len(layout.parameters)
     targets = ", ".join(f"out[k, {i}]" for i in range(n + 2))
     known = "t, u, w, 0.0" if excited == "base_displacement" else "t, u, w"

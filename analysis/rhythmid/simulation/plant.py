@@ -15,7 +15,8 @@ from rhythmid.model import Model
 from rhythmid.simulation.compiled import NO_HISTORY, compile_model
 from rhythmid.simulation.history import BEGIN
 from rhythmid.simulation.signal import FAR
-from rhythmid.simulation.simulate import MAX_STEP, physical_times, samplers, start_states
+from rhythmid.simulation.simulate import MAX_STEP, samplers, start_states
+from rhythmid.simulation.transport import CommandPath, physical_times
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
@@ -44,16 +45,12 @@ def forcing_at(model: Model, times: Array) -> Array:
     return total
 
 
-def settled_state(model: Model, periods: int = 120, tolerance: float = 1e-12) -> Array:
-    """State vector at t = 0 after the forced, uncommanded model has run long enough to be on its limit cycle.
+def settled(model: Model, periods: int = 120, tolerance: float = 1e-12) -> tuple[Array, Array]:
+    """State vector at t = 0 after the forced, uncommanded model has run long enough to be on its limit cycle, and what elements
+    with a dead time need of the past there.
 
     Without forcing the machine comes to rest. Starts from rest at the first spring's rest length.
     """
-    return settled(model, periods, tolerance)[0]
-
-
-def settled(model: Model, periods: int = 120, tolerance: float = 1e-12) -> tuple[Array, Array]:
-    """The `settled_state`, and what elements with a dead time need of the past there."""
     compiled = compile_model(model)
     period = next(
         (1.0 / t.values["frequency"].value for t in model.terms
@@ -98,7 +95,7 @@ class Plant:
         self._compiled = compile_model(model)
         self._parameters = self._compiled.layout.vector(model)
         self._samplers = samplers(model, seed)
-        self._late = [t for t in model.terms if t.element.slot == "command" and t.element.delay is not None]
+        self._path = CommandPath(model)
         self._past = NO_HISTORY
         if initial is None:
             self._state, self._past = settled(model)
@@ -111,7 +108,6 @@ class Plant:
         self._efforts: list[float] = []
         self._held = 0.0
         self._newest = -1
-        self._last_knot = -FAR
 
     def push(self, stamp_ns: int, effort: float) -> None:
         """A command [N] that holds from its stamp on. Raises InputError when stamps do not increase."""
@@ -126,13 +122,7 @@ class Plant:
         if not np.isfinite(effort).all():
             raise InputError(f"a command is not a finite number (at {int(stamp_ns[0])} ns)")
         self._newest = int(stamp_ns[-1])
-        knots = stamp_ns * 1e-9
-        for term in self._late:
-            assert term.element.delay is not None
-            knots = knots + term.element.delay(knots, **{n: v.value for n, v in term.values.items()})
-        knots = np.maximum.accumulate(np.maximum(knots, self._last_knot))
-        self._last_knot = float(knots[-1])
-        self._knots.extend(knots.tolist())
+        self._knots.extend(self._path.times(np.asarray(stamp_ns * 1e-9, dtype=float)).tolist())
         self._efforts.extend(np.asarray(effort, dtype=float).tolist())
 
     def advance(self, until_ns: int) -> Samples:

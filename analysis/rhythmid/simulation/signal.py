@@ -15,6 +15,7 @@ Hold = Literal["zero", "linear", "band_limited"]
 Array = NDArray[np.float64]
 
 FAR = 1e300  # seconds; stands for "for ever" in the compiled simulator, where inf - inf would be NaN
+FOR_EVER = FAR / 2  # [s] a knot beyond it is no time: the last value is held for ever
 
 
 def zero_order_hold(time: Array, value: Array) -> PPoly:
@@ -101,7 +102,7 @@ def continuous(time: Array, value: Array, hold: Hold) -> PPoly:
 
 
 def impulse_preserving(held: PPoly) -> PPoly:
-    """Smooth stand-in for a zero-order-held command that is sampled far above the machine's dynamics.
+    """Smooth surrogate for a zero-order-held command that is sampled far above the machine's dynamics.
 
     The derivative of a cubic spline through the command's integral at its knots: it has the same impulse, so a mass cannot
     tell the two apart, and an integrator need not stop at every knot. The integral is bent at every knot; what the bends
@@ -137,7 +138,7 @@ def pieces(signal: PPoly | None) -> tuple[Array, Array]:
     before = np.zeros((4, 1))
     if degree > 0:
         before[0, 0] = body[0, 0]
-    if signal.x[-1] > FAR / 2:
+    if signal.x[-1] > FOR_EVER:
         return np.concatenate([[-FAR], signal.x[:-1], [FAR]]), np.hstack([before, body])
     after = np.zeros((4, 1))
     after[0, 0] = float(signal(signal.x[-1]))

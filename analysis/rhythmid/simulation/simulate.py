@@ -10,6 +10,7 @@ from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.simulation.compiled import Compiled, compile_model
 from rhythmid.simulation.signal import pieces
+from rhythmid.simulation.transport import MEASUREMENT, delayed_command, physical_times
 
 Array = NDArray[np.float64]
 MAX_STEP = 2.5e-4  # [s] four steps in a sample at 1 kHz
@@ -30,46 +31,6 @@ class Trajectory:
     effort: Array
     output: Array
     states: Array
-
-
-def physical_times(model: Model, stamps: Array) -> Array:
-    """When the measurements stamped `stamps` [s] were taken: stamps less delay, skew and jitter of the model.
-
-    A measurement cannot overtake an earlier one.
-    """
-    times = np.asarray(stamps, dtype=float)
-    varies = False
-    for term in model.terms:
-        if term.element.slot in ("sensor", "timing") and term.element.delay is not None:
-            delays = term.element.delay(stamps, **{n: v.value for n, v in term.values.items()})
-            varies = varies or (len(delays) > 0 and np.ptp(delays) > 0.0)
-            times = times - delays
-    return np.maximum.accumulate(times) if varies else times
-
-
-def delayed_command(model: Model, command: PPoly | None) -> PPoly | None:
-    """The command as it acts on the machine: its knots moved by the delays of the command path.
-
-    A command cannot overtake an earlier one.
-    """
-    if command is None:
-        return None
-    knots = command.x
-    for term in model.terms:
-        if term.element.slot == "command" and term.element.delay is not None:
-            finite = knots < 1e200
-            late = term.element.delay(knots[finite], **{n: v.value for n, v in term.values.items()})
-            knots = np.concatenate([np.maximum.accumulate(knots[finite] + late), knots[~finite]])
-    return command if knots is command.x else PPoly(command.c, knots, extrapolate=True)
-
-
-def delay_of_command(model: Model, stamps: Array) -> Array:
-    """How much later [s] than its stamp a command acts; (n,) -> (n,)."""
-    late = np.zeros(len(stamps))
-    for term in model.terms:
-        if term.element.slot == "command" and term.element.delay is not None:
-            late = late + term.element.delay(stamps, **{n: v.value for n, v in term.values.items()})
-    return late
 
 
 def start_states(
@@ -151,5 +112,5 @@ def samplers(model: Model, seed: int) -> list:
             np.random.default_rng([seed, index]), **{n: v.value for n, v in term.values.items()}
         )
         for index, term in enumerate(model.terms)
-        if term.element.slot in ("sensor", "timing") and term.element.sampler is not None
+        if term.element.slot in MEASUREMENT and term.element.sampler is not None
     ]

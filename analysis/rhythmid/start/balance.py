@@ -15,7 +15,7 @@ from rhythmid.model import Model
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-LATEST = 0.2  # s by which what drives may act later than it was recorded, in a first guess
+LATEST_ACTION = 0.2  # s by which what drives may act later than it was recorded, in a first guess
 LATER = 0.9  # of what is left without a delay: by so much a delay has to lower it to be guessed
 COLUMNS = ("acceleration", "velocity", "position", "sine", "cosine", "constant")
 POSITIVE = frozenset({"acceleration", "velocity", "position"})
@@ -70,7 +70,9 @@ class Rows:
         if self.by_base:
             return 0.0
         period = max(self.period)
-        most = min(LATEST, 0.25 * min(len(one) * p for one, p in zip(self.drives, self.period, strict=True)))
+        most = min(
+            LATEST_ACTION, 0.25 * min(len(one) * p for one, p in zip(self.drives, self.period, strict=True))
+        )
         delays = [number * period for number in range(1, int(most / period) + 1)]
         at_once = self.fit(names)
         best = min((self.fit(names, one) for one in delays), key=lambda law: law.left, default=at_once)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhythmid.elements.catalogue import Catalogue
-from rhythmid.elements.force.pendulum_gravity import LEAST
+from rhythmid.elements.force.pendulum_gravity import LEAST_SWING
 from rhythmid.errors import InputError
 from rhythmid.identify.series import prepare, scales
 from rhythmid.model import INERTIA, MASS, Model, Value
@@ -16,7 +16,9 @@ from rhythmid.start.balance import Law, Rows
 from rhythmid.start.roles import Roles
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
-BETTER = 0.9  # of what a balance leaves: by so much an element has to lower it to be among the first guesses
+EARNS_PLACE = (
+    0.9  # of what a balance leaves: by so much an element has to lower it to be among the first guesses
+)
 LAW_KEPT = (
     0.5  # share of an effort that the law of a controller may leave at most, to be taken for what made it
 )
@@ -99,17 +101,17 @@ def _restoring(rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:
         "constant": rows.fit([*moving, "constant"], delay),
         "spring": rows.fit(full, delay),
     }
-    if rotary and rows.span >= 2.0 * LEAST:
+    if rotary and rows.span >= 2.0 * LEAST_SWING:
         options["pendulum"] = rows.fit([*moving, "sine", "cosine"], delay)
     if options["spring"].coefficients["position"] <= 0.0:
         del options["spring"]
     law, kind = plain, "free"
-    if options["constant"].left < BETTER * law.left:
+    if options["constant"].left < EARNS_PLACE * law.left:
         law, kind = options["constant"], "constant"
     back = [name for name in ("spring", "pendulum") if name in options]
     if back:
         best = min(back, key=lambda name: options[name].left)
-        if options[best].left < BETTER * law.left:
+        if options[best].left < EARNS_PLACE * law.left:
             law, kind = options[best], best
     return law, kind
 
@@ -125,7 +127,7 @@ def _forces(
         values = {"stiffness": _short(stiffness), "rest_length": _short(rest)}
         model = model.with_element(catalogue["linear_spring"], values)
         reasons["linear_spring"] = "a force that goes with the position brings it back"
-        if model.units.position == "rad" and rows.span >= 2.0 * LEAST:
+        if model.units.position == "rad" and rows.span >= 2.0 * LEAST_SWING:
             reasons["linear_spring"] += (
                 "; it explains more than a pendulum's gravity, which is pendulum_gravity: {moment: …}"
             )

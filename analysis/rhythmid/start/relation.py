@@ -10,9 +10,9 @@ from scipy.signal import coherence, welch
 from rhythmid.record.inventory import Recorded
 
 Array = NDArray[np.float64]
-LONGEST = 20_000  # samples that are looked at: more would tell no more
+MOST_SAMPLES = 20_000  # samples that are looked at: more would tell no more
 SEGMENTS = 6  # of a record in its spectra, overlapping by half
-LATEST = 0.5  # s by which an answer may come after its command
+LATEST_ANSWER = 0.5  # s by which an answer may come after its command
 LAGS = 12  # samples of the past in an autoregression
 MOST_ROWS = 2000  # of an autoregression: more would tell no more
 PER_PERIOD = 16.0  # samples in the fastest period that carries power, for an autoregression
@@ -42,7 +42,7 @@ def together(first: Recorded, second: Recorded) -> tuple[float, Array, Array]:
     count = int((end - begin) * rate) if rate > 0.0 else 0
     if count < 4 * LAGS:
         return 1.0, np.empty(0), np.empty(0)
-    grid = begin + np.arange(min(count, LONGEST)) / rate
+    grid = begin + np.arange(min(count, MOST_SAMPLES)) / rate
     return 1.0 / rate, *(np.interp(grid, *_finite(one)) for one in (first, second))
 
 
@@ -77,7 +77,7 @@ def follows(command: Recorded, answer: Recorded) -> Follows:
     u, y = u - u.mean(), y - y.mean()
     length = 1 << (2 * len(u) - 1).bit_length()
     product = np.fft.irfft(np.fft.rfft(y, length) * np.conj(np.fft.rfft(u, length)), length)
-    most = min(int(LATEST / period), len(u) // 4)
+    most = min(int(LATEST_ANSWER / period), len(u) // 4)
     lags = np.concatenate([np.arange(most + 1), np.arange(-most, 0)])
     best = int(lags[int(np.argmax(np.abs(product[lags])))])
     size = math.sqrt(float(u @ u) * float(y @ y))

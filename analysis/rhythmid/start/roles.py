@@ -22,9 +22,6 @@ INTEGRAL = 0.9  # correlation from which a position and a velocity belong togeth
 SURE_INTEGRAL = 0.98  # the same where no name says so
 RATIO = 0.3  # by which the slope of a position may differ from the velocity, before their units are doubted
 MEASURED: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
-REFERENCE_BETTER = (
-    1.2  # times: by which another command has to go better with the answer to be named by itself
-)
 
 
 @dataclass(frozen=True, eq=False)

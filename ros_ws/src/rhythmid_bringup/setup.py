@@ -24,5 +24,8 @@ setup(
     maintainer_email="rhythmid@example.org",
     description="Launch file, example experiments, layouts and the command rhythmid run.",
     license="Apache-2.0",
-    entry_points={"rhythmid.commands": ["run = rhythmid_bringup.command:add"]},
+    entry_points={
+        "rhythmid.commands": ["run = rhythmid_bringup.command:add"],
+        "rhythmid.live": ["watch = rhythmid_bringup.watch:watch"],
+    },
 )

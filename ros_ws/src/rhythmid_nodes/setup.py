@@ -24,6 +24,8 @@ setup(
             "excitation = rhythmid_nodes.excitation:main",
             "delay_injector = rhythmid_nodes.delay_injector:main",
             "recorder = rhythmid_nodes.recorder:main",
+            "command_guard = rhythmid_nodes.command_guard:main",
+            "twin = rhythmid_nodes.twin:main",
         ],
     },
 )

@@ -51,7 +51,6 @@ def words_of(elements: Iterable[Element]) -> dict[str, ElementWords]:
         e.name: ElementWords(
             e.title,
             {p.name: p.description for p in e.parameters},
-            e.special_case_of,
             e.also_known_as,
             e.reference,
         )

@@ -40,7 +40,7 @@ from rhythmid.report.findings import ElementScore, Findings, FreeFunction, Trans
 from rhythmid.report.page import Page
 from rhythmid.report.record_quality import quality_of
 from rhythmid.report.run import Compared, Run
-from rhythmid.simulation.simulate import physical_times
+from rhythmid.simulation.transport import physical_times
 
 Array = NDArray[np.float64]
 INDICES = (0, -1, 1, -2, 2)  # transfer functions that are compared

@@ -26,7 +26,7 @@ from rhythmid.identify.inverse_dynamics.motion import effort_channel
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.report.findings import Findings, FreeFunction
-from rhythmid.report.run import FEWEST, Compared, Run
+from rhythmid.report.run import FEWEST_SAMPLES, Compared, Run
 
 Array = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def effort_runs(
     predicted = [_along(balance, before), None if after is None else _along(balance, after)]
     found: list[Run] = []
     for index, (motion, places) in enumerate(zip(balance.motions, balance.places, strict=True)):
-        if len(places) < FEWEST:
+        if len(places) < FEWEST_SAMPLES:
             continue
         grid = np.arange(places[0], places[-1] + 1, int(np.diff(places).min()))
         first, second = (None if one is None else one[index][grid] for one in predicted)

@@ -15,7 +15,7 @@ HYPOTHESES_SHOWN = 6
 REJECTIONS_SHOWN = 5
 NOMINAL = "nominal model"
 NONE = "—"
-LEAST = 1e-3  # probability, of itself or of the contrary, below which only that is told
+LEAST_PROBABILITY = 1e-3  # probability, of itself or of the contrary, below which only that is told
 
 
 def show(found: Diagnosis, console: Console) -> None:
@@ -145,9 +145,11 @@ def _worse(difference: float, error: float) -> str:
 
 def _probability(value: float) -> str:
     """A probability, which evidence never makes 0 or 1."""
-    if value < LEAST:
-        return f"< {100.0 * LEAST:g} %"
-    return f"> {100.0 * (1.0 - LEAST):g} %" if value > 1.0 - LEAST else _percent(value)
+    if value < LEAST_PROBABILITY:
+        return f"< {100.0 * LEAST_PROBABILITY:g} %"
+    return (
+        f"> {100.0 * (1.0 - LEAST_PROBABILITY):g} %" if value > 1.0 - LEAST_PROBABILITY else _percent(value)
+    )
 
 
 def _weight(value: float, stands: bool) -> str:

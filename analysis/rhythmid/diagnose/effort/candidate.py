@@ -15,15 +15,15 @@ from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import Alignment, EffortFit, size_of
 from rhythmid.identify.student import weights_of
 from rhythmid.model import INERTIA, Model
+from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
 SEEN = ("force", "actuator")  # slots whose elements the balance of effort sees
 LARGEST = 30.0  # times its first guess that an effect is started at, at most
-LEAST = 0.05  # of its first guess, at least: at nothing a shape has no derivative
+LEAST_START = 0.05  # of its first guess, at least: at nothing a shape has no derivative
 QUARTER = (
     0.25  # of the motion's dominant period that a delay is looked for: half a turn looks like another sign
 )
-DELAY = "input_delay.delay"  # the name that a longer delay goes by
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def starts_of(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
         Start("freed_value", name, None, {name: model.value(name)}) for name in fixed_values(balance, model)
     ]
     if not driven:
-        found.append(Start("delay", DELAY, None, {}))
+        found.append(Start("delay", INPUT_DELAY, None, {}))
     return found
 
 
@@ -107,10 +107,10 @@ def extended(model: Model, start: Start, factor: float = 1.0) -> tuple[Model, st
     if element.size and math.isfinite(element.absent):
         name = element.size
         low, high = element.parameter(name).bounds
-        if abs(factor) < LEAST:
-            factor = math.copysign(LEAST, factor)
+        if abs(factor) < LEAST_START:
+            factor = math.copysign(LEAST_START, factor)
         value = element.absent + float(np.clip(factor, -LARGEST, LARGEST)) * (values[name] - element.absent)
-        margin = LEAST * abs(values[name] - element.absent)
+        margin = LEAST_START * abs(values[name] - element.absent)
         values[name] = float(np.clip(value, low + margin if low > -math.inf else low, high))
     grown = model.with_element(element, values)
     return grown, grown.terms[-1].label

@@ -9,6 +9,7 @@ from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit
 from rhythmid.model import Model, Prior
+from rhythmid.simulation.transport import INPUT_DELAY
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ class Fitted:
     @property
     def model(self) -> Model:
         """The fitted model; a delay that was found beyond its own is in its input delay, where it has one."""
-        model, name = self.fit.model, "input_delay.delay"
+        model, name = self.fit.model, INPUT_DELAY
         if name not in model.parameters or controlled(model):
             return model
         value = model.parameters[name]

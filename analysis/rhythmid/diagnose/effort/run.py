@@ -11,7 +11,7 @@ from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.held_out import HeldOut
 from rhythmid.diagnose.effort.remainder import Remainder, remainder_of
-from rhythmid.diagnose.effort.search import GAP, MOST, EffortSearch, search_effort
+from rhythmid.diagnose.effort.search import GAP, MOST_EFFECTS, EffortSearch, search_effort
 from rhythmid.diagnose.evidence import (
     Blocks,
     CrossValidated,
@@ -92,13 +92,14 @@ def _rows(case: Case, found: EffortSearch, unseen: Balance | None) -> _Rows:
 def effort_run(
     case: Case,
     applicability: Applicability,
-    most: int = MOST,
+    most: int = MOST_EFFECTS,
     unseen: Balance | None = None,
     promising: float | None = None,
     places: int = 1,
 ) -> EffortResult:
     """Search for up to `most` effects, weigh and decide; `unseen` is the balance of held-out efforts where the case has no records
-    of them, `promising` as for `search_effort`; the same search is made at so many `places`, and chance has as many candidates. Raises InputError where the records hold too little."""
+    of them, `promising` as for `search_effort`; the same search is made at so many `places`, and chance has as many
+    candidates. Raises InputError where the records hold too little."""
     found = search_effort(
         case.records, case.nominal, case.catalogue, applicability.balance, most, case.tell, case.budget,
         promising,
@@ -130,6 +131,7 @@ def effort_run(
             made(predicted[one.elements]),
             errors[tuple(sorted(one.elements))] / size,
             richer=richer_of(one.fit.model, one.elements),
+            values={name: one.fit.model.value(name) for name in one.fit.names},
         )
         for one in found.hypotheses
     ]

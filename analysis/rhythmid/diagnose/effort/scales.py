@@ -4,7 +4,7 @@ import numpy as np
 
 from rhythmid.elements.element import Scales
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.series import FAINT, REST_LENGTH
+from rhythmid.identify.series import NO_SPRING, REST_LENGTH
 from rhythmid.model import Model
 
 
@@ -19,7 +19,7 @@ def scales_of(balance: Balance, model: Model) -> Scales:
     spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
     size = max(float(np.std(motion.effort)) for motion in motions)
     # where no spring sets the scale of force, the effort does: an axis moves slowly and yet against much friction
-    stiffness = spring if spring > FAINT * inertial else max(inertial, size / spread)
+    stiffness = spring if spring > NO_SPRING * inertial else max(inertial, size / spread)
     return Scales(
         position=spread,
         velocity=max(max(float(np.std(motion.leg_velocity)) for motion in motions), 1e-12),

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import EQUIVALENT, MISMATCH, PRACTICAL_EFFORT, REST
 from rhythmid.diagnose.effort.candidate import (
-    DELAY,
+    INPUT_DELAY,
     Screened,
     Start,
     extended,
@@ -45,7 +45,7 @@ from rhythmid.model import Model, Prior
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 
-MOST = 4  # effects that are looked for: a fifth was never real on recordings that were tried
+MOST_EFFECTS = 4  # effects that are looked for: a fifth was never real on recordings that were tried
 REFINED = 10  # additions that are fitted in earnest in each round: the right one was among the first five of a score test always
 SWALLOWED = (
     0.5  # of the effort that an actuator's effect has to leave: one that takes more explains no motion
@@ -63,7 +63,7 @@ class EffortSearch:
     nominal : the nominal model, its free values fitted.
     hypotheses : all that were fitted, the nominal among them, best prediction first.
     predictions : of each of them.
-    reference, beyond : the nominal model, and the chosen one, with a free map beside them; and what they predict.
+    reference, beyond : the nominal model, and the chosen one, with a free map beside them; and what the first predicts.
     chosen : the hypothesis with which the search ended.
     condition : of the nominal model's scaled columns.
     not_tried : why candidates of the catalogue took no part, by name.
@@ -79,7 +79,6 @@ class EffortSearch:
     reference: Linearised
     reference_prediction: Prediction
     beyond: Linearised
-    beyond_prediction: Prediction
     condition: float
     not_tried: Mapping[str, str]
     candidates: int
@@ -100,7 +99,7 @@ def search_effort(
     model: Model,
     catalogue: Catalogue,
     balance: Balance | None = None,
-    most: int = MOST,
+    most: int = MOST_EFFECTS,
     tell: Tell = lambda _: None,
     budget: Budget | None = None,
     promising: float | None = None,
@@ -136,7 +135,7 @@ def search_effort(
     order = sorted(range(len(search.found)), key=lambda index: -made[index].score)
     return EffortSearch(
         balance, search.blocks, nominal, tuple(search.found[i] for i in order), tuple(made[i] for i in order), chosen,
-        reference, made[-2], beyond, made[-1], condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)), len(search.tried),
+        reference, made[-2], beyond, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)), len(search.tried),
     )  # fmt: skip
 
 
@@ -289,7 +288,7 @@ class _Search:
 
     def _aligned(self, elements: Sequence[str]) -> Alignment:
         usual = Alignment.of(self.balance)
-        if DELAY not in elements:
+        if INPUT_DELAY not in elements:
             return usual
         most = late_start(self.balance, self.nominal.fit)[0]
         return most

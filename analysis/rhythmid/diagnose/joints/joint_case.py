@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.diagnose.case import Budget, Case
 from rhythmid.diagnose.effort.candidate import DELAY
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
-from rhythmid.diagnose.effort.search import MOST
+from rhythmid.diagnose.effort.search import MOST_EFFECTS
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.applicability import Applicability
@@ -56,7 +56,7 @@ def joint_catalogue(catalogue: Catalogue) -> Catalogue:
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
 def diagnose_joint(
     balances: JointBalances, unseen: JointBalances | None, joint: str, catalogue: Catalogue, tell: Tell,
-    budget: Budget, late: float = 0.0, most: int = MOST,
+    budget: Budget, late: float = 0.0, most: int = MOST_EFFECTS,
 ) -> JointResult:  # fmt: skip
     """Search for what one joint's path lacks; a reference acts there `late` [s] after its stamp. Raises InputError where the records hold too little of its motion."""
     model = balances.models[joint]

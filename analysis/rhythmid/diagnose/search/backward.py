@@ -1,8 +1,8 @@
-"""The chosen effects defend their places: against being left out, and against others in their place."""
+"""Backward elimination: every chosen effect is tried against being left out, and against others in their place."""
 
 from collections.abc import Callable, Sequence
 
-from rhythmid.diagnose.search.refit import run_trials, under_noise
+from rhythmid.diagnose.search.refit import reach_of, run_trials, under_noise
 from rhythmid.diagnose.search.round import Round, distinct
 from rhythmid.diagnose.search.trial import Proposal, Trial, propose
 from rhythmid.elements.catalogue import Catalogue
@@ -13,10 +13,10 @@ from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.simulation.compiled import compile_model
 
-RIVALS = 2  # elements that scored best at first, tried again in the place of each of several effects
+RIVALS_TRIED = 2  # elements that scored best at first, tried again in the place of each of several effects
 
 
-def defend(
+def eliminate(
     best: Trial,
     series: Sequence[Series],
     catalogue: Catalogue,
@@ -28,7 +28,7 @@ def defend(
     most: int,
     tell: Tell,
 ) -> tuple[Trial, dict[tuple[str, ...], Trial]]:
-    """Let every added element defend its place; returns the survivor and the models that were tried on the way.
+    """Backward elimination of the added elements; returns the survivor and the models that were tried on the way.
 
     First whether it can be left out, then whether another one does better in its place: a simpler member of its family,
     or, where there are several effects, an element that scored well before the others were known. A model that says less
@@ -42,7 +42,10 @@ def defend(
         if not fresh:
             return []
         tell(f"testing {', '.join(' + '.join(p.added) for p in fresh)}")
-        found, _ = run_trials(fresh, series, known.starts, _states(known), noise, step)
+        reach = reach_of(known.chi2, known.samples) + margin
+        found, _ = run_trials(
+            fresh, series, known.starts, _states(known), noise, step, reach=reach, tell=tell
+        )
         tried.update({tuple(sorted(t.added)): t for t in found})
         return found
 
@@ -85,7 +88,7 @@ def _swaps(
         family = {e.name for e in catalogue.values() if element.name in e.special_case_of and e.candidate}
         names = set(family)
         if len(best.added) > 1:
-            names |= {score.element.name for score, _ in distinct(rounds[0].scores, RIVALS)}
+            names |= {score.element.name for score, _ in distinct(rounds[0].scores, RIVALS_TRIED)}
         rest = _rest(best, label)
         slim = best.model.without(label)
         for name in sorted(names - {best.element(other).name for other in best.added}):

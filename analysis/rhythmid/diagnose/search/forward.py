@@ -1,7 +1,7 @@
 """Forward search for missing elements, then pruning: the model that explains the records with the fewest effects.
 
 Each round scores the whole catalogue (cheap), refits the most promising elements with everything free (dear), and keeps
-the best if it is worth its parameters. Afterwards every element must defend its place: against being left out, against
+the best if it is worth its parameters. Afterwards backward elimination tries every element: against being left out, against
 a simpler member of its family, and, where there are several, against the other candidates.
 """
 
@@ -16,9 +16,16 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.baseline import FOLLOWS
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import PRACTICAL
-from rhythmid.diagnose.search.backward import defend
+from rhythmid.diagnose.search.backward import eliminate
 from rhythmid.diagnose.search.order import in_best_order
-from rhythmid.diagnose.search.refit import fine_enough, near_under_noise, run_trials, under_noise, whole_fit
+from rhythmid.diagnose.search.refit import (
+    fine_enough,
+    near_under_noise,
+    reach_of,
+    run_trials,
+    under_noise,
+    whole_fit,
+)
 from rhythmid.diagnose.search.round import Round, distinct, not_tried, one_round
 from rhythmid.diagnose.search.score_tests import (
     changes_of,
@@ -45,7 +52,7 @@ from rhythmid.progress import Tell
 
 Array = NDArray[np.float64]
 
-# difference of the information criterion below which two models are told apart by nothing but hope
+# difference of the information criterion below which two models are indistinguishable
 WORTH = 10.0
 SHARE = 5e-4  # of what is explained already, below which a further effect is an imperfection of the others
 LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
@@ -58,12 +65,12 @@ NEAR = 60.0
 # leaves; and how many of them get it
 PLAIN, SECOND = 100.0, 2
 UNDERSTATED = 0.1  # share of what a refit gains that a score shows at least, where an effect is far from its first guess
-MOST = 3  # effects at once
-RIVALS = 4  # models of each number of effects that are compared at the end
+MOST_EFFECTS = 3  # effects at once
+RIVALS_COMPARED = 4  # models of each number of effects that are compared at the end
 OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
 # of the noise: integration error of an element with corners beyond which all steps are made finer
-ROUGH = 0.1
+POOR_FIT = 0.1
 
 
 @dataclass(frozen=True)
@@ -173,7 +180,7 @@ def search(
     while (
         now.p_value < LEVEL
         and _could_pay(now, best, max(WORTH, SHARE * gained), current)
-        and len(best.added) < MOST
+        and len(best.added) < MOST_EFFECTS
     ):
         if budget.spent:
             untried = [score.element.name for score, _ in distinct(now.scores, REFITTED)]
@@ -183,12 +190,25 @@ def search(
         proposals, enough = _proposals(here.model, replace(now, added=here.added), count, here.chi2)
         tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
         found, failed = run_trials(
-            proposals, series, here.starts, current.run.compiled.layout.states, here.noise, step, enough
+            proposals,
+            series,
+            here.starts,
+            current.run.compiled.layout.states,
+            here.noise,
+            step,
+            enough,
+            tell=tell,
         )
         if not best.added and nominal.nrmse() > FOLLOWS:
             proposals = _from_given(nominal, given, catalogue, here.chi2, pool)
             others, failed_too = run_trials(
-                proposals, series, here.starts, current.run.compiled.layout.states, here.noise, step
+                proposals,
+                series,
+                here.starts,
+                current.run.compiled.layout.states,
+                here.noise,
+                step,
+                tell=tell,
             )
             found, failed = _better_of([*found, *others]), failed + failed_too
         excluded += failed
@@ -202,7 +222,7 @@ def search(
         for group in (near, *hopeful):
             top = _most_likely(group, series, here.noise, step, floor)
             fit = whole_fit(top, series, here.noise, step, pool=pool)
-            finer = accurate(fit.run, fit.model, fit.starts, ROUGH * fit.noise.variance**0.5, 2)
+            finer = accurate(fit.run, fit.model, fit.starts, POOR_FIT * fit.noise.variance**0.5, 2)
             if finer.max_step < 0.45 * fine_enough(top.model, step):
                 step = finer.max_step
                 fit = whole_fit(replace(top, converged=False), series, here.noise, step, pool=pool)
@@ -214,7 +234,8 @@ def search(
                 sought = replace(top, model=fit.model, starts=fit.starts, converged=False)
             others = [trial for trial in group if trial.added != top.added]
             settled = noise_of(fit.residuals, series, floor)
-            compared = under_noise([sought, *others, best], series, settled, step)
+            reach = reach_of(fit.chi2, fit.samples)
+            compared = under_noise([sought, *others, best], series, settled, step, reach=reach)
             trials |= {tuple(sorted(t.added)): t for t in compared}
             winner = compared[0]
             before = next((t for t in compared if t.added == best.added), best)
@@ -229,17 +250,19 @@ def search(
         trials[tuple(sorted(best.added))] = best
         tell(f"{best.added[-1]} explains it better by {gain:.0f}; looking for more")
         current = whole_fit(best, series, noise, step, pool=pool)
-        if len(best.added) >= MOST:
+        if len(best.added) >= MOST_EFFECTS:
             break
         now, current = one_round(current, best.added, catalogue, pool)
         here = under_noise([best], series, current.noise, step, 0)[0]
         rounds.append(now)
     if best.added and not budget.spent:
         margin = max(WORTH, SHARE * gained)
-        defended, more = defend(best, series, catalogue, trials, noise, step, rounds, margin, MOST, tell)
+        reduced, more = eliminate(
+            best, series, catalogue, trials, noise, step, rounds, margin, MOST_EFFECTS, tell
+        )
         trials |= more
-        if defended is not best:
-            best = in_best_order(defended, series, noise, step)
+        if reduced is not best:
+            best = in_best_order(reduced, series, noise, step)
             trials[tuple(sorted(best.added))] = best
             noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
     ranked = _contenders(trials, best)
@@ -265,7 +288,7 @@ def _most_likely(
 ) -> Trial:
     """The one of several close models whose remainder predicts itself best: each under the noise that it leaves.
 
-    The first noise model is coloured by the effect that is missing and can put an imitation ahead by a little.
+    The first noise model is coloured by the effect that is missing and can put a surrogate ahead by a little.
     """
     if len(near) == 1:
         return near[0]
@@ -296,7 +319,7 @@ def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial) -> list[Trial
     ranked = sorted(trials.values(), key=lambda t: t.bic())
     kept = {tuple(sorted(t.added)): t for t in [trials[()], best]}
     for count in {len(t.added) for t in ranked if t.added}:
-        same = [t for t in ranked if len(t.added) == count][:RIVALS]
+        same = [t for t in ranked if len(t.added) == count][:RIVALS_COMPARED]
         kept = {tuple(sorted(t.added)): t for t in same} | kept
     parts = {key: t for key, t in trials.items() if set(key) < set(best.added)}
     return list((parts | kept).values())

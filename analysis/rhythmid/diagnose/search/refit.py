@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.search.trial import FAINTER, Outcome, Proposal, Trial, outcome_of, trial_of
 from rhythmid.elements.element import ELAPSED, STEP
 from rhythmid.errors import InputError
-from rhythmid.identify.descent import Descent, descend
+from rhythmid.identify.descent import Descent, descend, out_of_reach
 from rhythmid.identify.free_run import FreeRun, prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, minimise
@@ -23,6 +23,7 @@ from rhythmid.identify.sample_clock.tick_scan import scanned
 from rhythmid.identify.series import Series, scales
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
+from rhythmid.progress import Tell, counted, silent
 
 Array = NDArray[np.float64]
 SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
@@ -31,7 +32,11 @@ PROMISING = 0.3  # share of the spread of chi2 within which a model is carried t
 # share of its ceiling, above which the best of a round has found so little that all minima of all trials are gone through
 LITTLE = 0.5
 HOPS = 12  # at most, from one minimum to the next
-WAYS = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minima, that one hop goes
+HOP_DISTANCES = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minima, that one hop goes
+# of the samples: excess of chi2 over that of the best model, beyond which a model is out of the question on unseen data, too: a gain in
+# log likelihood of a twentieth per sample, where a few per record decide
+EXCESS = 0.1
+LEAST_EXCESS = 60.0  # the same for few samples
 TOLERANCE = 0.05  # of chi2, at which a trial has converged: far below what an element has to earn
 
 
@@ -42,6 +47,11 @@ def fine_enough(model: Model, step: float) -> float:
     return min(step, 5e-4 if ELAPSED in asked else 1e-3 if STEP in asked else step)
 
 
+def reach_of(chi2: float, samples: int) -> float:
+    """Chi2 that a model has to come to in order to matter beside the best one, with its `chi2` over the `samples`."""
+    return chi2 + max(LEAST_EXCESS, EXCESS * samples)
+
+
 def _fit_proposal(
     proposal: Proposal,
     series: Sequence[Series],
@@ -50,9 +60,10 @@ def _fit_proposal(
     noise: NoiseModel,
     max_step: float,
     enough: float,
+    reach: float,
 ) -> Outcome:
-    """A few iterations from each guess, more from the best, starting in `starts` (whose states are `known` by name); no
-    further guess is tried once chi2 falls below `enough`.
+    """A few iterations from each guess, more from the best as long as it may come to `reach`, starting in `starts` (whose states
+    are `known` by name); no further guess is tried once chi2 falls below `enough`.
 
     Raises InputError when the model diverges from every guess.
     """
@@ -81,7 +92,7 @@ def _fit_proposal(
     if best is None:
         assert failure is not None
         raise failure
-    best = _carried_on(best, run, names, noise)
+    best = _carried_on(best, run, names, noise, reach)
     guessed = proposal.guesses[0] if proposal.guesses else {}
     flat = _flat(best.model, best.differences[0], list(guessed))
     if flat:
@@ -91,14 +102,18 @@ def _fit_proposal(
     return outcome_of(best, run, noise)
 
 
-def _carried_on(end: Descent, run: FreeRun, names: tuple[str, ...], noise: NoiseModel) -> Descent:
+def _carried_on(
+    end: Descent, run: FreeRun, names: tuple[str, ...], noise: NoiseModel, reach: float = math.inf
+) -> Descent:
     """The descent carried on to `BRIEF` iterations, and beyond as long as it still falls steeply: in a narrow, bent valley it
-    comes from far away and can be the deepest in the end."""
-    done, steep = SKETCH, True
+    comes from far away and can be the deepest in the end. It is given up where it would not come to `reach` at its rate."""
+    done, steep, costs = SKETCH, True, [end.chi2]
     while not end.converged and (done < BRIEF or (steep and done < THOROUGH)):
-        before = end.chi2
+        if len(costs) > 1 and out_of_reach(costs[-2], costs[-1], (THOROUGH - done) / SKETCH, reach):
+            break
         end = descend(end.model, run, names, noise, end.starts, SKETCH, None, TOLERANCE, end.differences)
-        done, steep = done + SKETCH, end.chi2 < STEEP * before
+        costs.append(end.chi2)
+        done, steep = done + SKETCH, end.chi2 < STEEP * costs[-2]
     return end
 
 
@@ -128,7 +143,7 @@ def _hopped(
     low, high = best.model.parameters[name].bounds
     for _ in range(HOPS):
         before = best
-        for value in (before.model.value(name) + way * distance for way in WAYS):
+        for value in (before.model.value(name) + hop * distance for hop in HOP_DISTANCES):
             if not low < value < high:
                 continue
             moved = before.model.with_values({name: value})
@@ -147,8 +162,8 @@ def _flat(model: Model, steps: Array, names: Sequence[str]) -> list[str]:
 
 
 def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
-    """The trial with flat parameters of its effects tried again from the elements' own guesses, where that is better: a
-    few iterations from each, more from the best."""
+    """The trial with flat parameters of its effects tried again from the elements' own guesses, where that is better: one
+    iteration from each, for all others are where they belong, more from the best."""
     best = trial
     if trial.differences is None:
         return best
@@ -167,9 +182,7 @@ def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
             for values in sorted(known):
                 moved = trial.model.with_values(dict(zip(flat, (share * value for value in values))))
                 try:
-                    found.append(
-                        descend(moved, run, free, trial.noise, trial.starts, SKETCH, tolerance=TOLERANCE)
-                    )
+                    found.append(descend(moved, run, free, trial.noise, trial.starts, 1, tolerance=TOLERANCE))
                 except InputError:
                     continue
         if not found:
@@ -200,19 +213,23 @@ def run_trials(
     noise: NoiseModel,
     max_step: float,
     enough: Sequence[float] | None = None,
+    reach: float = math.inf,
+    tell: Tell = silent,
 ) -> tuple[list[Trial], list[tuple[tuple[str, ...], str]]]:
     """Fit all proposals in parallel. Returns the trials, best first, and those excluded with the reason.
 
-    A few iterations from each guess first, until chi2 is `enough`; then the promising ones are carried to convergence.
+    A few iterations from each guess first, until chi2 is `enough`; then the promising ones are carried to convergence, as long as
+    they may come to `reach`: a chi2 that one has to come to in order to matter.
     """
     goals = list(enough) if enough is not None else [-math.inf] * len(proposals)
 
     def one(case: tuple[Proposal, float]) -> Outcome:
-        return _fit_proposal(case[0], series, starts, known, noise, max_step, case[1])
+        return _fit_proposal(case[0], series, starts, known, noise, max_step, case[1], reach)
 
     trials: list[Trial] = []
     excluded: list[tuple[tuple[str, ...], str]] = []
-    for index, result in fork_map(one, list(zip(proposals, goals))):
+    done = fork_map(one, list(zip(proposals, goals)))
+    for index, result in counted(done, len(proposals), "fits", tell):
         if isinstance(result, Exception):
             excluded.append((proposals[index].added, str(result)))
         else:
@@ -234,9 +251,11 @@ def run_trials(
             before = trials[hopping[place]]
             trials[hopping[place]] = trial_of(before.added, before.model, result, noise)
     open_ones = [t for t in trials if not t.converged and _promising(t, trials)]
-    finished = under_noise(open_ones, series, noise, max_step, THOROUGH)
-    done = {t.added for t in finished}
-    return sorted([*finished, *(t for t in trials if t.added not in done)], key=lambda t: t.bic()), excluded
+    finished = under_noise(open_ones, series, noise, max_step, THOROUGH, reach)
+    settled = {t.added for t in finished}
+    return sorted(
+        [*finished, *(t for t in trials if t.added not in settled)], key=lambda t: t.bic()
+    ), excluded
 
 
 def _promising(trial: Trial, trials: Sequence[Trial]) -> bool:
@@ -252,25 +271,35 @@ def whole_fit(
     max_step: float,
     iterations: int = 15,
     pool: ThreadPoolExecutor | None = None,
+    reach: float = math.inf,
 ) -> Fit:
-    """The full fit of a trial under a noise model; one that has converged under it is only evaluated."""
+    """The full fit of a trial under a noise model; one that has converged under it is only evaluated, one that would not come to
+    `reach` is not carried to convergence."""
     if trial.noise is noise and trial.converged:
         iterations = 1
     run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
     names = tuple(trial.model.free)
     return minimise(
-        trial.model, run, names, noise, trial.starts, iterations, pool, differences=trial.differences
+        trial.model,
+        run,
+        names,
+        noise,
+        trial.starts,
+        iterations,
+        pool,
+        differences=trial.differences,
+        reach=reach,
     )
 
 
 def _again(
-    trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int
+    trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int, reach: float
 ) -> Outcome:
     """Where a trial's descent under a noise model ends; without `iterations`, the trial as it is."""
     run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
     names = tuple(trial.model.free)
     end = descend(
-        trial.model, run, names, noise, trial.starts, iterations, None, TOLERANCE, trial.differences
+        trial.model, run, names, noise, trial.starts, iterations, None, TOLERANCE, trial.differences, reach
     )
     return outcome_of(end, run, noise)
 
@@ -281,13 +310,15 @@ def under_noise(
     noise: NoiseModel,
     max_step: float,
     iterations: int = 15,
+    reach: float = math.inf,
 ) -> list[Trial]:
-    """The trials, best first, all under one noise model: those that were fitted under another are fitted again."""
+    """The trials, best first, all under one noise model: those that were fitted under another are fitted again, as far as they may
+    come to `reach`."""
     done = [trial for trial in trials if trial.noise is noise and trial.converged]
     others = [trial for trial in trials if not (trial.noise is noise and trial.converged)]
 
     def one(trial: Trial) -> Outcome:
-        return _again(trial, series, noise, max_step, iterations)
+        return _again(trial, series, noise, max_step, iterations, reach)
 
     again = [
         trial_of(others[index].added, others[index].model, result, noise)

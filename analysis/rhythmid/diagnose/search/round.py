@@ -22,6 +22,7 @@ from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.least_squares import reduced
 from rhythmid.identify.multiple_shooting import periods_long, windows
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.output_error import Fit, minimise
@@ -79,18 +80,21 @@ def noise_without(fit: Fit, changes: Sequence[Change], most: int = 60) -> NoiseM
         by_key = {change.key: change for change in changes}
         picked = [by_key[one.key] for one in ranked]
         used = [one.used for one in fit.run.series]
-        design = np.concatenate(
-            [np.column_stack([c.outputs[i][u] for c in picked]) for i, u in enumerate(used)]
+        design, target = reduced(
+            (np.column_stack([c.outputs[i][u] for c in picked]), residuals[i][u]) for i, u in enumerate(used)
         )
         norms = np.linalg.norm(design, axis=0)
         norms[norms == 0.0] = 1.0
-        target = np.concatenate([r[u] for r, u in zip(residuals, used)])
         solution, _, rank, _ = np.linalg.lstsq(design / norms, -target, rcond=1e-6)
         solution = solution / norms
         share = samples / max(samples - int(rank), 1)
         for i, r in enumerate(residuals):
             r += np.column_stack([c.outputs[i] for c in picked]) @ solution
-    stretches = [r[s] * math.sqrt(share) for r, one in zip(residuals, fit.run.series) for s in runs(one.used)]
+    stretches = [
+        one.levelled(r[s], s) * math.sqrt(share)
+        for r, one in zip(residuals, fit.run.series)
+        for s in runs(one.used)
+    ]
     return estimate_noise(stretches, floor=fit.noise.std * 1e-6)
 
 

@@ -30,9 +30,12 @@ from rhythmid.model import Model
 from rhythmid.simulation.effect import Path, effect_along
 from rhythmid.simulation.generated_source import DRIVES
 from rhythmid.simulation.signal import first_order_hold
-from rhythmid.simulation.simulate import delay_of_command, delayed_command, physical_times
+from rhythmid.simulation.transport import delayed_command, delays, physical_times
 
 Array = NDArray[np.float64]
+FULL_PRECISION_ROWS = (
+    200_000  # averages in all, beyond which changes are kept to seven digits: a score needs no more
+)
 SMALL = 1e-3  # of the force that shakes the machine: a force that is tried is no larger, so that the answer is in proportion
 
 
@@ -211,7 +214,9 @@ def _change_of_reference(known: Trajectories, index: int, change: Array) -> Arra
     fit, run, one = known.fit, known.disturbed, known.disturbed.series[index]
     if not np.isfinite(change).all():
         return None
-    stamped = known.paths[index].time - float(np.mean(delay_of_command(fit.model, known.paths[index].time)))
+    time = known.paths[index].time
+    late = sum((late for _, late in delays(fit.model, time, "command")), np.zeros(len(time)))
+    stamped = time - float(np.mean(late))
     both = []
     for reference in (known.commands[index], known.commands[index] + change):
         moved = replace(one, command=first_order_hold(stamped, reference))
@@ -226,7 +231,8 @@ def whitened(fit: Fit, samples: Sequence[Array], noise: NoiseModel) -> list[Arra
     """Used stretches of each series, whitened and joined."""
     found = []
     for one, given in zip(fit.run.series, samples):
-        parts = [noise.whiten(given[s]) for s in runs(one.used) if s.stop - s.start > noise.order + 1]
+        stretches = [s for s in runs(one.used) if s.stop - s.start > noise.order + 1]
+        parts = [noise.whiten(one.levelled(given[s], s)) for s in stretches]
         found.append(np.concatenate(parts) if parts else given[:0])
     return found
 
@@ -274,10 +280,17 @@ def changes_of(
             or not any(np.any(o) for o in outputs)
         ):
             return None
-        return Change(key, element, values, tuple(outputs))
+        return Change(key, element, values, _kept(outputs))
 
     cases = list(enumerate(candidates))
     return [change for change in (pool.map(one, cases) if pool else map(one, cases)) if change is not None]
+
+
+def _kept(outputs: Sequence[Array]) -> tuple[Array, ...]:
+    """Changes as they are kept for the whole catalogue: in half the memory over records that are very long."""
+    if sum(map(len, outputs)) <= FULL_PRECISION_ROWS:
+        return tuple(outputs)
+    return tuple(one.astype(np.float32) for one in outputs)
 
 
 def _impossible(element: Element, values: Mapping[str, float], factor: float) -> bool:

@@ -7,7 +7,8 @@ Without a controller, all that drives the machine comes later by tau_a, so the m
 measurement delay. Only their sum is identifiable then.
 """
 
-from rhythmid.elements.element import LONGEST_DEAD_TIME, Element, Parameter
+from rhythmid.elements.dead_time import dead_time
+from rhythmid.elements.element import Element
 
 
 def kernel(f, t, delay, past_f):
@@ -19,15 +20,10 @@ ELEMENT = Element(
     slot="actuator",
     title="Actuator delay",
     equation="f(t) = f_cmd(t − τ_a),  f_cmd = f₀ + u",
-    parameters=(Parameter("delay", "s", "dead time τ_a of the actuator", bounds=(0.0, LONGEST_DEAD_TIME)),),
+    **dead_time("dead time τ_a of the actuator"),
     kernel=kernel,
     history=("f",),
-    dead_time="delay",
-    size="delay",
-    controlled=True,
-    starts=lambda s: [{"delay": w / s.natural_frequency} for w in (0.01, 0.05)],
     also_known_as=("actuator dead time", "transport delay of the actuator", "drive latency"),
-    family="dead time",
     confusable={
         "measurement_delay": "the same where no controller closes the loop",
         "feedback_delay": "delays reference and forcing, too: know the input delay, with a forcing the measurement delay",

@@ -4,7 +4,8 @@ The time that a controller's own measurement and its computation take, inside th
 what the computation adds there is part of the input delay. It turns the phase of the loop, and takes k_p tau_f from its damping.
 """
 
-from rhythmid.elements.element import LONGEST_DEAD_TIME, Element, Parameter
+from rhythmid.elements.dead_time import dead_time
+from rhythmid.elements.element import Element
 
 
 def kernel(x, v, t, delay, past_x, past_v):
@@ -16,23 +17,11 @@ ELEMENT = Element(
     slot="command",
     title="Feedback delay",
     equation="F = k_p (r − x(t − τ_f)) − k_d v(t − τ_f)",
-    parameters=(
-        Parameter(
-            "delay",
-            "s",
-            "delay τ_f of the controller's measurement and computation",
-            bounds=(0.0, LONGEST_DEAD_TIME),
-        ),
-    ),
+    **dead_time("delay τ_f of the controller's measurement and computation"),
     kernel=kernel,
     acts="observation",
     history=("x", "v"),
-    dead_time="delay",
-    size="delay",
-    controlled=True,
-    starts=lambda s: [{"delay": w / s.natural_frequency} for w in (0.01, 0.05)],
     also_known_as=("loop delay", "controller latency", "sampling and computation delay"),
-    family="dead time",
     confusable={
         "actuator_delay": "leaves reference and forcing alone: know the input delay, with a forcing the measurement delay",
         "viscous_damper": "to first order a damping of −k_p τ_f: give the derivative gain, move fast",

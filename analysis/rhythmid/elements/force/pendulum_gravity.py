@@ -13,14 +13,14 @@ def kernel(x, v, t, f, moment, reference):
     return -moment * math.sin(x - reference)
 
 
-LEAST = (
+LEAST_SWING = (
     0.2  # [rad] amplitude a below which the sine and a line differ by less than a^2 / 6, 0.7 % of the force
 )
 
 
 def starts(scales):
     """Hanging at the middle of the motion; of one that goes round, nowhere in particular; of a small one not at all."""
-    if 0.5 * (scales.high - scales.low) < LEAST:
+    if 0.5 * (scales.high - scales.low) < LEAST_SWING:
         return []
     moment = max(0.1 * scales.stiffness, 0.1 * scales.effort)
     around = scales.high - scales.low > 2.0 * math.pi

@@ -2,7 +2,7 @@
 identifiability, not of how the motion looks."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -18,7 +18,7 @@ from rhythmid.simulation.effect import Path, effect_along
 # of the scaled normal equations' root, beyond which a robot's parameters are said not to be excited (K. Schröer, in: Robot
 # Calibration, Chapman & Hall, 1993; M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362 aim below it)
 CONDITION = 100.0
-EXPLAINED = 0.5  # of the effort's power that any map of the motion has to explain, or it is not the motion that the effort makes
+EXPLAINED_BY_MOTION = 0.5  # of the effort's power that any map of the motion has to explain, or it is not the motion that the effort makes
 # of the inertial force that the effort varies by at least: below it the machine swings by itself and the small difference of two
 # large terms is weighed (a resonance of 10 % damping is driven by a fifth of its inertial force)
 LIGHT = 0.2
@@ -66,7 +66,7 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
     share = 1.0 if driven else float(np.std(balance.measured)) / max(_inertial(balance, model), 1e-300)
     reason = f"the effort is predicted below {chosen.effort:.3g} Hz, where a free map explains {chosen.explained:.0%} of it"
     applies = True
-    if chosen.explained < EXPLAINED:
+    if chosen.explained < EXPLAINED_BY_MOTION:
         applies, reason = (
             False,
             f"no map of the motion explains more than {chosen.explained:.0%} of the effort",
@@ -102,20 +102,3 @@ def restores(balance: Balance, model: Model) -> bool:
         if term.element.slot == "force" and term.element.acts in ("leg", "body"):
             total += effect_along(term.element, {n: v.value for n, v in term.values.items()}, model, path)
     return bool(total[0] - total[-1] > 1e-9 * max(float(np.abs(total).max()), 1e-300))
-
-
-def moved_with_bandwidth(
-    records: Sequence[Record], model: Model, balance: Balance, by: float = 1.5
-) -> dict[str, float]:
-    """By how many standard deviations each parameter moves when the cut-off of the effort is `by` times lower.
-
-    Noise of the motion, effects that are not modelled and rows that are too few show as estimates that depend on the filter.
-    """
-
-    lower = Balance.of(records, model, replace(balance.bandwidth, effort=balance.bandwidth.effort / by))
-    first, second = fit_effort(balance, model), fit_effort(lower, model)
-    found = {}
-    for name in first.names:
-        spread = float(np.hypot(first.std_of(name), second.std_of(name)))
-        found[name] = abs(first.model.value(name) - second.model.value(name)) / max(spread, 1e-300)
-    return found

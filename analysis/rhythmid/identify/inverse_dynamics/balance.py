@@ -19,6 +19,7 @@ from rhythmid.identify.inverse_dynamics.motion import Motion, high_pass, low_pas
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.record.record import Record
 from rhythmid.simulation.effect import MAX_STEP, Path, effect_along
+from rhythmid.simulation.transport import MEASUREMENT, delays
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -131,13 +132,8 @@ class Balance:
 
     def shift(self, model: Model) -> float:
         """By how much later [s] than the stamps of the effort the motion shows it, as the model's delays say."""
-        late, stamps = 0.0, self.motions[0].time
-        for term in model.terms:
-            if term.element.delay is None or (term.element.slot == "command" and controlled(model)):
-                continue
-            values = {name: value.value for name, value in term.values.items()}
-            late += float(np.mean(term.element.delay(stamps, **values)))
-        return late
+        slots = MEASUREMENT if controlled(model) else ("command", *MEASUREMENT)
+        return sum((float(np.mean(late)) for _, late in delays(model, self.motions[0].time, *slots)), 0.0)
 
     def required(self, model: Model) -> list[Array]:
         """Effort (n,) that the model requires along each motion, unfiltered."""

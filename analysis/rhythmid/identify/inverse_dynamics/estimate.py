@@ -21,13 +21,13 @@ SPREAD = 0.7  # relative standard deviation of a value that the file states with
 FAINTEST = 0.1  # of the effort that one standard deviation of a prior may move at least: a file's placeholder forbids nothing
 ALIGNED = 1.0  # samples: standard deviation of the alignment of effort and motion, whose stamps a driver rounds to a sample
 FARTHEST = 2.0  # samples by which they may be out; a longer delay is a hypothesis of its own
-LEAST = 0.01  # of an inertia or a motor's constant that is thought of, at least: none vanishes
+LEAST_INERTIA = 0.01  # of an inertia or a motor's constant that is thought of, at least: none vanishes
 SHRINKS = 3.0  # times by which one of these becomes smaller in a step, at most: what is divided by it is far from linear
 STEPS = 12  # Gauss-Newton steps at most
 HALVINGS = 5
 SETTLED = 1e-4  # change of the cost below which it is at its end
 DIFFERENCE = 1e-4  # of a parameter's size: step of its finite difference
-FAR = 1e3  # spreads of the effort's size: a column that moves the effort by less for one unit has no size of its own
+FAR_SPREADS = 1e3  # spreads of the effort's size: a column that moves the effort by less for one unit has no size of its own
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def priors_of(balance: Balance, model: Model, names: Sequence[str], columns: Arr
             found[name] = value.prior
             continue
         strength = float(np.sqrt(np.mean(column**2)))
-        widest = size / strength if strength > 0.0 else FAR * max(abs(value.value), 1.0)
+        widest = size / strength if strength > 0.0 else FAR_SPREADS * max(abs(value.value), 1.0)
         std = widest
         if value.bounds[0] >= 0.0 and value.value > 0.0:
             std = max(SPREAD * value.value, min(FAINTEST * widest, widest))
@@ -150,7 +150,7 @@ def fit_effort(
     bounds = [(aligned.low, aligned.high), *(model.parameters[name].bounds for name in names)]
     for place, name in enumerate(names, start=1):
         if _divides(model, name):
-            bounds[place] = (max(bounds[place][0], LEAST * known[name].mean), bounds[place][1])
+            bounds[place] = (max(bounds[place][0], LEAST_INERTIA * known[name].mean), bounds[place][1])
     low, high = (np.array(side) for side in zip(*bounds, strict=True))
     value = np.array([alignment, *(model.value(name) for name in names)])
 

@@ -18,19 +18,20 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import Fit, minimise, noise_of
 from rhythmid.identify.sample_clock.clock import clock_of
-from rhythmid.identify.sample_clock.tick_scan import DELAY, scanned
+from rhythmid.identify.sample_clock.tick_scan import scanned
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.model import Model
+from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
 STEPS = np.linspace(-1.0, 1.0, 9)
 WIDE, FINE = 0.2, 1e-4  # reach of the grid at first and in the end: periods by which the last tick moves
 SHIFTS = np.linspace(-1.0, 1.0, 7)
-LEAST = 0.25  # of a sample, by which the delay is moved at least while ticks move by more than a sample
+LEAST_MOVE = 0.25  # of a sample, by which the delay is moved at least while ticks move by more than a sample
 FINER = 0.4  # of a grid's reach is that of the next
 FOLLOWED = 4  # cases whose surroundings are looked at more finely
 SCANS = 3  # at most, each under the noise that the one before has left
-BETTER = 0.98  # of chi2, above which a scan has found nothing new
+NOTHING_NEW = 0.98  # of chi2, above which a scan has found nothing new
 
 
 def ticks_sought(fit: Fit, floor: float, pool: ThreadPoolExecutor | None = None) -> Fit:
@@ -44,8 +45,8 @@ def ticks_sought(fit: Fit, floor: float, pool: ThreadPoolExecutor | None = None)
         noise = noise_of(fit.residuals, series, floor)
         try:
             now = minimise(fit.model, fit.run, fit.names, noise, fit.starts, 0, pool)
-            late = fit.model.value(DELAY) if DELAY in fit.model.parameters else 0.0
-            mean = {DELAY: late + 0.5 * fit.model.value(period)} if DELAY in fit.names else {}
+            late = fit.model.value(INPUT_DELAY) if INPUT_DELAY in fit.model.parameters else 0.0
+            mean = {INPUT_DELAY: late + 0.5 * fit.model.value(period)} if INPUT_DELAY in fit.names else {}
             guesses = scanned(now.model.with_values(mean), series, now.starts, noise)
             cases, costs = tried(now, places, guesses, pool)
             moved = moved_to(now, places, cases[np.argmin(costs)])
@@ -54,7 +55,7 @@ def ticks_sought(fit: Fit, floor: float, pool: ThreadPoolExecutor | None = None)
             )
         except InputError:
             return fit
-        if found.chi2 > BETTER * now.chi2:
+        if found.chi2 > NOTHING_NEW * now.chi2:
             return fit
         fit = found
     return fit
@@ -62,7 +63,7 @@ def ticks_sought(fit: Fit, floor: float, pool: ThreadPoolExecutor | None = None)
 
 def places_of(fit: Fit) -> list[int]:
     """Where period and input delay stand among the free parameters."""
-    return [fit.names.index(name) for name in (clock_of(fit.model), DELAY) if name in fit.names]
+    return [fit.names.index(name) for name in (clock_of(fit.model), INPUT_DELAY) if name in fit.names]
 
 
 def moved_to(fit: Fit, places: Sequence[int], case: Array) -> Model:
@@ -84,7 +85,7 @@ def tried(
         around = (near[:, None, :] + grid).reshape(-1, len(places))
         cases = np.concatenate([cases, np.maximum(around, 0.0)])
         costs = np.concatenate([costs, _costs(fit, places, cases[len(costs) :], pool)])
-        reach, late = FINER * reach, max(FINER * late, LEAST * sample)
+        reach, late = FINER * reach, max(FINER * late, LEAST_MOVE * sample)
     return cases, costs
 
 

@@ -24,14 +24,14 @@ from rhythmid.identify.sample_clock.clock import clock_of
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import Model
+from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
-DELAY = "input_delay.delay"
 COARSE = 50  # rates of the coarse scan
 # of the way from the best to the middling cost of the coarse scan, up to which a rate is in the band
 BAND = 0.5
 SLOW = 2.5  # times the slowest rate, up to which rates join the band
-MOST = 3000  # rates tried over the first stretch
+MOST_RATES = 3000  # rates tried over the first stretch
 SERIES = 2  # looked at, those with the strongest command at first
 SLOWEST = 2.0  # times the dominant frequency of the motion
 FASTEST = 100.0  # [Hz] beyond which a hold is little but a delay, and its ticks do not matter
@@ -52,7 +52,7 @@ def scanned(
     `starts` are the initial states of the series; the other parameters stay at the model's values.
     """
     period = clock_of(model)
-    mean = model.parameters[DELAY].value if DELAY in model.parameters else 0.0
+    mean = model.parameters[INPUT_DELAY].value if INPUT_DELAY in model.parameters else 0.0
     driven = [
         (one, start) for one, start in zip(series, starts) if one.command is not None and one.kind == "force"
     ]
@@ -68,7 +68,7 @@ def scanned(
     longest = max(one.time[-1] - one.time[0] for one in chosen)
 
     def guess(rate: float, shift: float) -> dict[str, float]:
-        return {period: float(1.0 / rate), DELAY: float(max(mean - 0.5 / rate + shift, 0.0))}
+        return {period: float(1.0 / rate), INPUT_DELAY: float(max(mean - 0.5 / rate + shift, 0.0))}
 
     def best_of(length: float, cases: Array, middle: Array) -> tuple[Array, Array]:
         """The cases (n, 2) of rate and shift, best first, with their costs over stretches of this length."""
@@ -86,7 +86,7 @@ def scanned(
     near = cases[costs <= costs[0] + BAND * (np.median(costs) - costs[0]), 0]
     low, high = near.min() / 1.05, near.max() * 1.05
     slow = min(SLOW * slowest, low)
-    length = min(whole, 0.25 * MOST / (high - low + slow - slowest))
+    length = min(whole, 0.25 * MOST_RATES / (high - low + slow - slowest))
     reach, late = 0.25 / length, 0.5 * chosen[0].period
     rates = np.concatenate([np.arange(slowest, slow, reach), np.arange(low, high, reach)])
     cases, _ = best_of(length, _unshifted(rates), cases[0])

@@ -2,18 +2,40 @@
 
     ros2 launch rhythmid_bringup experiment.launch.py experiment:=demo.yaml [bag:=out]
 
-The excitation starts by itself when it is ready; when it has ended, everything is shut down.
+The excitation starts by itself when it is ready. When any node has ended everything is shut down, and the exit code is that
+node's (128 and the signal's number if it was killed).
 """
 
+import atexit
+import os
+import sys
 from pathlib import Path
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
+from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from rhythmid_bringup.arguments import given_parameters
 from rhythmid_bringup.run import load
+
+
+def shut_down(event: ProcessExited, context: LaunchContext) -> list[Shutdown]:
+    """End the launch with the exit code of the node that ended first."""
+    if context.is_shutdown:
+        return []
+    code = event.returncode
+    if code != 0:
+        atexit.register(_exit, code if code > 0 else 128 - code)
+    return [Shutdown(reason=f"{event.process_name} ended with exit code {code}")]
+
+
+def _exit(code: int) -> None:
+    """Exit with `code`: `ros2 launch` itself knows only 0 and 1, and not of nodes."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def graph(context: LaunchContext) -> list[Node]:
@@ -33,7 +55,7 @@ def graph(context: LaunchContext) -> list[Node]:
                 parameters=[{**given_parameters(spec), **({"unattended": True} if leads else {})}],
                 remappings=list(spec.remappings.items()),
                 output="screen",
-                on_exit=[Shutdown()] if leads else None,
+                on_exit=shut_down,
             )
         )
     return nodes

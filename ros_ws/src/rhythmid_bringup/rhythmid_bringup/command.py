@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from rhythmid.errors import InputError
+
+from . import isolation
 
 
 def add(app: typer.Typer) -> None:
@@ -23,8 +27,18 @@ def add(app: typer.Typer) -> None:
             str | None,
             typer.Option("--node", help="Run only this node, here and unattended (one container per node)."),
         ] = None,
+        isolated: Annotated[
+            bool,
+            typer.Option(
+                "--isolated", help="Give the nodes a network of their own: nobody else reaches them."
+            ),
+        ] = False,
     ) -> None:
         """Run the graph of an experiment: starts, watches and stops its nodes and leaves a bag."""
+        if isolated:
+            again = [argument for argument in sys.argv[1:] if argument != "--isolated"]
+            line = isolation.isolated([sys.executable, "-m", "rhythmid.cli", *again])
+            os.execvp(line[0], line)
         try:  # ROS is slow to load, and the other commands need none
             from rhythmid_bringup.run import run_alone, run_graph
         except ModuleNotFoundError as missing:

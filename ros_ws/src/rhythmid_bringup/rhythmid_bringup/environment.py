@@ -37,7 +37,8 @@ def own_domain() -> Iterator[int]:
 def run_environment(given: Mapping[str, str], domain: int | None, log_folder: Path) -> dict[str, str]:
     """`given` and what it lacks for a run; whatever the user has set stays as it is.
 
-    Without `domain` the nodes are on their own: everybody's domain, no supervisor.
+    Without `domain` the nodes are on their own: everybody's domain, no supervisor. Nodes are found on this machine only, unless
+    the user has said otherwise.
     """
     environment = {
         "ROS_LOG_DIR": str(log_folder),
@@ -47,6 +48,6 @@ def run_environment(given: Mapping[str, str], domain: int | None, log_folder: Pa
     }
     if domain is not None:
         environment |= {"ROS_DOMAIN_ID": str(domain), "RHYTHMID_SUPERVISOR": str(os.getpid())}
-        if "ROS_LOCALHOST_ONLY" not in given:
-            environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    if "ROS_LOCALHOST_ONLY" not in given:
+        environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     return {**environment, **given}

@@ -11,6 +11,7 @@ from rclpy.node import Node
 from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 
+from rhythmid_nodes.diagnostics import NOT_READY, OK, STOPPED
 from rhythmid_nodes.lockstep import ACK_TOPIC
 from rhythmid_nodes.qos import latched
 
@@ -23,6 +24,7 @@ class Observer(Node):
     Attributes
     ----------
     obstacles : node name -> what keeps the node from its work ("" when it is ready), as /diagnostics says.
+    tripped : node name -> why the node stopped early, of those that did.
     figures : node name -> its key-value pairs, the newest.
     heard : node name -> how many sets of them have come.
     run : content of the topic `run`, the newest; empty before the start.
@@ -32,6 +34,7 @@ class Observer(Node):
     def __init__(self, namespace: str) -> None:
         super().__init__("supervisor", namespace=namespace)
         self.obstacles: dict[str, str] = {}
+        self.tripped: dict[str, str] = {}
         self.figures: dict[str, dict[str, str]] = {}
         self.heard: dict[str, int] = {}
         self.run: dict[str, Any] = {}
@@ -67,18 +70,36 @@ class Observer(Node):
         if self._stop.service_is_ready():
             self._stop.call_async(Trigger.Request())
 
-    def tell_timing(self) -> None:
-        """Say on `run` how punctual the run was, if there was one."""
-        if self.run:
-            self.run["timing"] = timing(self.figures, self.run)
-            self._run.publish(String(data=json.dumps(self.run)))
+    def tell_outcome(self, failure: str, punctual: bool) -> None:
+        """Say on `run`, if there was one, why it failed, what came from strangers, and where that means something how punctual it was."""
+        if not self.run:
+            return
+        foreign = {name: told for name in self.figures if (told := self._foreign(name))}
+        said = {
+            **self.run,
+            **({"timing": timing(self.figures, self.run)} if punctual else {}),
+            **({"failure": failure} if failure else {}),
+            **({"foreign": foreign} if foreign else {}),
+        }
+        if said != self.run:
+            self.run = said
+            self._run.publish(String(data=json.dumps(said)))
             self._run.wait_for_all_acked(Duration(seconds=0.5))
+
+    def _foreign(self, node: str) -> dict[str, Any]:
+        """How many messages of a second publisher a node has refused, and who publishes; empty when there was none."""
+        figures = self.figures[node]
+        if "conflict" not in figures:
+            return {}
+        return {"messages": int(figures["foreign_messages"]), "conflict": figures["conflict"]}
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             namespace, _, name = status.name.rpartition("/")
             if namespace == self.get_namespace().rstrip("/"):
-                self.obstacles[name] = status.message.removeprefix("not ready: ").removeprefix("ok")
+                self.obstacles[name] = "" if status.message == OK else status.message.removeprefix(NOT_READY)
+                if status.message.startswith(STOPPED):
+                    self.tripped[name] = status.message.removeprefix(STOPPED)
                 self.figures[name] = {pair.key: pair.value for pair in status.values}
                 self.heard[name] = self.heard.get(name, 0) + 1
 

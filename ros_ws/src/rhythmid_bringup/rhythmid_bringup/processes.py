@@ -46,9 +46,22 @@ class Supervised:
         self._reader.start()
 
     @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
     def returncode(self) -> int | None:
         """Exit code, minus the signal's number if killed; None while it runs."""
         return self._process.poll()
+
+    @property
+    def suspended(self) -> bool:
+        """Whether it has been stopped (SIGSTOP) and cannot heed a signal that asks it to end."""
+        try:
+            status = Path(f"/proc/{self._process.pid}/stat").read_text(encoding="ascii", errors="replace")
+        except OSError:
+            return False
+        return status.rpartition(")")[2].split()[0] in "Tt"
 
     def hurry(self) -> None:
         """Let it run before others where the user has the right to; to be called before it has made threads."""
@@ -78,7 +91,7 @@ def end(processes: Sequence[Supervised], meanwhile: Callable[[], None] = lambda:
     """End all processes; `meanwhile` is called while they take their time."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
         for process in processes:
-            process.signal(number)
+            process.signal(signal.SIGKILL if process.suspended else number)
         patience = time.monotonic() + GRACE
         while time.monotonic() < patience:
             if all(process.returncode is not None for process in processes):

@@ -14,12 +14,9 @@ _STAGES = {
     "plant": ("commands", "late_commands", "transport"),
     "measurement_delay": ("relayed", "late", "delay_error"),
 }
-_LOSSES = (
-    ("command_delay", "dropped"),
-    ("measurement_delay", "dropped"),
-    ("recorder", "dropped"),
-    ("recorder", "lost"),
-)
+_LOSSES = [
+    (node, key) for node in ("command_delay", "measurement_delay", "recorder") for key in ("dropped", "lost")
+]
 
 
 def timing(figures: Mapping[str, Mapping[str, str]], said: Mapping[str, Any]) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rhythmid.experiment import Delay, Experiment
 
 from .arguments import command, compose_command, ros_arguments
+from .liveness import SILENT_AFTER, Liveness, Relay
 from .observer import Observer
 from .processes import Supervised, end
 
@@ -67,6 +68,12 @@ class Supervisor:
         self._lockstep = experiment.time.mode == "lockstep"
         self._length = experiment.count * experiment.time.period_ns * 1e-9
         self._nodes = [spec.name for spec in experiment.nodes()]
+        self._liveness = Liveness(
+            {
+                "command_delay": Relay("excitation", "sent", longest(experiment.input_delay)),
+                "measurement_delay": Relay("plant", "samples", longest(experiment.measurement_delay)),
+            }
+        )
         self._streams = any(topic not in ("run", "diagnostics") for topic in experiment.record.topics)
 
     def run(self) -> Outcome:
@@ -78,7 +85,10 @@ class Supervisor:
         try:
             self._launch()
             outcome = self._wait_until_ready(observer) or self._play(observer)
-            self._tell_timing(observer)
+            silent = self._tell_outcome(observer, outcome)
+            if outcome.code == 1 and silent:
+                told = f"nothing was heard from {', '.join(silent)} for {FIGURES_WITHIN:g} s"
+                outcome = Outcome(1, f"{outcome.sentence}; {told}")
             end([process for process in self._processes if process.name != "recorder"], self._listen)
             end(self._processes, self._listen)  # the recorder hears the others' last words
             for process in self._processes:
@@ -115,20 +125,27 @@ class Supervisor:
             if not self._lockstep:
                 self._processes[-1].hurry()
 
-    def _trouble(self) -> Outcome | None:
-        """A node that has ended, or the user's wish to stop."""
-        for process in self._processes:
-            code = process.returncode
-            if code is None:
-                continue
-            process.join_output()
-            if code == 2:
-                return Outcome(2, process.refusal)
-            how = (
-                f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
-            )
-            return Outcome(1, f"{process.name} {how}")
+    def _trouble(self, observer: Observer) -> Outcome | None:
+        """A node that has ended or stopped early, or the user's wish to stop."""
+        dead = next((process for process in self._processes if process.returncode is not None), None)
+        if dead is not None:
+            dead.join_output()
+            self._listen()  # it may have said why
+            return _cause(observer) or _death(dead)
         return Outcome(0, "stopped by the user") if self._interrupted() else None
+
+    def _stopped_working(self, observer: Observer) -> Outcome | None:
+        """A node that lives and does not work; a silent one is killed, lest it wakes up and acts after the run."""
+        heard = {name: count for name, count in observer.heard.items() if name in self._nodes}
+        silent = self._liveness.silent(time.monotonic(), heard)
+        for process in self._processes:
+            if process.name in silent or (silent and len(self._processes) == 1):
+                process.signal(signal.SIGKILL)
+        if silent:
+            said = f"nothing was heard from {', '.join(silent)} for {SILENT_AFTER:g} s: stopped working"
+        else:
+            said = self._liveness.stalled(observer.figures)
+        return Outcome(1, said) if said else None
 
     def _wait_until_ready(self, observer: Observer) -> Outcome | None:
         """Until every node says that it is ready and the excitation has started; why not, if it comes to nothing."""
@@ -136,7 +153,7 @@ class Supervisor:
         refusal: str | None = None
         with self._console.status("waiting for the nodes") as status:
             while not observer.state:
-                if trouble := self._trouble():
+                if trouble := self._trouble(observer):
                     return trouble
                 silent = [name for name in self._nodes if name not in observer.obstacles]
                 waiting = [f"{name}: {why}" for name, why in observer.obstacles.items() if why]
@@ -174,11 +191,10 @@ class Supervisor:
                     moved = now
                 self.observed.elapsed, self.observed.played = now, min(played, self._length)
                 progress.update(bar, completed=self.observed.played)
-                outcome = self._trouble() or self._ending(observer)
+                outcome = self._trouble(observer) or self._stopped_working(observer) or self._ending(observer)
                 if outcome is None and now - moved > STALLED_AFTER:
                     outcome = Outcome(1, f"nothing has moved for {STALLED_AFTER:g} s")
-        if self._interrupted():
-            self._fade_out(observer)
+        self._fade_out(observer)
         return outcome
 
     def _ending(self, observer: Observer) -> Outcome | None:
@@ -187,7 +203,8 @@ class Supervisor:
             return None
         if self._lockstep:
             if (
-                self._streams
+                "excitation" not in observer.tripped
+                and self._streams
                 and observer.acknowledged_ns < self._experiment.count * self._experiment.time.period_ns
             ):
                 return None
@@ -195,6 +212,8 @@ class Supervisor:
             self._record_tail()
         if observer.state == "finished":
             return Outcome(0, "finished")
+        if cause := _cause(observer):
+            return cause
         reason = observer.run.get("reason", "")
         return Outcome(0 if reason == "asked to stop" else 1, f"excitation stopped: {reason}")
 
@@ -206,7 +225,7 @@ class Supervisor:
             self._listen()
 
     def _fade_out(self, observer: Observer) -> None:
-        """Let the excitation ramp down before the graph goes."""
+        """Let the excitation ramp down, if it still plays, before the graph goes."""
         if self._lockstep or observer.state != "running":
             return
         observer.ask_stop()
@@ -215,17 +234,38 @@ class Supervisor:
             self._listen()
         self._record_tail()
 
-    def _tell_timing(self, observer: Observer) -> None:
-        """Let the bag say how punctual the run was; simulated time knows no lateness."""
-        if self._lockstep or not observer.run:
-            return
-        before = dict(observer.heard)
-        patience = time.monotonic() + FIGURES_WITHIN
-        while any(observer.heard[name] == before[name] for name in before):
-            if time.monotonic() > patience:
-                break
-            self._listen()
-        observer.tell_timing()
+    def _tell_outcome(self, observer: Observer, outcome: Outcome) -> list[str]:
+        """Let the bag say how the run ended and how punctual it was; simulated time knows no lateness. The nodes that
+        told nothing more."""
+        if not observer.run:
+            return []
+        silent: list[str] = []
+        if not self._lockstep:
+            before = {name: count for name, count in observer.heard.items() if name in self._nodes}
+            patience = time.monotonic() + FIGURES_WITHIN
+            while (silent := [name for name in before if observer.heard[name] == before[name]]) and (
+                time.monotonic() < patience
+            ):
+                self._listen()
+        observer.tell_outcome(outcome.sentence if outcome.code == 1 else "", punctual=not self._lockstep)
+        return silent
+
+
+def _cause(observer: Observer) -> Outcome | None:
+    """The node that stopped early; the excitation's stop is only a consequence of another's."""
+    for name, reason in observer.tripped.items():
+        if name != "excitation":
+            return Outcome(1, f"{name} stopped: {reason}")
+    return None
+
+
+def _death(process: Supervised) -> Outcome:
+    code = process.returncode
+    assert code is not None
+    if code == 2:
+        return Outcome(2, process.refusal)
+    how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+    return Outcome(1, f"{process.name} {how}")
 
 
 def longest(delay: Delay) -> float:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import sqlite3
 import threading
+import time
 from collections import deque
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosbags.interfaces import (
@@ -23,7 +26,7 @@ from rosbags.rosbag2.errors import WriterError
 from rosbags.typesys import Stores, get_typestore
 
 from rhythmid.errors import InputError
-from rhythmid.record.bag_writer import STORAGES, BagWriter
+from rhythmid.record.bag_writer import BagWriter
 
 from .clock import Worker
 from .definitions import learn
@@ -31,33 +34,53 @@ from .definitions import learn
 _DRAIN_PERIOD = 0.1
 
 
-class LiveBag(Worker):
-    """Takes messages from any thread and writes them to a new bag.
+@dataclass(frozen=True)
+class Storage:
+    """Where and how a live bag is written.
 
-    Parameters
+    Attributes
     ----------
     path
-        Folder of the bag; must not exist. Until the bag is closed it has no metadata.yaml; after a crash
-        `rhythmid.record.recover` brings back what had been written.
-    storage
+        Folder of the bag; must not exist. Until the bag is closed it has no metadata.yaml; after a crash `rhythmid recover`
+        brings back what had been written.
+    kind
         `mcap` or `sqlite3`.
     flush_period
         Seconds after which what was written survives the end of the process.
     queue_size
-        Messages waiting at most; more are dropped and counted in `dropped`.
+        Messages waiting at most; more are dropped.
+    max_size, max_duration
+        Bytes of messages and seconds after which the next file is begun; 0: never.
+    by_message_time
+        Whether the flush period counts in the messages' time, so that equal messages give equal files.
     """
 
-    def __init__(self, path: Path, storage: str, flush_period: float, queue_size: int) -> None:
+    path: Path
+    kind: Literal["mcap", "sqlite3"] = "mcap"
+    flush_period: float = 1.0
+    queue_size: int = 200_000
+    max_size: int = 0
+    max_duration: float = 0.0
+    by_message_time: bool = False
+
+
+class LiveBag(Worker):
+    """Takes messages from any thread and writes them to a new bag; counts in `dropped` what the queue could not hold."""
+
+    def __init__(self, storage: Storage) -> None:
         super().__init__("bag", self._write_all)
         self.dropped = 0
-        self._path, self._storage = path, storage
-        self._flush_every = max(1, round(flush_period / _DRAIN_PERIOD))
-        self._queue_size = queue_size
+        self._storage = storage
+        self._flush_ns = round(storage.flush_period * 1e9)
+        self._max_ns = round(storage.max_duration * 1e9) or 2**63
+        self._max_size = storage.max_size or 2**63
+        self._flushed_ns = 0
         self._queue: deque[tuple[str, int, bytes]] = deque()
         self._topics: deque[tuple[str, str, Sequence[TopicEndpointInfo]]] = deque()
         self._connections: dict[str, Connection] = {}
         self._typestore = get_typestore(Stores.ROS2_JAZZY)
         self._opened = threading.Event()
+        self._split_asked = threading.Event()
 
     def open(self) -> None:
         """Create the bag. Raises InputError if its place is taken or cannot be written."""
@@ -70,55 +93,78 @@ class LiveBag(Worker):
         return len(self._queue)
 
     def add_topic(self, topic: str, type_name: str, publishers: Sequence[TopicEndpointInfo]) -> None:
-        """Announce a topic before its first message. Raises InputError if its type's definition is not to be had."""
+        """Announce a topic before its first message. Raises InputError if its type's definition is not known."""
         learn(self._typestore, type_name)
         self._topics.append((topic, type_name, publishers))
 
     def put(self, topic: str, receive_ns: int, data: bytes) -> None:
         """Queue a message [ns since the epoch] of an announced topic."""
-        if len(self._queue) >= self._queue_size:
+        if len(self._queue) >= self._storage.queue_size:
             self.dropped += 1
         else:
             self._queue.append((topic, receive_ns, data))
 
+    def split(self) -> None:
+        """Begin the next file as soon as what is queued has been written."""
+        self._split_asked.set()
+
     def _write_all(self) -> None:
+        path = self._storage.path
         try:
-            writer = BagWriter(self._path, version=9, storage_plugin=STORAGES[self._storage])
+            writer = BagWriter(path, self._storage.kind, numbered=True)
             writer.open()
         except (WriterError, OSError, sqlite3.Error) as error:
-            self.failure = InputError(f"{self._path}: {error}")
+            self.failure = InputError(f"{path}: {error}")
             return
         finally:
             self._opened.set()
-        rounds = 0
         try:
             while not self.stopping.wait(_DRAIN_PERIOD):
                 self._drain(writer)
-                rounds += 1
-                if rounds % self._flush_every == 0:
-                    writer.flush()
             self._drain(writer)
             writer.close()
-        except (
-            OSError,
-            sqlite3.Error,
-        ) as error:  # the disk is full or gone; what was flushed can be recovered
-            self.failure = InputError(f"{self._path}: {error}; the bag is not complete")
+        except (OSError, sqlite3.Error) as error:  # the disk is full or gone
+            with suppress(OSError, sqlite3.Error):
+                writer.abort()
+            self.failure = InputError(
+                f"{path}: {error}; the recording broke off, and rhythmid recover brings back what was written"
+            )
+        except BaseException:
+            writer.close()  # what precedes the failure is a whole bag
+            raise
 
     def _drain(self, writer: BagWriter) -> None:
-        while self._queue:
+        for _ in range(len(self._queue)):
             topic, receive_ns, data = self._queue.popleft()
             if topic not in self._connections:
                 self._connect(writer)
+            file = writer.file
+            if file.size and (file.size > self._max_size or receive_ns - file.first_ns >= self._max_ns):
+                writer.split()
+            if self._storage.by_message_time:
+                self._flush_when_due(writer, receive_ns)
             writer.write(self._connections[topic], receive_ns, data)
         self._connect(writer)
+        if self._split_asked.is_set():
+            self._split_asked.clear()
+            writer.split()
+        if not self._storage.by_message_time:
+            self._flush_when_due(writer, time.monotonic_ns())
+
+    def _flush_when_due(self, writer: BagWriter, now_ns: int) -> None:
+        if now_ns - self._flushed_ns >= self._flush_ns:
+            writer.flush()
+            self._flushed_ns = now_ns
 
     def _connect(self, writer: BagWriter) -> None:
         while self._topics:
             topic, type_name, publishers = self._topics.popleft()
+            profiles = {
+                repr(qos): qos for qos in (_offered(publisher.qos_profile) for publisher in publishers)
+            }
             self._connections[topic] = writer.add_connection(
                 topic, type_name, typestore=self._typestore,
-                offered_qos_profiles=[_offered(publisher.qos_profile) for publisher in publishers],
+                offered_qos_profiles=[profiles[key] for key in sorted(profiles)],  # each once
             )  # fmt: skip
 
 

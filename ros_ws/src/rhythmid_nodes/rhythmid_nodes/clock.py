@@ -12,7 +12,6 @@ from collections.abc import Callable
 from .lateness import Lateness
 
 _TIMER_ABSTIME = 1
-_SLICE_NS = 100_000_000  # a sleeping thread looks for `stop` this often
 
 
 class _Timespec(ctypes.Structure):
@@ -75,13 +74,23 @@ class Worker:
 
 
 class Grid(Worker):
-    """Calls `tick(stamp_ns)` at every multiple of `period_ns` of the clock, without drift and without skipping.
+    """Calls `tick(stamp_ns)` at every multiple of `period_ns` of the clock, without drift.
 
-    After an overrun the missed ticks follow at once, each with its own grid stamp; how late they came is in `figures`.
+    After an overrun of up to `catch_up` seconds the missed ticks follow at once, each with its own grid stamp. After a longer one
+    only the newest does, and `skipped` counts the others. How late they came is in `figures`.
     """
 
-    def __init__(self, clock: Clock, period_ns: int, tick: Callable[[int], None], priority: int = 0) -> None:
+    def __init__(
+        self,
+        clock: Clock,
+        period_ns: int,
+        tick: Callable[[int], None],
+        priority: int = 0,
+        catch_up: float = 0.0,
+    ) -> None:
         super().__init__("grid", self._loop, priority)
+        self.skipped = 0
+        self._catch_up_ns = max(round(catch_up * 1e9), period_ns)
         self._clock, self._period_ns, self._tick = clock, period_ns, tick
         self._lateness = Lateness(period_ns)
         self._first_ns = self._last_ns = 0
@@ -90,7 +99,7 @@ class Grid(Worker):
         """Ticks per second so far, and how late they came, for /diagnostics."""
         elapsed = (self._last_ns - self._first_ns) * 1e-9
         rate = (self._lateness.count - 1) / elapsed if elapsed > 0.0 else 0.0
-        return {"rate_hz": f"{rate:.3f}", **self._lateness.summary("lateness")}
+        return {"rate_hz": f"{rate:.3f}", "skipped": str(self.skipped), **self._lateness.summary("lateness")}
 
     def _loop(self) -> None:
         self._first_ns = due = (self._clock.now() // self._period_ns + 2) * self._period_ns
@@ -98,16 +107,9 @@ class Grid(Worker):
             self._clock.sleep_until(due)
             self._last_ns = self._clock.now()
             self._lateness.add(max(0, self._last_ns - due))
+            if self._last_ns - due > self._catch_up_ns:
+                missed = (self._last_ns - due) // self._period_ns
+                self.skipped += missed
+                due += missed * self._period_ns
             self._tick(due)
             due += self._period_ns
-
-
-def sleep_in_slices(clock: Clock, due_ns: int, stopping: threading.Event) -> bool:
-    """Sleep until `due_ns`, looking for `stopping` ten times a second; False if it was asked to stop."""
-    while True:
-        now = clock.now()
-        if stopping.is_set():
-            return False
-        if now >= due_ns:
-            return True
-        clock.sleep_until(min(due_ns, now + _SLICE_NS))

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from .command_guard import CommandGuard
 from .delay_injector import DelayInjector
 from .excitation import ExcitationNode
 from .node import GraphNode, serve
@@ -25,6 +26,7 @@ EXECUTABLES: dict[str, Callable[..., GraphNode]] = {
     "excitation": ExcitationNode,
     "delay_injector": DelayInjector,
     "recorder": Recorder,
+    "command_guard": CommandGuard,
 }
 
 

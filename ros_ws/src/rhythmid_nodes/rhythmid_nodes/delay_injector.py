@@ -11,26 +11,30 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter as RosParameter
 from std_msgs.msg import String
 
 from rhythmid.errors import InputError
-from rhythmid.experiment import Delay
+from rhythmid.settings import Delay, profile_delay
 
-from .clock import Clock, Worker, sleep_in_slices
+from .authority import Authority
+from .clock import Clock, Worker
 from .joint_state import restamped, stamp_of
 from .lateness import Lateness
-from .node import PRIORITY, RATE, TIME_MODE, GraphNode, run
+from .node import CATCH_UP, PRIORITY, RATE, TIME_MODE, GraphNode, run
 from .parameters import Parameter
 from .qos import AdaptiveSubscription, latched, message_type, stream
+
+_SLICE_NS = 100_000_000  # the relay looks at least so often whether it is to end
+_SETTLE_NS = 20_000_000  # after an overrun: what comes within this time has waited in the transport meanwhile
 
 DELAY = Parameter("delay", 0.0, "time by which every message is held back", "s", (0.0, 10.0), settable=True)
 PARAMETERS = (
     RATE,
     TIME_MODE,
     PRIORITY,
+    CATCH_UP,
     DELAY,
     Parameter("profile", "", "CSV file of seconds since start and delay [s] that replaces `delay`; empty: none"),
     Parameter(
@@ -42,6 +46,7 @@ PARAMETERS = (
         choices=("header", "receive"),
     ),
     Parameter("type", "sensor_msgs/msg/JointState", "message type; its first field is a std_msgs/Header"),
+    Parameter("one_publisher", True, "stop when a second node publishes on `input`"),
     Parameter("queue_size", 100_000, "messages held back at most; more are dropped and counted", bounds=(1, 10**7)),
 )  # fmt: skip
 
@@ -64,15 +69,16 @@ class DelayInjector(GraphNode):
         self._delay_ns = round(values["delay"] * 1e9)
         self._start_ns: int | None = 0 if self.lockstep else None
         self._last_ns = -1
-        self._relayed = self._dropped = 0
+        self._relayed = self._dropped = self._skipped = 0
         self._applied_ns = 0
         self._error = Lateness(self.period_ns)
         self._wall = Clock()
         self._queue: deque[tuple[int, int, bytes]] = deque()
         self._arrived = threading.Event()
         self._output = self.create_publisher(self._type, "output", stream(self.lockstep))
+        self._authority = Authority(self, "input", self.trip) if values["one_publisher"] else None
         self._input = AdaptiveSubscription(
-            self, "input", self._on_lockstep if self.lockstep else self._on_realtime
+            self, "input", self._on_lockstep if self.lockstep else self._on_realtime, admits=self._admits
         )
         if self._profile is not None and not self.lockstep:
             self.create_subscription(String, "run", self._on_run, latched())
@@ -85,14 +91,17 @@ class DelayInjector(GraphNode):
         applied = self._applied_ns / self._relayed * 1e-6 if self._relayed else 0.0
         figures = {
             "relayed": str(self._relayed),
+            "lost": str(self._input.lost),
             "delay_ms": f"{self._delay_ns * 1e-6:.6f}" if self._profile is None else "profile",
             "applied_delay_mean_ms": f"{applied:.6f}",
+            **(self._authority.figures() if self._authority else {}),
         }
         if self.lockstep:
             return figures
         queue = {
             "queued": str(len(self._queue)),
             "dropped": str(self._dropped),
+            "skipped": str(self._skipped),
             "late": str(self._error.late),
         }
         return {**figures, **queue, **self._error.summary("delay_error")}
@@ -104,6 +113,9 @@ class DelayInjector(GraphNode):
             if self._output.get_subscription_count()
             else [*found, f"no subscriber of {self._output.topic}"]
         )
+
+    def _admits(self, about: dict[str, Any]) -> bool:
+        return not self.tripped and (self._authority is None or self._authority.admits(about))
 
     def _on_set(self, parameters: list[RosParameter]) -> SetParametersResult:
         for parameter in parameters:
@@ -126,7 +138,7 @@ class DelayInjector(GraphNode):
         if self._profile is None:
             return self._delay_ns
         since = 0 if self._start_ns is None else stamp_ns - self._start_ns
-        return int(np.rint(np.interp(since * 1e-9, *self._profile) * 1e9))
+        return int(profile_delay(since, *self._profile))
 
     def _on_lockstep(self, data: bytes, _received_ns: int) -> None:
         stamp_ns = stamp_of(data)
@@ -147,22 +159,44 @@ class DelayInjector(GraphNode):
         self._arrived.set()
 
     def _release_due(self) -> None:
-        keep = self.values["stamp_mode"] == "keep"
-        stopping = self._relay.stopping
+        stopping, catch_up_ns = self._relay.stopping, round(self.values["catch_up"] * 1e9)
+        expected_ns = self._wall.now()
         while not stopping.is_set():
+            now = self._wall.now()
+            if now - expected_ns > catch_up_ns:
+                self._leave_backlog(now)
+                now = self._wall.now()
+            expected_ns = now
             if not self._queue:
-                self._arrived.wait(0.1)
+                expected_ns += _SLICE_NS
+                self._arrived.wait(_SLICE_NS * 1e-9)
                 self._arrived.clear()
-                continue
-            due_ns, origin_ns, data = self._queue[0]
-            if not sleep_in_slices(self._wall, due_ns, stopping):
-                return
-            self._queue.popleft()
-            released_ns = self._wall.now()
-            self._output.publish(data if keep else restamped(data, released_ns))
-            self._relayed += 1
-            self._applied_ns += released_ns - origin_ns
-            self._error.add(max(0, released_ns - due_ns))
+            elif self._queue[0][0] > now:
+                expected_ns = min(self._queue[0][0], now + _SLICE_NS)
+                self._wall.sleep_until(expected_ns)
+            else:
+                self._release(*self._queue.popleft())
+
+    def _release(self, due_ns: int, origin_ns: int, data: bytes) -> None:
+        released_ns = self._wall.now()
+        self._output.publish(data if self.values["stamp_mode"] == "keep" else restamped(data, released_ns))
+        self._relayed += 1
+        self._applied_ns += released_ns - origin_ns
+        self._error.add(max(0, released_ns - due_ns))
+
+    def _leave_backlog(self, resumed_ns: int) -> None:
+        """After an overrun: keep of what has waited meanwhile only the newest."""
+        self._wall.sleep_until(resumed_ns + _SETTLE_NS)
+        waited: list[tuple[int, int, bytes]] = []
+        by_arrival = self.values["delay_from"] == "receive"
+        while self._queue:
+            due_ns, origin_ns, _ = self._queue[0]
+            if not (origin_ns >= resumed_ns if by_arrival else due_ns <= self._wall.now()):
+                break
+            waited.append(self._queue.popleft())
+        if waited:
+            self._queue.appendleft(waited[-1])
+            self._skipped += len(waited) - 1
 
 
 def main() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -11,44 +12,72 @@ from rclpy.node import Node
 
 from .qos import latched
 
+OK = "ok"
+NOT_READY = "not ready: "
+STOPPED = "stopped: "
+"""What the message of a status is or begins with, for OK, WARN and ERROR."""
+
 _LOOK_PERIOD = 0.05  # a change of readiness is told within this time, everything else at 1 Hz
 
 
 class Diagnostics:
-    """Publishes one DiagnosticStatus for `node`: level OK, or WARN while `obstacles()` names what keeps it from its work.
+    """Publishes one DiagnosticStatus for `node`: level OK, WARN while `obstacles()` names what keeps it from its work, or
+    ERROR when `tripped()` says why it stopped early.
 
     `values()` are the key-value pairs.
     """
 
     def __init__(
-        self, node: Node, values: Callable[[], dict[str, str]], obstacles: Callable[[], list[str]]
+        self,
+        node: Node,
+        values: Callable[[], dict[str, str]],
+        obstacles: Callable[[], list[str]],
+        tripped: Callable[[], str] = lambda: "",
     ) -> None:
-        self._node, self._values, self._obstacles = node, values, obstacles
+        self._node, self._values, self._obstacles, self._tripped = node, values, obstacles, tripped
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", latched(1))
+        self._noticed: set[str] = set()
+        self._notices: deque[str] = deque()
         self._told = ""
         self._told_at = -1.0
         self._timer = node.create_timer(_LOOK_PERIOD, self._look)
 
-    def _look(self) -> None:
-        obstacles = "; ".join(self._obstacles())
-        now = time.monotonic()
-        if obstacles != self._told or now - self._told_at >= 1.0:
-            self._publish(obstacles)
-            self._told, self._told_at = obstacles, now
+    def notice(self, text: str) -> None:
+        """Have `text` logged as a warning, once, by the executor: the first log of a process takes tens of milliseconds, which
+        a clock thread does not have."""
+        if text not in self._noticed:
+            self._noticed.add(text)
+            self._notices.append(text)
 
-    def _publish(self, obstacles: str) -> None:
+    def _look(self) -> None:
+        while self._notices:
+            self._node.get_logger().warning(self._notices.popleft())
+        message = self._message()
+        now = time.monotonic()
+        if message != self._told or now - self._told_at >= 1.0:
+            self._publish(message)
+            self._told, self._told_at = message, now
+
+    def _message(self) -> str:
+        if tripped := self._tripped():
+            return f"{STOPPED}{tripped}"
+        obstacles = "; ".join(self._obstacles())
+        return f"{NOT_READY}{obstacles}" if obstacles else OK
+
+    def _publish(self, message: str) -> None:
+        level = DiagnosticStatus.ERROR if message.startswith(STOPPED) else DiagnosticStatus.WARN
         status = DiagnosticStatus(
-            level=DiagnosticStatus.WARN if obstacles else DiagnosticStatus.OK,
+            level=DiagnosticStatus.OK if message == OK else level,
             name=self._node.get_fully_qualified_name(),
-            message=f"not ready: {obstacles}" if obstacles else "ok",
+            message=message,
             hardware_id="",
             values=[KeyValue(key=key, value=value) for key, value in self._values().items()],
         )
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        self._publisher.publish(message)
+        array = DiagnosticArray(status=[status])
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(array)
 
     def publish_last(self) -> None:
         """The closing figures, delivered before the node goes."""
-        self._publish("; ".join(self._obstacles()))
+        self._publish(self._message())
         self._publisher.wait_for_all_acked(Duration(seconds=0.5))

@@ -1,7 +1,7 @@
 """excitation: publishes u(t) on `excitation` (or `command_topic`, as `command_type`) when told to, and stops by itself when the machine is not safe.
 
 Services `~/start` and `~/stop` (std_srvs/Trigger). In real time it listens to `joint_states` and stops at once, with a
-last command of zero, when the newest measurement is older than `stale_after` or leaves `envelope`.
+last command of zero, when the measurements are in danger (see `watch`), nobody listens any more, or another node commands, too.
 """
 
 from __future__ import annotations
@@ -23,14 +23,18 @@ from rhythmid.errors import InputError
 from rhythmid.excitation.sequence import build
 from rhythmid.experiment import Safety, ramped
 
+from .authority import UNNAMED, Authority
 from .clock import Clock, Grid
 from .command import STAMPED, TYPES, Commander
 from .joint_state import JointStateReader
 from .lateness import Lateness
 from .lockstep import Credit
-from .node import COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
+from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
 from .parameters import Parameter
 from .qos import latched, stream
+from .watch import Watch
+from .watch_parameters import PARAMETERS as WATCHED
+from .watch_parameters import limits
 
 _FAR = float("inf")
 PARAMETERS = (
@@ -40,12 +44,12 @@ PARAMETERS = (
     WINDOW,
     COUNT,
     PRIORITY,
+    CATCH_UP,
     Parameter("excitation", "", "what to play, in JSON: the `excitation` of an experiment file"),
     Parameter("folder", ".", "where file names in it start"),
     Parameter("max_effort", 0.0, "largest |u|; what exceeds it is clamped", "N", (0.0, _FAR)),
     Parameter("ramp", 0.0, "fading in at the start and out at the end or on stop", "s", (0.0, 3600.0)),
-    Parameter("stale_after", 0.5, "realtime: stop when the newest measurement is older; 0: never", "s", (0.0, _FAR)),
-    Parameter("envelope", [-_FAR, _FAR], "realtime: stop when the position leaves [low, high] in m"),
+    *WATCHED,
     Parameter("command_type", STAMPED, "message type of the commands", choices=tuple(TYPES)),
     Parameter("command_topic", "excitation", "topic of the commands"),
     Parameter("command_joints", None, "order of a Float64MultiArray's joints; not given: the one joint", items=str),
@@ -62,20 +66,20 @@ class ExcitationNode(GraphNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("excitation", PARAMETERS, **options)
         self._effort = self._command()
-        self._low, self._high = self._envelope()
+        self._watch = Watch(limits(self.values))
         self._state = "idle"  # idle -> running (-> ramping) -> finished | stopped
         self._sent = 0
         self._lateness = Lateness(self.period_ns)  # of the commands sent, against their stamps
         self._start_ns = 0
         self._fade_from: int | None = None
         self._fade_length = round(self.values["ramp"] * self.values["rate"])
-        self._seen_ns: int | None = None
         self._ended_at: float | None = None
         self._grid: Grid | None = None
-        self._position = float("nan")
+        self._neighbours: set[str] = set()
         self._lock = threading.Lock()  # measurements and services come on another thread than ticks
         self._reader = JointStateReader(self.values["joint"])
         self._output = self._commander()
+        self._authority = Authority(self, self._output.publisher.topic, self._on_intrusion)
         self._run = self.create_publisher(String, "run", latched())
         self.create_service(Trigger, "~/start", self._on_start)
         self.create_service(Trigger, "~/stop", self._on_stop)
@@ -88,7 +92,9 @@ class ExcitationNode(GraphNode):
             self.create_subscription(
                 JointState, "joint_states", self._on_measurement, qos_profile_sensor_data, raw=True
             )
-            self._grid = Grid(self._wall, self.period_ns, self._tick, self.values["priority"])
+            self._grid = Grid(
+                self._wall, self.period_ns, self._tick, self.values["priority"], self.values["catch_up"]
+            )
             self.workers.append(self._grid)
         if self.values["unattended"]:
             self.create_timer(0.05, self._attend)
@@ -123,52 +129,43 @@ class ExcitationNode(GraphNode):
             stream(self.lockstep),
         )  # fmt: skip
 
-    def _envelope(self) -> tuple[float, float]:
-        envelope = self.values["envelope"]
-        if len(envelope) != 2 or not envelope[0] < envelope[1]:
-            raise InputError(f"parameter envelope = {envelope}: two positions low < high in m are expected")
-        return envelope[0], envelope[1]
-
     def figures(self) -> dict[str, str]:
         return {
             "state": self._state,
             "sent": str(self._sent),
             "of": str(len(self._effort)),
+            "other_graphs": ", ".join(self._other_graphs()),
             "peak_effort": f"{np.max(np.abs(self._effort), initial=0.0):g}",
             **(self._grid.figures() if self._grid else {}),
             **({} if self.lockstep else self._lateness.summary("lateness")),
         }
 
     def obstacles(self) -> list[str]:
-        found = []
+        found = [self._unheard(), self._authority.conflict()]
+        if not self.lockstep:
+            found.append(self._watch.danger(self._wall.now()))
+        return [obstacle for obstacle in found if obstacle]
+
+    def _unheard(self) -> str:
+        """How many of those who must listen do not; empty when all do."""
         matched, wanted = self._output.publisher.get_subscription_count(), self.values["subscribers"]
-        if matched < wanted:
-            found.append(f"{matched} of {wanted} subscribers of {self._output.publisher.topic}")
-        if not self.lockstep and (danger := self._danger()):
-            found.append(danger)
-        return found
+        return f"{matched} of {wanted} subscribers of {self._authority.topic}" if matched < wanted else ""
 
-    def _danger(self) -> str:
-        """Why the machine must not be excited now; empty when it may."""
-        stale = self.values["stale_after"]
-        if self._seen_ns is None:
-            return "no measurement on joint_states yet" if stale > 0.0 else ""
-        age = (self._wall.now() - self._seen_ns) * 1e-9
-        if age > stale > 0.0:
-            return f"the newest measurement is {age:.3f} s old, allowed are {stale:g} s"
-        if not self._low <= self._position <= self._high:  # NaN is outside, too
-            return (
-                f"the position {self._position:g} m is outside the envelope [{self._low:g}, {self._high:g}] m"
-            )
-        return ""
+    def _other_graphs(self) -> list[str]:
+        """Namespaces of the other excitations in this DDS domain; each is told when it is seen first."""
+        own = (self.get_name(), self.get_namespace())
+        found = {space for name, space in self.get_node_names_and_namespaces() if name == own[0]} - {own[1]}
+        for space in sorted(found - self._neighbours):
+            self.get_logger().warning(f"another graph is in this DDS domain: {space}")
+        self._neighbours |= found
+        return sorted(found)
 
-    def close(self) -> None:
+    def stand_down(self) -> None:
         """A node that is ended while it plays leaves a last command of zero."""
         with self._lock:
             playing = not self.lockstep and self._state in ("running", "ramping")
             if playing:
                 self._halt(self._wall.now(), "the node was ended")
-        super().close()
         if playing:
             for publisher in (self._output.publisher, self._run):
                 publisher.wait_for_all_acked(Duration(seconds=0.5))
@@ -184,7 +181,7 @@ class ExcitationNode(GraphNode):
         if self._state == "idle":
             self._start()
         elif self._state in ("finished", "stopped"):
-            if self.lockstep and self._credit.taken < len(self._effort):
+            if self.lockstep and not self.tripped and self._credit.taken < len(self._effort):
                 return
             self._ended_at = self._ended_at or time.monotonic()
             self.done = time.monotonic() - self._ended_at > 1.0
@@ -199,6 +196,7 @@ class ExcitationNode(GraphNode):
             if obstacles := self.obstacles():
                 return "; ".join(obstacles)
             self._sent, self._fade_from, self._lateness = 0, None, Lateness(self.period_ns)
+            self.tripped = ""
             self._start_ns = 0 if self.lockstep else (self._wall.now() // self.period_ns + 2) * self.period_ns
             self._enter("running")
         if self.lockstep:
@@ -234,6 +232,7 @@ class ExcitationNode(GraphNode):
         return effort * max(0.0, 1.0 - (index + 1 - self._fade_from) / max(1, self._fade_length))
 
     def _send(self) -> None:
+        """Send sample `_sent`, the next one."""
         stamp_ns = self._start_ns + self._sent * self.period_ns
         self._output.send(stamp_ns, self._value(self._sent))
         self._sent += 1
@@ -252,9 +251,12 @@ class ExcitationNode(GraphNode):
         with self._lock:
             if self._state not in ("running", "ramping") or stamp_ns < self._start_ns:
                 return
-            if danger := self._danger():
-                self._halt(stamp_ns, danger)
+            if danger := self._unheard() or self._watch.danger(self._wall.now()):
+                self._abort(stamp_ns, danger)
                 return
+            self._sent = (
+                stamp_ns - self._start_ns
+            ) // self.period_ns  # after an overrun samples are left out
             faded = self._fade_from is not None and self._sent - self._fade_from >= self._fade_length
             if faded or self._sent >= len(self._effort):
                 # whoever holds the last command holds zero from now on
@@ -270,20 +272,35 @@ class ExcitationNode(GraphNode):
         else:
             self._enter("stopped", "asked to stop")
 
-    def _halt(self, stamp_ns: int, danger: str) -> None:
+    def _halt(self, stamp_ns: int, reason: str) -> None:
         """Stop at once, without fading, with a last command of zero."""
-        self._output.send(stamp_ns, 0.0)
-        self._enter("stopped", danger)
-        self.get_logger().error(f"excitation stopped: {danger}")
+        if not self.lockstep:
+            self._output.send(stamp_ns, 0.0)
+        self._enter("stopped", reason)
+        self.get_logger().error(f"excitation stopped: {reason}")
+
+    def _on_intrusion(self, conflict: str) -> None:
+        with self._lock:
+            if UNNAMED in self.tripped:
+                self.tripped = conflict
+                self._enter("stopped", conflict)
+            self._abort(self._wall.now(), conflict)
+
+    def _abort(self, stamp_ns: int, danger: str) -> None:
+        """Halt, if it plays: the run has failed."""
+        if self._state in ("running", "ramping"):
+            self.tripped = danger
+            self._halt(stamp_ns, danger)
 
     def _on_measurement(self, data: bytes) -> None:
         sample = self._reader.read(data)
         if sample is None:
             return
-        with self._lock:
-            self._position, self._seen_ns = sample.position, self._wall.now()
-            if self._state in ("running", "ramping") and not self._low <= sample.position <= self._high:
-                self._halt(self._wall.now(), self._danger())
+        now = self._wall.now()
+        self._watch.hear(sample, now)
+        if danger := self._watch.danger(now):
+            with self._lock:
+                self._abort(now, danger)
 
 
 def main() -> None:

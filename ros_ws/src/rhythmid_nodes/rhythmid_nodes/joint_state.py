@@ -7,10 +7,15 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import NamedTuple
+from typing import Any
 
-from rclpy.serialization import deserialize_message, serialize_message
+import numpy as np
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
+
+from rhythmid.record.messages import Messages
+
+from .sample import Sample
 
 _FIELDS = ("position", "velocity", "effort")
 _CDR = 4  # encapsulation header; CDR aligns relative to its end
@@ -18,15 +23,6 @@ _LITTLE_ENDIAN = b"\x00\x01"
 _stamp = struct.Struct("<iI")
 _count = struct.Struct("<I")
 _double = struct.Struct("<d")
-
-
-class Sample(NamedTuple):
-    """What a message says of one joint; NaN where it says nothing. SI: ns since the epoch, m, m/s, N."""
-
-    stamp_ns: int
-    position: float
-    velocity: float
-    effort: float
 
 
 def stamp_of(data: bytes) -> int:
@@ -112,8 +108,10 @@ class JointStateWriter:
     """Writes serialized JointState messages of one joint that carry the named fields."""
 
     def __init__(self, joint: str, *fields: str) -> None:
-        message = JointState(name=[joint], **{field: [0.0] for field in fields})
-        self._buffer = bytearray(serialize_message(message))
+        # rclpy's serialize_message hands out all the bytes that it reserved, more than the message has, and leaves in its
+        # padding what the memory held: strict readers refuse the first, and equal messages differ by the second
+        columns: dict[str, Any] = {field: np.zeros(1) for field in fields}
+        self._buffer = bytearray(Messages(np.zeros(1, dtype=np.int64), **columns).serialised(joint).tobytes())
         _, arrays = _layout(bytes(self._buffer))
         self._offsets = [arrays[_FIELDS.index(field)][0] for field in fields]
 

@@ -21,13 +21,16 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
 from rhythmid.errors import InputError
+from rhythmid.simulation.command_hold import TIMEOUT
 
+from .authority import UNNAMED
 from .clock import Worker
 from .diagnostics import Diagnostics
 from .parameters import Parameter, declare
 
 _PR_SET_PDEATHSIG = 1
 _LAST_WORDS = 0.1  # seconds
+_NAMING = 2.0  # seconds that a tripped node waits for the name of a stranger, which comes after its messages
 
 RATE = Parameter("rate", 1000, "samples per second of the common grid", "Hz", (1, 100_000))
 TIME_MODE = Parameter(
@@ -43,6 +46,19 @@ PRIORITY = Parameter(
     "SCHED_FIFO priority of the clock thread; 0: none; needs the right to set it",
     bounds=(0, 99),
 )
+CATCH_UP = Parameter(
+    "catch_up",
+    TIMEOUT,
+    "realtime: overrun up to which missed samples follow; after a longer one only the newest does",
+    "s",
+    (0.0, 10.0),
+)
+"""By default as long as a command is held: after a longer overrun the robot has been given up already."""
+
+
+def lapse_notice(timeout: float) -> str:
+    """What a node says that holds a command for `timeout` seconds at most."""
+    return f"a command was not renewed within {timeout:g} s: it fades to zero"
 
 
 class GraphNode(Node):
@@ -54,7 +70,8 @@ class GraphNode(Node):
         self.lockstep = self.values["time_mode"] == "lockstep"
         self.workers: list[Worker] = []
         self.done = False  # set by a node whose work ends by itself; the process then ends
-        self.diagnostics = Diagnostics(self, self.figures, self.obstacles)
+        self.tripped = ""  # why the node stopped its work early, if it did; the process then ends with code 1
+        self.diagnostics = Diagnostics(self, self.figures, self.obstacles, lambda: self.tripped)
 
     @property
     def period_ns(self) -> int:
@@ -69,6 +86,25 @@ class GraphNode(Node):
         """What keeps the node from its work; empty when it is ready."""
         return []
 
+    def trip(self, reason: str) -> None:
+        """Stop the work for good, because of `reason`: say so, and end the process soon. What is told last counts."""
+        self.tripped = reason
+        self.get_logger().error(f"stopped: {reason}")
+        if UNNAMED in reason:
+            self.create_timer(_NAMING, self._finish)
+        else:
+            self._finish()
+
+    def _finish(self) -> None:
+        self.done = True
+
+    def notice(self, text: str) -> None:
+        """Have `text` logged as a warning, once; clock threads use this."""
+        self.diagnostics.notice(text)
+
+    def stand_down(self) -> None:
+        """Give no more effort, at once; called when the node is about to end, perhaps more than once."""
+
     def begin(self) -> None:
         """Start the workers, once every node of the process stands."""
         for worker in self.workers:
@@ -80,7 +116,8 @@ class GraphNode(Node):
         return next((worker.failure for worker in self.workers if worker.failure is not None), None)
 
     def close(self) -> None:
-        """End the workers and say the last figures; the context is still valid."""
+        """Give no more effort, end the workers and say the last figures; the context is still valid."""
+        self.stand_down()
         for worker in self.workers:
             worker.stop()
         self.diagnostics.publish_last()
@@ -98,7 +135,7 @@ def _end_with_supervisor() -> None:
 def serve(build: Sequence[Callable[[], GraphNode]], arguments: list[str]) -> int:
     """Run the nodes in this process on one EventsExecutor until SIGINT, SIGTERM or a failure; the exit code.
 
-    0: asked to stop; 2: a parameter or other input was refused, told in one line; 1: a failure of ours.
+    0: asked to stop; 2: a parameter or other input was refused, told in one line; 1: a node stopped early, or a failure of ours.
     """
     asked: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -136,7 +173,9 @@ def serve(build: Sequence[Callable[[], GraphNode]], arguments: list[str]) -> int
             print(f"error: {problem}", file=sys.stderr)
         else:
             traceback.print_exception(problem)
-    return 0 if not problems else 2 if isinstance(problems[0], InputError) else 1
+    if problems:
+        return 2 if isinstance(problems[0], InputError) else 1
+    return 1 if any(node.tripped for node in nodes) else 0
 
 
 def _spin(executor: Executor, nodes: Sequence[GraphNode], asked: list[int]) -> None:
@@ -157,6 +196,8 @@ def _spin(executor: Executor, nodes: Sequence[GraphNode], asked: list[int]) -> N
                 raise failure
             if end_at == math.inf and (asked or any(node.done for node in nodes)):
                 end_at = time.monotonic() + _LAST_WORDS
+                for node in nodes:
+                    node.stand_down()
 
 
 def run(build: Callable[[], GraphNode]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from pathlib import Path
 from typing import Any
@@ -13,15 +14,19 @@ from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.experiment import Forcing, Noise, plant_model
 from rhythmid.model import Model
+from rhythmid.simulation.command_hold import RAMP, TIMEOUT, CommandHold
 from rhythmid.simulation.plant import Plant
 
+from .authority import Authority
 from .clock import Clock, Grid
+from .effort_limits import EffortLimits
 from .joint_state import JointStateReader, JointStateWriter
 from .lateness import Lateness
 from .lockstep import Acknowledger, Credit, block
-from .node import COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, run
+from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, lapse_notice, run
 from .parameters import Parameter
-from .qos import stream
+from .qos import stream, subscribe_informed
+from .sample import Sample
 
 _LARGE = 1e12
 PARAMETERS = (
@@ -31,6 +36,10 @@ PARAMETERS = (
     WINDOW,
     COUNT,
     PRIORITY,
+    CATCH_UP,
+    Parameter("max_effort", math.inf, "largest |effort| of a command; what exceeds it is clamped", "N", (0.0, math.inf)),
+    Parameter("command_timeout", TIMEOUT, "hold of a command that is not renewed; 0: for ever", "s", (0.0, 3600.0)),
+    Parameter("command_ramp", RAMP, "fading of a command after that", "s", (0.0, 3600.0)),
     Parameter("model", "", "model YAML file of the machine"),
     Parameter("elements", None, "folders with further elements that the model names", items=str),
     Parameter("forcing_amplitude", 1.0, "periodic forcing made on the machine; 0: none", "N", (-_LARGE, _LARGE)),
@@ -59,8 +68,10 @@ class PlantNode(GraphNode):
         profile = stream(self.lockstep)
         self._states = self.create_publisher(JointState, "plant/joint_states", profile)
         self._forcing = self.create_publisher(JointState, "forcing", profile)
-        self._command_topic = self.resolve_topic_name("command")
-        self._commands = self._foreign = self._samples = 0
+        self._authority = Authority(self, "command", self.trip)
+        self._hold = CommandHold(self.values["command_timeout"], self.values["command_ramp"], self.period_ns)
+        self._limits = EffortLimits(size=self.values["max_effort"])
+        self._commands = self._clamped = self._other_joint = self._samples = 0
         self._newest_ns = -1
         self._grid: Grid | None = None
         if self.lockstep:
@@ -78,15 +89,17 @@ class PlantNode(GraphNode):
                 self.period_ns,
                 self._advance_lockstep,
             )
-            self.create_subscription(JointState, "command", self._on_lockstep, profile, raw=True)
+            subscribe_informed(self, JointState, "command", self._on_lockstep, profile)
         else:
             self._wall = Clock()
             self._origin_ns: int | None = None
             self._transport = Lateness(self.period_ns)  # by which commands acted later than they were stamped
             self._done_ns = 0  # time since the origin up to which the plant has been integrated
             self._arrived: deque[tuple[int, int, float]] = deque()
-            self.create_subscription(JointState, "command", self._on_realtime, profile, raw=True)
-            self._grid = Grid(self._wall, self.period_ns, self._tick, self.values["priority"])
+            subscribe_informed(self, JointState, "command", self._on_realtime, profile)
+            self._grid = Grid(
+                self._wall, self.period_ns, self._tick, self.values["priority"], self.values["catch_up"]
+            )
             self.workers.append(self._grid)
 
     def _build(self) -> Plant:
@@ -111,31 +124,56 @@ class PlantNode(GraphNode):
         return plant()
 
     def figures(self) -> dict[str, str]:
-        figures = {"samples": str(self._samples), "commands": str(self._commands)}
+        figures = {
+            "samples": str(self._samples),
+            "commands": str(self._commands),
+            "clamped_commands": str(self._clamped),
+            "lapsed_commands": str(self._hold.lapses),
+            **self._authority.figures(),
+        }
         if self._grid is None:
             return figures
         late = {
             "late_commands": str(self._transport.late),
             **self._transport.summary("transport"),
-            "foreign_commands": str(self._foreign),
+            "commands_of_other_joints": str(self._other_joint),
         }
         return {**figures, **late, **self._grid.figures()}
 
     def obstacles(self) -> list[str]:
         found = []
-        if self.count_publishers(self._command_topic) == 0:
-            found.append(f"no publisher of {self._command_topic}")
+        if self.count_publishers(self._authority.topic) == 0:
+            found.append(f"no publisher of {self._authority.topic}")
         if self._states.get_subscription_count() == 0:
             found.append(f"no subscriber of {self._states.topic}")
         return found
 
-    def _publish(self, until_ns: int, origin_ns: int) -> None:
+    def _accepted(self, data: bytes, about: dict[str, Any]) -> Sample | None:
+        """The command in a message, clamped; None if it is not to be obeyed."""
+        if self.tripped or not self._authority.admits(about):
+            return None
+        sample = self._reader.read(data)
+        if sample is None:
+            self._other_joint += 1
+            return None
+        if not math.isfinite(sample.effort):
+            self.trip(f"a command of {sample.effort} on {self._authority.topic}")
+            return None
+        effort = self._limits.apply(sample.effort, 0.0, 0.0)
+        self._clamped += effort != sample.effort
+        return sample._replace(effort=effort)
+
+    def _tell_lapse(self) -> None:
+        if self._hold.lapses:
+            self.notice(lapse_notice(self.values["command_timeout"]))
+
+    def _publish(self, until_ns: int, origin_ns: int, newest_only: bool = False) -> None:
         samples = self._plant.advance(until_ns)
         rows = zip(
             samples.stamp_ns.tolist(), samples.position.tolist(), samples.velocity.tolist(),
             samples.effort.tolist(), samples.forcing.tolist(), strict=True,
         )  # fmt: skip
-        for stamp_ns, position, velocity, effort, forcing in rows:
+        for stamp_ns, position, velocity, effort, forcing in list(rows)[-1 if newest_only else 0 :]:
             stamp_ns += origin_ns
             self._states.publish(self._state_writer.write(stamp_ns, position, velocity, effort))
             self._forcing.publish(self._forcing_writer.write(stamp_ns, forcing))
@@ -143,15 +181,19 @@ class PlantNode(GraphNode):
 
     # Lockstep: a command stamped s tells that every command up to s is known, so the plant may go on to s.
 
-    def _on_lockstep(self, data: bytes) -> None:
-        sample = self._reader.read(data)
+    def _on_lockstep(self, data: bytes, about: dict[str, Any]) -> None:
+        sample = self._accepted(data, about)
         if sample is None:
-            raise InputError(f"a command does not name the joint {self.values['joint']!r}")
+            if self._other_joint:
+                raise InputError(f"a command does not name the joint {self.values['joint']!r}")
+            return
         self._block_stamps.append(sample.stamp_ns)
         self._block_efforts.append(sample.effort)
         self._commands += 1
         if len(self._block_stamps) == self._block or self._commands >= self._count:
-            self._plant.push_many(np.array(self._block_stamps, dtype=np.int64), np.array(self._block_efforts))
+            stamps, efforts = np.array(self._block_stamps, dtype=np.int64), np.array(self._block_efforts)
+            self._plant.push_many(*self._hold.fill(stamps, efforts))
+            self._tell_lapse()
             self._newest_ns = sample.stamp_ns
             self._block_stamps.clear()
             self._block_efforts.clear()
@@ -167,12 +209,10 @@ class PlantNode(GraphNode):
     # Real time: a command acts from its stamp on, which is when it was released, even between two ticks; one that
     # comes after the plant has passed its stamp acts at once; later than a sample period, it is counted as late.
 
-    def _on_realtime(self, data: bytes) -> None:
-        sample = self._reader.read(data)
-        if sample is None:
-            self._foreign += 1
-            return
-        self._arrived.append((sample.stamp_ns, self._wall.now(), sample.effort))
+    def _on_realtime(self, data: bytes, about: dict[str, Any]) -> None:
+        sample = self._accepted(data, about)
+        if sample is not None:
+            self._arrived.append((sample.stamp_ns, self._wall.now(), sample.effort))
 
     def _tick(self, stamp_ns: int) -> None:
         if self._origin_ns is None:
@@ -183,11 +223,26 @@ class PlantNode(GraphNode):
             stamped_ns = act_ns
             act_ns = max(act_ns, self._done_ns, self._newest_ns + 1)
             self._transport.add(act_ns - stamped_ns)
-            self._plant.push(act_ns, effort)
-            self._newest_ns = act_ns
+            self._fade_until(act_ns - 1)
+            self._push(act_ns, effort)
+            self._hold.renew(act_ns, effort)
             self._commands += 1
-        self._done_ns = stamp_ns - self._origin_ns
-        self._publish(self._done_ns, self._origin_ns)
+        done_ns, self._done_ns = self._done_ns, stamp_ns - self._origin_ns
+        if self.tripped:
+            self._push(max(done_ns, self._newest_ns + 1), 0.0)
+            self._hold.renew(self._newest_ns, 0.0)
+        self._fade_until(self._done_ns)
+        self._publish(self._done_ns, self._origin_ns, newest_only=True)
+
+    def _fade_until(self, stamp_ns: int) -> None:
+        """The steps of a command that was not renewed, up to a time since the origin."""
+        for step_ns, effort in self._hold.until(stamp_ns):
+            self._push(step_ns, effort)
+        self._tell_lapse()
+
+    def _push(self, stamp_ns: int, effort: float) -> None:
+        self._plant.push(stamp_ns, effort)
+        self._newest_ns = stamp_ns
 
 
 def main() -> None:

@@ -6,7 +6,6 @@ import importlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from rclpy.event_handler import QoSMessageLostInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
@@ -14,10 +13,13 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from rhythmid.errors import InputError
 
+from .sequence_gaps import SequenceGaps
+
 WINDOW_MAX = 100
 """Largest credit window: more messages in flight than this overflow the transport's queues."""
 
-_DISCOVERY_PERIOD = 0.05
+_DISCOVERY_PERIOD = 0.05  # seconds between two looks for the first publisher
+_ATTENTION_PERIOD_NS = 1_000_000_000  # between two looks for publishers that join later
 
 
 def stream(lockstep: bool) -> QoSProfile:
@@ -51,6 +53,14 @@ def adapted(publishers: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
     )
 
 
+def weaker(profile: QoSProfile, than: QoSProfile) -> bool:
+    """Whether a publisher that `profile` hears may be one that a subscription `than` does not."""
+    best_effort, volatile = ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.VOLATILE
+    return (profile.reliability == best_effort != than.reliability) or (
+        profile.durability == volatile != than.durability
+    )
+
+
 def message_type(name: str) -> type:
     """The Python class of a ROS message type such as `sensor_msgs/msg/JointState`."""
     try:
@@ -62,12 +72,31 @@ def message_type(name: str) -> type:
         ) from None
 
 
-class AdaptiveSubscription:
-    """A raw subscription made as soon as a publisher shows its type and quality of service.
+def subscribe_informed(
+    node: Node,
+    message: type,
+    topic: str,
+    callback: Callable[[bytes, dict[str, Any]], None],
+    profile: QoSProfile,
+) -> Subscription:
+    """A raw subscription whose `callback(data, about)` gets what the middleware says about each message, too: times and number."""
 
-    `callback(data, received_ns)` gets a message and when the middleware received it [ns since the epoch], which on a busy machine
-    is long before the callback's turn; 0 if it does not say. `found(type_name, publishers)` is called once, before the first message. `lost` counts the messages that the
-    transport says it could not deliver.
+    def receive(*taken: Any) -> None:
+        callback(*(taken[0] if len(taken) == 1 else taken))
+
+    subscription = node.create_subscription(message, topic, receive, profile, raw=True)
+    # the events executor hands over message and info as one pair; rclpy would not ask for the info of such a callback
+    subscription._callback_type = Subscription.CallbackType.WithMessageInfo
+    return subscription
+
+
+class AdaptiveSubscription:
+    """A raw subscription made as soon as a publisher shows its type and quality of service, and made anew when a publisher
+    comes that it would not hear.
+
+    `callback(data, received_ns)` gets a message and when the middleware received it [ns since the epoch], which on a busy
+    machine is long before the callback's turn; 0 if it does not say. `found(type_name, publishers)` is called once, before
+    the first message. A message for which `admits(about)` is false is left out.
     """
 
     def __init__(
@@ -77,35 +106,47 @@ class AdaptiveSubscription:
         callback: Callable[[bytes, int], None],
         found: Callable[[str, Sequence[TopicEndpointInfo]], None] | None = None,
         depth: int = 2000,
+        admits: Callable[[dict[str, Any]], bool] = lambda _about: True,
     ) -> None:
         self.topic = node.resolve_topic_name(topic)
         self.subscription: Subscription | None = None
-        self.lost = 0
+        self._gaps = SequenceGaps()
         self._node, self._callback, self._found, self._depth = node, callback, found, depth
+        self._admits = admits
         self._timer = node.create_timer(_DISCOVERY_PERIOD, self._look)
 
     @property
     def matched(self) -> bool:
         return self.subscription is not None and self._node.count_publishers(self.topic) > 0
 
+    @property
+    def lost(self) -> int:
+        """Messages that were sent before the newest one and did not arrive."""
+        return self._gaps.lost
+
     def _look(self) -> None:
         publishers = self._node.get_publishers_info_by_topic(self.topic)
         if not publishers:
             return
-        self._timer.cancel()
-        type_name = publishers[0].topic_type
-        if self._found is not None:
-            self._found(type_name, publishers)
+        if self.subscription is None:
+            self._timer.timer_period_ns = _ATTENTION_PERIOD_NS
+            if self._found is not None:
+                self._found(publishers[0].topic_type, publishers)
+            self._subscribe(publishers)
+        elif weaker(adapted(publishers, self._depth), self._profile):
+            self._node.destroy_subscription(self.subscription)
+            self._subscribe(publishers)
+
+    def _subscribe(self, publishers: Sequence[TopicEndpointInfo]) -> None:
+        self._profile = adapted(publishers, self._depth)
         self.subscription = self._node.create_subscription(
-            message_type(type_name), self.topic, self._receive, adapted(publishers, self._depth), raw=True,
-            event_callbacks=SubscriptionEventCallbacks(message_lost=self._on_lost),
-        )  # fmt: skip
+            message_type(publishers[0].topic_type), self.topic, self._receive, self._profile, raw=True
+        )
         # the events executor hands over message and info as one pair; rclpy would not ask for the info of such a callback
         self.subscription._callback_type = Subscription.CallbackType.WithMessageInfo
 
     def _receive(self, *taken: Any) -> None:
         data, about = taken[0] if len(taken) == 1 else taken
-        self._callback(data, about["received_timestamp"])
-
-    def _on_lost(self, event: QoSMessageLostInfo) -> None:
-        self.lost = event.total_count
+        if self._admits(about):
+            self._gaps.add(about["publication_sequence_number"])
+            self._callback(data, about["received_timestamp"])

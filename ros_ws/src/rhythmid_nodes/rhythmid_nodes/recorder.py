@@ -1,11 +1,14 @@
 """recorder: writes topics of any type to a bag; says what it lost, and leaves a valid bag whenever it can.
 
-Services `~/pause` and `~/resume` (std_srvs/Trigger).
+Services, named as rosbag2's recorder names them: `~/pause`, `~/resume`, `~/toggle_paused`, `~/is_paused` and
+`~/split_bagfile`. Their type is std_srvs/Trigger, as rosbag2_interfaces is not everywhere; of `~/is_paused` the answer
+is `success`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +17,19 @@ from std_srvs.srv import Trigger
 
 from rhythmid.errors import InputError
 
-from .bag import LiveBag
+from .bag import LiveBag, Storage
 from .clock import Clock
 from .joint_state import stamp_of
 from .lockstep import Acknowledger
 from .node import COUNT, RATE, TIME_MODE, WINDOW, GraphNode, run
 from .parameters import Parameter
 from .qos import AdaptiveSubscription, message_type
+from .stamp_order import Message, StampOrder
+from .track import Track
 
-_STREAM = "sensor_msgs/msg/JointState"
+_LOOK_PERIOD = 0.2  # seconds between two looks for topics whose names match
+_STATE = "run"  # what the excitation says when it begins and when it ends; it bears no stamp
+_TEXT = "std_msgs/msg/String"
 PARAMETERS = (
     RATE,
     TIME_MODE,
@@ -30,53 +37,15 @@ PARAMETERS = (
     COUNT,
     Parameter("path", "", "folder of the bag; must not exist"),
     Parameter("storage", "mcap", "file format", choices=("mcap", "sqlite3")),
-    Parameter("topics", ["excitation", "joint_states", "forcing", "run"], "what to record"),
+    Parameter("topics", ["excitation", "joint_states", "forcing", "run"], "what to record, whether or not it is there yet"),
+    Parameter("regex", "", "records also every topic whose full name this regular expression finds; realtime only"),
+    Parameter("exclude_regex", "", "of the topics that `regex` finds, those that are left out"),
+    Parameter("start_paused", False, "records nothing until ~/resume is called"),
     Parameter("flush_period", 1.0, "time after which what was received survives a crash", "s", (0.1, 60.0)),
     Parameter("queue_size", 200_000, "messages waiting for the disk at most; more are dropped", "", (1, 10**7)),
+    Parameter("max_bagfile_size", 0, "size of the messages at which the next file is begun; 0: none", "bytes", (0, 2**62)),
+    Parameter("max_bagfile_duration", 0.0, "time after which the next file is begun; 0: none", "s", (0.0, 1e9)),
 )  # fmt: skip
-
-
-class Track:
-    """One recorded topic: what came in, checked by the stamps of the headers."""
-
-    def __init__(self, period_ns: int) -> None:
-        self.received = 0
-        self.type_name = ""
-        self.has_header = False
-        self._period_ns = period_ns
-        self._stamped = self._duplicates = self._backwards = self._longest_ns = 0
-        self._first_ns = self._previous_ns = self._last_ns = 0
-        self._on_grid = True
-
-    @property
-    def is_stream(self) -> bool:
-        """Whether it carries one message for every sample of the grid."""
-        return self.type_name == _STREAM
-
-    def add(self, stamp_ns: int) -> None:
-        """Take note of the header stamp [ns] of the next message."""
-        if self._stamped == 0:
-            self._first_ns = self._previous_ns = self._last_ns = stamp_ns
-        else:
-            step = stamp_ns - self._previous_ns
-            self._duplicates += step == 0
-            self._backwards += step < 0
-            self._on_grid = self._on_grid and step % self._period_ns == 0
-            self._longest_ns = max(self._longest_ns, step)
-            self._last_ns = max(self._last_ns, stamp_ns)
-            self._previous_ns = stamp_ns
-        self._stamped += 1
-
-    def check(self) -> str:
-        """Rate, duplicates, steps back, longest interval; missing samples where the stamps lie on a grid."""
-        span_ns = self._last_ns - self._first_ns
-        if span_ns == 0:
-            return ""
-        rate = (self._stamped - 1) / (span_ns * 1e-9)
-        found = f", {rate:.3f} Hz, {self._duplicates} duplicates, {self._backwards} backwards"
-        if self.is_stream and self._on_grid:
-            found += f", {span_ns // self._period_ns + 1 - (self._stamped - self._duplicates)} missing"
-        return f"{found}, longest interval {self._longest_ns * 1e-6:.3f} ms"
 
 
 class Recorder(GraphNode):
@@ -85,27 +54,50 @@ class Recorder(GraphNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("recorder", PARAMETERS, **options)
         values = self.values
+        self._regex, self._exclude = self._expression("regex"), self._expression("exclude_regex")
+        # `topics` has a default, and who gives an expression instead does not want it
+        named = [] if self._regex and not self._given("topics") else values["topics"]
         if not values["path"]:
             raise InputError("parameter path is missing: name the folder of the bag")
-        if not values["topics"]:
+        if not named and not self._regex:
             raise InputError("parameter topics is empty: name what to record")
-        self._paused = self._closed = False
+        if self._regex and self.lockstep:
+            raise InputError("parameter regex: in lockstep every topic must be named; use topics")
+        self._paused, self._closed = values["start_paused"], False
         self._skipped = 0
         self._wall = Clock()
         self._simulated_ns = 0
         self._streams: list[Track] = []  # filled when every topic has been found
+        self._order: StampOrder | None = None  # in lockstep, when every topic has been found
+        self._early: list[Message] = []  # what came before
+        self._found: dict[str, tuple[str, Sequence[TopicEndpointInfo]]] = {}
         self._ack = (
             Acknowledger(self, values["window"], self.period_ns, values["count"]) if self.lockstep else None
         )
         self._bag = LiveBag(
-            Path(values["path"]), values["storage"], values["flush_period"], values["queue_size"]
-        )
+            Storage(
+                Path(values["path"]), values["storage"], values["flush_period"], values["queue_size"],
+                values["max_bagfile_size"], values["max_bagfile_duration"], by_message_time=self.lockstep,
+            )
+        )  # fmt: skip
         self._bag.open()
         self.workers.append(self._bag)
-        self._tracks = {self.resolve_topic_name(topic): Track(self.period_ns) for topic in values["topics"]}
-        self._inputs = {topic: self._subscribe(topic, track) for topic, track in self._tracks.items()}
-        self.create_service(Trigger, "~/pause", self._on_pause)
-        self.create_service(Trigger, "~/resume", self._on_resume)
+        self._tracks: dict[str, Track] = {}
+        self._inputs: dict[str, AdaptiveSubscription] = {}
+        for topic in dict.fromkeys(self.resolve_topic_name(name) for name in named):
+            self._tracks[topic] = Track(self.period_ns)
+        for topic in self._tracks:
+            self._subscribe(topic)
+        if self._regex:
+            self.create_timer(_LOOK_PERIOD, self._look_for_topics)
+        for name, act in {
+            "pause": self._pause,
+            "resume": self._resume,
+            "toggle_paused": self._toggle,
+            "is_paused": lambda: (self._paused, "paused" if self._paused else "recording"),
+            "split_bagfile": self._split,
+        }.items():
+            self.create_service(Trigger, f"~/{name}", _answering(act))
 
     def begin(self) -> None:
         """Nothing to start: the bag's thread runs since the bag was opened."""
@@ -127,55 +119,141 @@ class Recorder(GraphNode):
         return [f"no publisher of {topic}" for topic, sub in self._inputs.items() if not sub.matched]
 
     def close(self) -> None:
+        if self.lockstep and not self._closed:
+            if self._order is None:  # not every topic was found
+                self._begin_order()
+            assert self._order is not None
+            self._put_all(self._order.rest())
         self._closed = True
         super().close()
 
-    def _subscribe(self, topic: str, track: Track) -> AdaptiveSubscription:
+    # Topics
+
+    def _given(self, name: str) -> bool:
+        return name in self._parameter_overrides
+
+    def _expression(self, name: str) -> re.Pattern[str] | None:
+        try:
+            return re.compile(self.values[name]) if self.values[name] else None
+        except re.error as error:
+            raise InputError(
+                f"parameter {name} = {self.values[name]!r} is no regular expression: {error}"
+            ) from None
+
+    def _look_for_topics(self) -> None:
+        for topic, types in self.get_topic_names_and_types():
+            if topic in self._tracks or not self._regex or not self._regex.search(topic):
+                continue
+            if self._exclude and self._exclude.search(topic):
+                continue
+            self._tracks[topic] = Track(self.period_ns)
+            try:
+                message_type(types[0])
+            except InputError as problem:
+                self.get_logger().warning(f"{topic} is not recorded: {problem}")
+            else:
+                self._subscribe(topic)
+
+    def _subscribe(self, topic: str) -> None:
+        track = self._tracks[topic]
+
         def found(type_name: str, publishers: Sequence[TopicEndpointInfo]) -> None:
             fields = message_type(type_name).get_fields_and_field_types()
             track.type_name = type_name
             track.has_header = next(iter(fields.values()), "") == "std_msgs/Header"
-            self._bag.add_topic(topic, type_name, publishers)
-            if all(known.type_name for known in self._tracks.values()):
+            if not self.lockstep:
+                self._bag.add_topic(topic, type_name, publishers)
+                return
+            self._found[topic] = type_name, publishers
+            if len(self._found) == len(self._tracks):
+                self._begin_order()
                 self._streams = [known for known in self._tracks.values() if known.is_stream]
 
         def receive(data: bytes, received_ns: int) -> None:
             self._receive(topic, track, data, received_ns)
 
-        return AdaptiveSubscription(self, topic, receive, found)
+        self._inputs[topic] = AdaptiveSubscription(self, topic, receive, found)
+
+    def _begin_order(self) -> None:
+        """Declare the topics, now that all are known, and let go what came before."""
+        present = [topic for topic in self._tracks if topic in self._found]
+        for topic in present:
+            self._bag.add_topic(topic, *self._found[topic])
+        state = self.resolve_topic_name(_STATE)
+        streams = [topic for topic in present if self._tracks[topic].is_stream]
+        self._order = StampOrder(present, streams, state if state in present else None)
+        for message in self._early:
+            self._order.add(*message)
+        self._early.clear()
+
+    # Messages
 
     def _receive(self, topic: str, track: Track, data: bytes, received_ns: int) -> None:
         track.received += 1
+        if track.type_name == _TEXT:
+            data = unpadded_text(data)
         stamp_ns = stamp_of(data) if track.has_header else 0
         if self._paused:
             self._skipped += 1
         else:
             if track.has_header:
                 track.add(stamp_ns)
-            self._bag.put(topic, self._receive_time(track, stamp_ns, received_ns), data)
+            if self.lockstep:
+                self._put_in_order(topic, track, stamp_ns, data)
+            else:
+                self._bag.put(topic, received_ns or self._wall.now(), data)
         if self._ack is not None and self._streams:
             self._ack.taken(min([stream.received for stream in self._streams]))
 
-    def _receive_time(self, track: Track, stamp_ns: int, received_ns: int) -> int:
-        """When the middleware received it, or in lockstep the simulated time: the newest stamp of any stream."""
-        if not self.lockstep:
-            return received_ns or self._wall.now()
+    def _put_in_order(self, topic: str, track: Track, stamp_ns: int, data: bytes) -> None:
+        """In lockstep the receive time is the stamp; of a topic without one, the newest stamp of any stream."""
         if track.is_stream:
             self._simulated_ns = max(self._simulated_ns, stamp_ns)
-            return stamp_ns
-        return self._simulated_ns
+        message = topic, stamp_ns if track.is_stream else self._simulated_ns, data
+        if self._order is None:
+            self._early.append(message)
+        else:
+            self._order.add(*message)
+            self._put_all(self._order.ready())
 
-    def _on_pause(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = not self._paused
-        response.message = "" if response.success else "already paused"
-        self._paused = True
+    def _put_all(self, messages: Iterable[Message]) -> None:
+        for message in messages:
+            self._bag.put(*message)
+
+    # Services: whether it was done, and why not
+
+    def _pause(self) -> tuple[bool, str]:
+        done, self._paused = not self._paused, True
+        return done, "" if done else "already paused"
+
+    def _resume(self) -> tuple[bool, str]:
+        done, self._paused = self._paused, False
+        return done, "" if done else "not paused"
+
+    def _toggle(self) -> tuple[bool, str]:
+        self._paused = not self._paused
+        return True, "paused" if self._paused else "recording"
+
+    def _split(self) -> tuple[bool, str]:
+        self._bag.split()
+        return True, ""
+
+
+def unpadded_text(data: bytes) -> bytes:
+    """A serialised std_msgs/String without the bytes by which some transports fill it up to a multiple of four."""
+    return data[: 8 + int.from_bytes(data[4:8], "little" if data[1] else "big")]
+
+
+def _answering(
+    act: Callable[[], tuple[bool, str]],
+) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
+    """A service that answers what `act` returns."""
+
+    def serve(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success, response.message = act()
         return response
 
-    def _on_resume(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = self._paused
-        response.message = "" if response.success else "not paused"
-        self._paused = False
-        return response
+    return serve
 
 
 def main() -> None:

@@ -1,0 +1,25 @@
+"""`rhythmid recover`: what is readable of a damaged recording, as a complete bag."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rhythmid.output import require_new
+
+
+def recover(
+    bag: Annotated[Path, typer.Argument(help="Bag directory, .mcap or .db3 file, broken off or damaged.")],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Bag to write: a new folder; BAG_recovered if not given."),
+    ] = None,
+) -> None:
+    """Write every whole message of a damaged recording to a new bag, and list what was lost. BAG is left as it is."""
+    from rhythmid.record.bag import Bag
+    from rhythmid.record.recover import recover as write_recovered
+
+    out = out or bag.with_name(f"{Bag(bag).name}_recovered")
+    require_new(out)
+    for line in write_recovered(bag, out).lines():
+        typer.echo(line)

@@ -1,0 +1,136 @@
+"""`rhythmid watch`: a model beside its machine, live or over a bag."""
+
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from rhythmid.commands.options import Elements, JsonFile, SignalsFile
+from rhythmid.errors import InputError
+from rhythmid.output import require_new, write_json
+
+if TYPE_CHECKING:
+    from rhythmid.twin.twin import Status
+    from rhythmid.twin.watch import Watch
+
+LIVE_GROUP = "rhythmid.live"  # entry points of packages that know how to reach a running robot
+
+
+def watch(
+    model: Annotated[Path, typer.Argument(help="Model of the machine, as identified, with its delays.")],
+    bag: Annotated[
+        Path | None, typer.Option("--bag", help="Watch a recording instead of the running machine.")
+    ] = None,
+    signals: SignalsFile = None,
+    healthy: Annotated[
+        float,
+        typer.Option("--healthy", metavar="SECONDS", help="Beginning that is taken for healthy operation."),
+    ] = 60.0,
+    false_alarms: Annotated[
+        float,
+        typer.Option("--false-alarms", metavar="A DAY", help="False alarms allowed in healthy operation."),
+    ] = 1.0,
+    calibration: Annotated[
+        Path | None,
+        typer.Option("--calibration", help="What --save-calibration wrote; nothing is learnt anew."),
+    ] = None,
+    save_calibration: Annotated[
+        Path | None, typer.Option("--save-calibration", help="Write what was learnt of the healthy machine.")
+    ] = None,
+    diagnose: Annotated[
+        bool, typer.Option(help="Diagnose the last minute of a mismatch that lasts for a minute.")
+    ] = True,
+    elements: Elements = None,
+    json: JsonFile = None,
+) -> None:
+    """Run a model beside its machine and say when, where and by how much the two part.
+
+    Without --bag the running machine is watched over ROS 2 until Ctrl-C.
+    """
+    require_new(json, save_calibration)
+    if bag is None:
+        raise typer.Exit(
+            _live(
+                model=model, signals=signals, healthy=healthy, false_alarms=false_alarms, calibration=calibration,
+                save_calibration=save_calibration, diagnose=diagnose, elements=tuple(elements or ()), json=json,
+            )
+        )  # fmt: skip
+    from rhythmid.elements.catalogue import load_catalogue
+    from rhythmid.model import Model
+    from rhythmid.record.read import read_record
+    from rhythmid.twin.kept import load, save
+    from rhythmid.twin.settings import Settings
+    from rhythmid.twin.watch import Watch, watch_record
+
+    catalogue = load_catalogue(elements or ())
+    machine = Model.load(model, catalogue)
+    record = read_record(bag, signals)
+    settings = Settings.of(record, healthy, false_alarms)
+    forced = record.forcing is not None
+    known = None if calibration is None else load(calibration, machine, settings, forced, catalogue)
+    watching = Watch(machine, settings, forced, known, catalogue, diagnose, tuple(elements or ()))
+    console, seen = Console(), _Told(watching)
+    watch_record(record, watching, seen.take)
+    if save_calibration is not None and watching.twin.calibration is not None:
+        save(watching.twin.calibration, save_calibration)
+    watching.close(wait=True)
+    result = seen.result(record.name)
+    for event in watching.events.found:
+        console.print(f"[bold red]mismatch[/] {escape(event.sentence())}")
+        if event.diagnosis is not None:
+            console.print(f"  diagnosis: {escape(event.diagnosis['summary'])}")
+    if not watching.events.found:
+        console.print(f"[green]no mismatch[/] in {result['watched']:.0f} s")
+    console.print(
+        f"innovations are {100.0 * result['nrmse']:.2g} % of the motion in healthy operation; "
+        f"{false_alarms:g} false alarms a day are allowed"
+    )
+    if json is not None:
+        write_json(json, result)
+
+
+class _Told:
+    """What a twin said of a bag: how long it watched, and its last delays."""
+
+    def __init__(self, watching: "Watch") -> None:
+        self._watching = watching
+        self._watched = 0.0
+        self._last: Status | None = None
+        self._before: float | None = None
+
+    def take(self, status: "Status") -> None:
+        if status.level != "learning":
+            if self._before is not None:
+                self._watched += status.time - self._before
+            self._before, self._last = status.time, status
+
+    def result(self, name: str) -> dict[str, Any]:
+        """Plain data for JSON."""
+        calibration = self._watching.twin.calibration
+        delays = {} if self._last is None else self._last.delays
+        return {
+            "record": name,
+            "watched": self._watched,
+            "level": None if self._last is None else self._last.level,
+            "nrmse": None if calibration is None else calibration.nrmse,
+            "events": [event.to_dict() for event in self._watching.events.found],
+            "delays": {key: {"value": one.value, "std": one.std, "unit": "s"} for key, one in delays.items()},
+        }
+
+
+def _live(**options: Any) -> int:
+    """Watch the running machine through whatever package knows how; the exit code."""
+    known = {entry.name: entry for entry in entry_points(group=LIVE_GROUP)}
+    if "watch" not in known:
+        raise InputError(
+            "watching a running machine needs the package rhythmid_bringup and ROS 2; a recording is watched with --bag"
+        )
+    try:
+        return known["watch"].load()(**options)
+    except ModuleNotFoundError as missing:
+        raise InputError(
+            f"watching a running machine needs ROS 2: {missing}; a recording is watched with --bag"
+        ) from None

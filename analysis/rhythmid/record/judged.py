@@ -1,0 +1,54 @@
+"""Quality of one channel as it was recorded."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.record.clock_skew import clock_skew
+from rhythmid.record.quality import ChannelQuality, clipped, resolution
+from rhythmid.record.stamp_jitter import stamp_jitter
+from rhythmid.record.timing import Timing
+
+Array = NDArray[np.float64]
+
+
+def judged(
+    source: str,
+    recorded: Array,
+    lateness: NDArray[np.floating] | None,
+    time: Array,
+    value: Array,
+    measured: bool,
+    missing: int,
+    conflicts: int,
+) -> ChannelQuality:
+    """Quality of a channel.
+
+    Parameters
+    ----------
+    source : where it comes from.
+    recorded, lateness : (m,) times [s] in the order of recording, and receipt less stamp [s]; None where there is no stamp.
+    time, value : (n,) times [s] in order, without duplicates, and values; NaN where one is missing.
+    measured : whether it is the output, whose samples tell of the jitter of its stamps.
+    missing, conflicts : messages without the channel's entry, and duplicates with other values.
+    """
+    absent = np.isnan(value)
+    present = value[~absent]
+    skew = None if lateness is None else clock_skew(recorded, lateness)
+    jitter = stamp_jitter([(time[~absent], present)]) if measured else None
+    return ChannelQuality(
+        source,
+        Timing.of(recorded),
+        nan=int(absent.sum()),
+        clipped=clipped(present),
+        missing=missing,
+        conflicts=conflicts,
+        lateness_mean=None if lateness is None else float(lateness.mean()),
+        lateness_max=None if lateness is None else float(lateness.max()),
+        lateness_min=None if lateness is None else float(lateness.min()),
+        lateness_std=None if lateness is None else float(lateness.std()),
+        skew=None if skew is None else skew.rate,
+        skew_std=None if skew is None else skew.std,
+        stamp_jitter=None if jitter is None else jitter.std,
+        stamp_jitter_std=None if jitter is None else jitter.uncertainty,
+        resolution=resolution(present),
+    )

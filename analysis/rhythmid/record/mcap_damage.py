@@ -1,0 +1,117 @@
+"""What of an MCAP file is damaged: chunks found again behind a break, checksums compared, counts of what was lost."""
+
+import struct
+import zlib
+from contextlib import suppress
+
+import numpy as np
+
+from rhythmid.record.mcap_writer import (
+    CHUNK,
+    DATA_END,
+    FOOTER,
+    MAGIC,
+    MESSAGE_INDEX,
+    STATISTICS,
+)
+
+FOOTER_SIZE = 9 + 8 + 8 + 4
+_DATA_END_SIZE = 9 + 4
+_PRIVATE = 0x80  # opcodes from here on are free for applications
+_METHODS = (b"", b"zstd", b"lz4")
+_WINDOW = 2**24  # bytes looked through at a time,
+_SEARCHED = 2**28  # and in all: no chunk is that long
+
+_head = struct.Struct("<BQ")
+
+
+def is_record(data: bytes | memoryview, at: int, end: int) -> bool:
+    """Whether a record that the format knows may stand at `at`."""
+    if at + 9 > end:
+        return False
+    op, size = _head.unpack_from(data, at)
+    if not 0 < op <= DATA_END and op < _PRIVATE:
+        return False
+    if op == MESSAGE_INDEX and at + 15 <= end:
+        return struct.unpack_from("<I", data, at + 11)[0] == size - 6
+    return True
+
+
+def is_chunk(data: bytes | memoryview, at: int, end: int) -> bool:
+    """Whether a whole chunk stands at `at`: the lengths within it must agree."""
+    if at + 9 + 40 > end or data[at] != CHUNK:
+        return False
+    size = _head.unpack_from(data, at)[1]
+    (length,) = struct.unpack_from("<I", data, at + 37)
+    if size > end - at - 9 or length > 4 or bytes(data[at + 41 : at + 41 + length]) not in _METHODS:
+        return False
+    return struct.unpack_from("<Q", data, at + 41 + length)[0] == size - 40 - length
+
+
+def find_chunk(data: memoryview, at: int) -> int | None:
+    """Where the next whole chunk begins, from `at` on; None if there is none within reach."""
+    end = len(data)
+    for begin in range(at, min(end, at + _SEARCHED), _WINDOW):
+        window = np.frombuffer(data[begin : min(end, begin + _WINDOW + 9)], dtype=np.uint8)
+        if len(window) < 9:
+            return None
+        high = window[6:-2] | window[7:-1] | window[8:]  # of a length, bytes that are zero below a terabyte
+        for place in np.flatnonzero((window[:-8] == CHUNK) & (high == 0)).tolist():
+            if is_chunk(data, begin + place, end):
+                return begin + place
+    return None
+
+
+def messages_in_chunk(data: bytes | memoryview, at: int) -> dict[int, int]:
+    """Messages by channel of the chunk that ends at `at`, as the index behind it tells; empty where there is none."""
+    found: dict[int, int] = {}
+    while at + 15 <= len(data) and data[at] == MESSAGE_INDEX and is_record(data, at, len(data)):
+        size = _head.unpack_from(data, at)[1]
+        channel, length = struct.unpack_from("<HI", data, at + 9)
+        found[channel] = found.get(channel, 0) + length // 16
+        at += 9 + size
+    return found
+
+
+def summary_start(data: bytes | memoryview) -> int:
+    """Where the summary begins; 0 if the file has none or its end is damaged."""
+    footer = len(data) - len(MAGIC) - FOOTER_SIZE
+    if footer < 0 or bytes(data[-len(MAGIC) :]) != MAGIC or data[footer] != FOOTER:
+        return 0
+    at = struct.unpack_from("<Q", data, footer + 9)[0]
+    return at if at <= footer else 0
+
+
+def counted(data: bytes | memoryview) -> dict[int, int]:
+    """Messages by channel, as the summary counts them; empty if it does not."""
+    at, end = summary_start(data), len(data) - len(MAGIC) - FOOTER_SIZE
+    with suppress(struct.error):
+        while at and is_record(data, at, end):
+            op, size = _head.unpack_from(data, at)
+            if op == STATISTICS:
+                length = struct.unpack_from("<I", data, at + 9 + 42)[0]
+                body = bytes(data[at + 9 + 46 : at + 9 + 46 + length])
+                return dict(struct.iter_unpack("<HQ", body))
+            at += 9 + size
+    return {}
+
+
+def wrong_checksums(data: bytes | memoryview) -> list[str]:
+    """What the checksums of a finished file say against it, one phrase each; a checksum of 0 says nothing."""
+    if bytes(data[-len(MAGIC) :]) != MAGIC:
+        return ["its end is damaged or missing"]
+    summary, footer = summary_start(data), len(data) - len(MAGIC) - FOOTER_SIZE
+    if not summary:
+        return []
+    found = []
+    stated = struct.unpack_from("<I", data, footer + FOOTER_SIZE - 4)[0]
+    if stated and zlib.crc32(data[summary : footer + FOOTER_SIZE - 4]) != stated:
+        found.append("its summary is not what was written: its checksum is wrong")
+    begin = summary - _DATA_END_SIZE
+    if begin >= 0 and data[begin] == DATA_END:
+        stated = struct.unpack_from("<I", data, begin + 9)[0]
+        if stated and zlib.crc32(data[:begin]) != stated:
+            found.append("its data are not what was written: their checksum is wrong")
+    elif begin >= 0:
+        found.append("the end of its data is damaged")
+    return found

@@ -1,0 +1,66 @@
+"""What of an sqlite3 bag is damaged: broken pages passed over, structure and checksums compared."""
+
+import sqlite3
+import struct
+
+from rhythmid.record.sqlite_writer import checksum
+
+
+def next_readable(database: sqlite3.Connection, after: int) -> int | None:
+    """The first row of `messages` behind `after` that can be read; None if there is none."""
+
+    def first(low: int) -> int | None:
+        row = database.execute(
+            "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ? ORDER BY id LIMIT 1", (low,)
+        ).fetchone()
+        return None if row is None else row[0]
+
+    try:
+        last = database.execute("SELECT max(id) FROM messages").fetchone()[0]
+    except sqlite3.DatabaseError:
+        return None
+    broken, step = after, 1
+    while isinstance(last, int) and broken + step < last:
+        try:
+            found = first(broken + step)
+            break
+        except sqlite3.DatabaseError:
+            broken, step = broken + step, 2 * step
+    else:
+        return None
+    whole = broken + step
+    while whole - broken > 1:  # rows behind `broken` cannot be read, those behind `whole` can
+        middle = (broken + whole) // 2
+        try:
+            found, whole = first(middle), middle
+        except sqlite3.DatabaseError:
+            broken = middle
+    return found
+
+
+def wrong_checksums(database: sqlite3.Connection) -> list[str]:
+    """What sqlite's own check and the checksums of messages, where there are any, say against a bag; one phrase each."""
+    found = []
+    try:
+        (answer,) = database.execute("PRAGMA quick_check(1)").fetchone()
+        if answer != "ok":
+            found.append(f"sqlite finds it damaged: {' '.join(str(answer).split())[:200]}")
+        if not database.execute("SELECT 1 FROM sqlite_master WHERE name = 'checksums'").fetchone():
+            return found
+        before = 0
+        for last, stated in database.execute("SELECT last_id, crc32 FROM checksums ORDER BY last_id"):
+            summed, count = 0, 0
+            rows = "SELECT topic_id, timestamp, data FROM messages WHERE id > ? AND id <= ? ORDER BY id"
+            for topic, time, data in database.execute(rows, (before, last)):
+                summed, count = checksum(topic, time, data, summed), count + 1
+            if summed != stated or count != last - before:
+                found.append(
+                    f"messages {before + 1} to {last} are not what was written: their checksum is wrong"
+                )
+            before = last
+        beyond = database.execute("SELECT count(*) FROM messages WHERE id > ?", (before,)).fetchone()[0]
+        if beyond:
+            found.append(f"{beyond} messages have no checksum")
+    except (sqlite3.DatabaseError, TypeError, ValueError, struct.error) as error:
+        found.append(f"its checksums cannot be compared: {error}")
+    return found

@@ -1,0 +1,179 @@
+"""Calibration: noise, random forces and scatter of a machine that is known to be healthy, from its first minute."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.errors import InputError
+from rhythmid.identify.noise import NoiseModel, estimate_noise
+from rhythmid.identify.series import block_length
+from rhythmid.model import Model
+from rhythmid.record.timing import nominal_period
+from rhythmid.twin.changes import Change, watched
+from rhythmid.twin.detector import Healthy, learn_healthy
+from rhythmid.twin.observer import Filter, Innovations, Observer
+from rhythmid.twin.samples import Samples
+from rhythmid.twin.score import Whitener
+from rhythmid.twin.segment import Simulation
+from rhythmid.twin.settings import Settings
+
+Array = NDArray[np.float64]
+SEGMENT = 0.2  # s
+BLOCKS = 4  # of a segment at least
+KICKS = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # candidates, of the usual speed in a segment
+TUNED = 60  # segments that random forces are tuned on
+PASSES = 3  # for each candidate, at most
+CLOSE = 0.1  # change of the noise's variance from pass to pass that is none
+SETTLED = 15  # segments until the beginning is forgotten, three of the seconds of which a minute has sixty
+ROUGH = 3  # differences of the measurement that leave noise and take motion away
+LEAST = 1e-9  # of the motion: noise that no sensor is below
+LOST = 0.5  # of the motion that innovations may be, above which the model is none of this machine
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """All that a twin knows of the healthy machine.
+
+    `nrmse` are the innovations as a share of the motion, `sizes` (p,) and `filter` what simulation and filter are made with.
+    """
+
+    model: Model
+    changes: tuple[Change, ...]
+    period: float
+    filter: Filter
+    sizes: Array
+    noise: NoiseModel
+    healthy: Healthy
+    nrmse: float
+
+    @property
+    def segment(self) -> float:
+        """Length of a segment [s]."""
+        return self.filter.samples * self.period
+
+
+def segments(time: Array, size: int) -> list[slice]:
+    """Whole segments of so many samples."""
+    return [slice(i, i + size) for i in range(0, len(time) - size + 1, size)]
+
+
+def calibrate(
+    model: Model,
+    catalogue: Catalogue,
+    settings: Settings,
+    output: Samples,
+    command: Samples,
+    forcing: Samples | None,
+) -> Calibration:
+    """Learn the healthy machine from a stretch of samples.
+
+    Raises InputError where the stretch shows no motion, or motion that the model does not make.
+    """
+    period = nominal_period(np.diff(output.time))
+    speed = _speed(output, period, settings)
+    if not speed > 0.0:
+        raise InputError(
+            "the healthy stretch shows no motion: a machine at rest tells nothing of its physics"
+        )
+    block = block_length(output.value, period)
+    size = max(round(SEGMENT / period), BLOCKS)
+    block = max(1, min(block, size // BLOCKS))
+    size = size // block * block
+    extended, changes = watched(model, catalogue, speed, settings.input_kind)
+    simulation = Simulation(extended, changes, settings, period)
+    scatter = _scatter(simulation, output, period, settings)
+    pieces = segments(output.time, size)
+    filter = _tuned(simulation, output, command, forcing, pieces, block, size, scatter)
+    scatter = filter.scatter
+    force = model.mass.value * speed**2 / max(float(np.std(output.value)), 1e-300)
+    sizes = np.array([_size(extended.value(c.name), c, force, speed, scatter[0]) for c in changes])
+    observer = Observer(simulation, filter, sizes)
+    found = _innovations(observer, output, command, forcing, pieces)[SETTLED:]
+    noise = estimate_noise([np.concatenate([one.white for one in found])])
+    whitener = Whitener(noise, len(changes))
+    scores = [whitener(one) for one in found]
+    healthy = learn_healthy(scores[1:], size * period, settings.false_alarms)
+    nrmse = float(np.sqrt(np.mean([one.rms**2 for one in found]))) / float(np.std(output.value))
+    if not nrmse < LOST:
+        raise InputError(
+            f"the model leaves {100.0 * nrmse:.0f} % of the motion in the healthy stretch: it is none of this machine; identify it first"
+        )
+    return Calibration(extended, changes, period, filter, sizes, noise, healthy, nrmse)
+
+
+def _speed(output: Samples, period: float, settings: Settings) -> float:
+    """Usual speed of the motion, in the model's unit."""
+    if settings.output_kind == "velocity":
+        return float(np.std(output.value))
+    block = block_length(output.value, period)
+    kept = output.value[: len(output.value) // block * block].reshape(-1, block).mean(axis=1)
+    return float(np.std(np.gradient(kept, block * period)))
+
+
+def _scatter(simulation: Simulation, output: Samples, period: float, settings: Settings) -> Array:
+    """First guess of the usual sizes of the states."""
+    scatter = np.full(simulation.states, 1e-3)
+    speed = _speed(output, period, settings)
+    scatter[1] = speed
+    scatter[0] = float(np.std(output.value)) if settings.output_kind == "position" else speed
+    return scatter
+
+
+def _size(value: float, change: Change, force: float, speed: float, position: float) -> float:
+    """Usual size of a parameter: its value, or where that is zero what it would be by its unit."""
+    if value != 0.0:
+        return abs(value)
+    unit = change.unit
+    if unit in ("N", "N*m"):
+        return force
+    if unit in ("N*s/m", "N*m*s/rad"):
+        return force / speed
+    return position if unit in ("m", "rad") else 1.0
+
+
+def _innovations(
+    observer: Observer, output: Samples, command: Samples, forcing: Samples | None, pieces: Sequence[slice]
+) -> list[Innovations]:
+    found = [observer.take(output.time[at], output.value[at], command, forcing) for at in pieces]
+    return [one for one in found if one is not None]
+
+
+def _tuned(
+    simulation: Simulation,
+    output: Samples,
+    command: Samples,
+    forcing: Samples | None,
+    pieces: Sequence[slice],
+    block: int,
+    size: int,
+    scatter: Array,
+) -> Filter:
+    """Noise and random forces under which the innovations are most likely.
+
+    Each candidate of the forces is tried with the noise that its own innovations show.
+    """
+    some = pieces[: SETTLED + TUNED]
+    averaged = output.value[: len(output.value) // block * block].reshape(-1, block).mean(axis=1)
+    rough = float(np.var(np.diff(averaged, ROUGH)))
+    noise = max(rough / comb(2 * ROUGH, ROUGH), (LEAST * scatter[0]) ** 2, 1e-300)
+    best, best_density = None, -np.inf
+    for kick in KICKS:
+        for _ in range(PASSES):
+            given = Filter(noise, (kick * scatter[1]) ** 2, scatter, block, size)
+            found = _innovations(Observer(simulation, given, None), output, command, forcing, some)[SETTLED:]
+            if len(found) < len(some) // 2:
+                break
+            squares = float(np.mean([np.mean(one.white**2) for one in found]))
+            density = sum(one.log_density for one in found)
+            if density > best_density:
+                best, best_density = given, density
+            noise = max(noise * min(max(squares, 0.1), 10.0), 1e-300)
+            if abs(squares - 1.0) < CLOSE:
+                break
+    if best is None:
+        raise InputError("the model diverges from the healthy machine's motion; identify the machine first")
+    return best

@@ -1,0 +1,119 @@
+"""Isolation: in which slot of the signal path the physics has changed, by how much, and the delays now."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.twin.changes import DELAYS, Change
+from rhythmid.twin.detector import Healthy
+from rhythmid.twin.score import Score, inverse
+
+Array = NDArray[np.float64]
+ODDS = 2.0 * np.log(20.0)  # in χ²: a slot is named alone when it is twenty times as likely as every other
+SHOWN = 0.5  # of the score statistic that the best change explains at least, or the physics is none of those known
+
+
+@dataclass(frozen=True)
+class Sized:
+    """A change with its size, its standard deviation and unit, and the χ² that it explains by itself."""
+
+    name: str
+    slot: str
+    size: float
+    std: float
+    unit: str
+    explained: float
+
+
+@dataclass(frozen=True)
+class Isolation:
+    """Where a mismatch lives.
+
+    `slot` explains most of it, `rivals` are slots that cannot be told from it, `share` is what each slot's best change explains
+    of the mismatch, `changes` those best changes, the most likely first. `slot` is "unknown" where none explains half of it.
+    `excess` is how much larger than by theory what they leave is.
+    """
+
+    slot: str
+    rivals: tuple[str, ...]
+    share: dict[str, float]
+    changes: tuple[Sized, ...]
+    excess: float
+
+
+def isolate(score: Score, healthy: Healthy, changes: Sequence[Change], excess: float) -> Isolation:
+    """The slot whose one change explains the score best.
+
+    `excess` is the overdispersion of the score in healthy operation. What the best change leaves counts, too: a change so large that
+    its effects are no longer proportional to its size leaves more than noise.
+    """
+    centred = healthy.centred(score)
+    information = np.diag(score.information)
+    inverted, rank = inverse(score.information)
+    whole = max(float(centred @ inverted @ centred), 1e-300)
+    best: dict[str, Sized] = {}
+    for index, change in enumerate(changes):
+        if not information[index] > 0.0:
+            continue
+        size = float(centred[index] / information[index])
+        explained = size**2 * float(information[index])
+        if change.slot not in best or explained > best[change.slot].explained:
+            std = float(1.0 / np.sqrt(information[index]))
+            best[change.slot] = Sized(change.name, change.slot, size, std, change.unit, explained)
+    ranked = sorted(best.values(), key=lambda one: -one.explained)
+    if ranked:
+        excess = max(excess, (whole - ranked[0].explained) / max(rank - 1, 1))
+    ranked = [replace(one, std=one.std * excess**0.5) for one in ranked]
+    share = {one.slot: min(1.0, one.explained / whole) for one in ranked}
+    if not ranked or share[ranked[0].slot] < SHOWN:
+        return Isolation("unknown", tuple(share), share, tuple(ranked), excess)
+    rivals = tuple(one.slot for one in ranked[1:] if ranked[0].explained - one.explained < ODDS * excess)
+    return Isolation(ranked[0].slot, rivals, share, tuple(ranked), excess)
+
+
+@dataclass(frozen=True)
+class DelayNow:
+    """A delay [s] as the last window shows it, with its standard deviation; None where it does not show."""
+
+    value: float
+    std: float | None
+
+
+def delays_now(
+    score: Score,
+    healthy: Healthy,
+    changes: Sequence[Change],
+    values: Sequence[float],
+    beside: str | None,
+    excess: float,
+) -> dict[str, DelayNow]:
+    """Both delays now, and their sum, from the score of a window.
+
+    `values` [s] are the model's delays in the order of `DELAYS`. They are estimated together, and together with the change
+    `beside`, which may be what has really happened.
+    """
+    names = [change.name for change in changes]
+    present = [name for name in DELAYS if name in names]
+    chosen = [names.index(name) for name in present]
+    if beside is not None and beside not in present:
+        chosen.append(names.index(beside))
+    found: dict[str, DelayNow] = {}
+    information = score.information[np.ix_(chosen, chosen)]
+    if not present or not np.all(np.diag(information) > 0.0):
+        return {
+            name.removesuffix("_delay.delay"): DelayNow(value, None) for name, value in zip(DELAYS, values)
+        }
+    inverted, rank = inverse(information)
+    shift = inverted @ healthy.centred(score)[chosen]
+    for place, name in enumerate(present):
+        value = values[DELAYS.index(name)]
+        std = float(np.sqrt(excess * inverted[place, place])) if rank == len(chosen) else None
+        found[name.removesuffix("_delay.delay")] = DelayNow(value + float(shift[place]), std)
+    if len(present) == len(DELAYS):
+        ones = np.zeros(len(chosen))
+        ones[: len(present)] = 1.0
+        total = sum(values) + float(ones @ shift)
+        found["sum"] = DelayNow(total, float(np.sqrt(excess * ones @ inverted @ ones)))
+    return found

@@ -1,0 +1,114 @@
+"""Extended Kalman filter that keeps a model beside the machine, and its normalised innovations.
+
+A segment of measurements is taken at once: the covariance of all its innovations is factored, which gives the same as taking
+one measurement after another, B. D. O. Anderson, J. B. Moore, Optimal Filtering, 1979, sections 3.1, 8.2 and 10.2. Between
+segments a random force kicks the mass: without it the filter would believe its model more and more, and follow no longer.
+
+What a change of physics does to the innovations is carried along: the change moves the outputs, and the filter follows in part.
+M. Basseville, I. V. Nikiforov, Detection of Abrupt Changes, 1993, section 7.2.5.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cholesky, solve_triangular
+
+from rhythmid.twin.samples import Samples
+from rhythmid.twin.segment import Inputs, Run, Simulation, Start
+
+Array = NDArray[np.float64]
+KNOWN = 3.0  # times its usual scatter: standard deviation of a state at the beginning
+
+
+@dataclass(frozen=True)
+class Filter:
+    """What the filter is made with.
+
+    `noise` is the variance of a block average of the measurement, `kick` that of the velocity by random forces in a segment,
+    `scatter` (q,) the usual sizes of the states, `block` the samples averaged into one, `samples` those of a segment.
+    """
+
+    noise: float
+    kick: float
+    scatter: Array
+    block: int
+    samples: int
+
+
+@dataclass(frozen=True)
+class Innovations:
+    """Innovations (m,) of a segment in units of their standard deviations, what a unit of each change does to them (m, p),
+    their log density up to a constant, and the rms of the innovations in the measurement's unit."""
+
+    white: Array
+    by_change: Array
+    log_density: float
+    rms: float
+
+
+class Observer:
+    """The filter at work, from segment to segment."""
+
+    def __init__(self, simulation: Simulation, given: Filter, sizes: Array | None) -> None:
+        self.simulation, self.given, self.sizes = simulation, given, sizes
+        self.start: Start | None = None
+        self.restarts = 0
+
+    def begin(self, stamps: Array, values: Array) -> None:
+        """Begin at the last of some samples, with position and velocity of the straight line through them."""
+        q = self.simulation.states
+        time = float(self.simulation.physical(stamps)[-1])
+        line = np.polynomial.Polynomial.fit(stamps - stamps[-1], values, 1)
+        state = np.zeros(q)
+        if self.simulation.settings.output_kind == "position":
+            state[:2] = line(0.0), line.deriv()(0.0)
+        elif self.simulation.settings.output_kind == "velocity":
+            state[1] = line(0.0)
+        self.start = Start(time, state)
+        self.covariance = np.diag((KNOWN * self.given.scatter) ** 2)
+        self.by_change = np.zeros((q, len(self.simulation.changes)))
+
+    def take(
+        self, stamps: Array, values: Array, command: Samples, forcing: Samples | None
+    ) -> Innovations | None:
+        """Take a segment of measurements in; None at the beginning and where the model diverges and is begun anew."""
+        if self.start is None:
+            self.begin(stamps, values)
+            return None
+        block, scatter = self.given.block, self.given.scatter
+        given = self.simulation.inputs(stamps, self.start, command, forcing)
+        run = self.simulation.run(given, self.start, block, scatter, self.sizes)
+        found = None if run is None else self._correct(run, given, values)
+        if found is None:
+            self.restarts += 1
+            self.begin(stamps, values)
+        return found
+
+    def _correct(self, run: Run, given: Inputs, values: Array) -> Innovations | None:
+        assert self.start is not None
+        error = values.reshape(-1, self.given.block).mean(axis=1) - run.output
+        sensitivity = run.by_start @ self.by_change + run.by_change
+        before = self.covariance.copy()
+        before[1, 1] += self.given.kick
+        spread = run.by_start @ before @ run.by_start.T + self.given.noise * np.eye(len(error))
+        try:
+            root = cholesky(spread, lower=True)
+        except (LinAlgError, ValueError):
+            return None
+        joined = np.column_stack([error, sensitivity, run.by_start @ before])
+        white = solve_triangular(root, joined, lower=True)
+        p = len(self.simulation.changes)
+        gain = white[:, 1 + p :].T  # of white innovations
+        state = self.start.state + gain @ white[:, 0]
+        again = self.simulation.rows(given, Start(self.start.time, state, self.start.past))
+        if again is None:
+            return None
+        rows, past = again
+        after = before - gain @ gain.T
+        self.covariance = run.end_by_start @ after @ run.end_by_start.T
+        self.covariance = 0.5 * (self.covariance + self.covariance.T)
+        self.by_change = run.end_by_start @ (self.by_change - gain @ white[:, 1 : 1 + p]) + run.end_by_change
+        self.start = Start(float(given.times[-1]), rows[-1, : self.simulation.states].copy(), past)
+        density = -0.5 * float(white[:, 0] @ white[:, 0]) - float(np.log(np.diag(root)).sum())
+        return Innovations(white[:, 0], white[:, 1 : 1 + p], density, float(np.sqrt(np.mean(error**2))))

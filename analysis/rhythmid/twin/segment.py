@@ -1,0 +1,214 @@
+"""A short stretch of the model's run, and what its start and every change of physics do to it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.model import Model
+from rhythmid.simulation.compiled import NO_HISTORY, compile_model
+from rhythmid.simulation.generated_source import Variant
+from rhythmid.simulation.signal import FAR, continuous, pieces
+from rhythmid.simulation.transport import command_delay, physical_times
+from rhythmid.twin.changes import Change
+from rhythmid.twin.samples import Samples
+from rhythmid.twin.settings import Settings
+
+Array = NDArray[np.float64]
+Pieces = tuple[Array, Array]
+SMALL = 1e-3  # of its scale, by which a state or parameter is moved to see what it does
+DELAY_STEP = (
+    2e-4  # s, likewise of a delay: below the sample period of most machines, above the rounding of times
+)
+MARGIN = 4  # samples on either side of a segment that a spline through a smooth signal takes
+LONGEST_STEP = 2e-3  # s of the integration: a hundredth of a period of 5 Hz
+DIVERGED = 1e100
+
+
+@dataclass(frozen=True)
+class Start:
+    """The machine at the end of the last segment: its time [s] there, state (q,), and the past that elements remember."""
+
+    time: float
+    state: Array
+    past: Array = field(default_factory=lambda: NO_HISTORY)
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What acts in a segment: the physical times of its samples (n,) [s], the command, the same `DELAY_STEP` later, the forcing."""
+
+    times: Array
+    command: Pieces
+    later: Pieces
+    forcing: Pieces
+
+
+@dataclass(frozen=True)
+class Run:
+    """A segment as simulated.
+
+    `output` (m,) are block averages, `states` (q,) those at its end, `by_start` (m, q) and `by_change` (m, p) what a unit of
+    each state at the start and of each change does to the output, `end_by_start` (q, q) and `end_by_change` (q, p) to the end.
+    """
+
+    output: Array
+    states: Array
+    by_start: Array
+    by_change: Array
+    end_by_start: Array
+    end_by_change: Array
+    past: Array
+
+
+class Simulation:
+    """A model, run from segment to segment over signals that come in."""
+
+    def __init__(self, model: Model, changes: tuple[Change, ...], settings: Settings, period: float) -> None:
+        self.model, self.changes, self.settings = model, changes, settings
+        self.compiled = compile_model(model, Variant(settings.input_kind, settings.output_kind))
+        self.parameters = self.compiled.layout.vector(model)
+        places = {name: index for index, (name, _) in enumerate(self.compiled.layout.parameters)}
+        self.places = [places.get(change.name) for change in changes]
+        self.max_step = min(period, LONGEST_STEP)
+
+    @property
+    def states(self) -> int:
+        """Length q of the state vector."""
+        return len(self.compiled.layout.states)
+
+    def command(self, samples: Samples, start: float, end: float, later: float = 0.0) -> Pieces:
+        """The command as it acts between two times [s], a constant `later` [s] than the model says; zero before the first."""
+        reach = later + self.longest_delay
+        time, value = samples.between(start - reach, end, MARGIN)
+        if len(time) == 0:
+            return pieces(None)
+        if self.settings.hold == "zero":
+            knots = np.maximum.accumulate(time + self._late(time) + later)
+            coefficients = np.zeros((4, len(time) + 1))
+            coefficients[0, 1:] = value
+            return np.concatenate([[-FAR], knots, [FAR]]), coefficients
+        if len(time) < 4:
+            return pieces(None)
+        signal = continuous(time, value, self.settings.hold)
+        knots, coefficients = pieces(signal)
+        knots = knots.copy()
+        knots[1:-1] += self._late(knots[1:-1]) + later
+        return knots, np.ascontiguousarray(coefficients)
+
+    @property
+    def longest_delay(self) -> float:
+        """Longest time [s] from a command's stamp until it acts."""
+        return float(self._late(np.zeros(1))[0])
+
+    def _late(self, stamps: Array) -> Array:
+        """How much later than their stamps commands act, (n,) [s]."""
+        late = command_delay(self.model, stamps)
+        return np.zeros(len(stamps)) if late is None else late
+
+    def forcing(self, samples: Samples | None, start: float, end: float) -> Pieces:
+        """The measured forcing between two times [s] as a smooth signal."""
+        if samples is None:
+            return pieces(None)
+        time, value = samples.between(start, end, MARGIN)
+        if len(time) < 2:
+            return pieces(None)
+        knots = np.concatenate([[-FAR], time, [FAR]])
+        return knots, np.ascontiguousarray(_hermite(time, value))
+
+    def physical(self, stamps: Array) -> Array:
+        """When measurements with these stamps were taken [s]."""
+        return physical_times(self.model, stamps)
+
+    def inputs(self, stamps: Array, start: Start, command: Samples, forcing: Samples | None) -> Inputs:
+        """What acts between a start and the last of the stamps."""
+        times = np.maximum(self.physical(stamps), start.time)
+        begin, end = start.time, float(times[-1])
+        later = self.command(command, begin, end, DELAY_STEP)
+        return Inputs(times, self.command(command, begin, end), later, self.forcing(forcing, begin, end))
+
+    def rows(
+        self, given: Inputs, start: Start, command: Pieces | None = None, parameters: Array | None = None
+    ) -> tuple[Array, Array] | None:
+        """Rows (n, q + 2) at the times after the start, and the past that elements remember; None where the run diverges.
+
+        `command` takes the place of the given one, `parameters` that of the model's.
+        """
+        times = given.times
+        none = pieces(None)
+        out = np.empty((len(times) + 1, self.states + 2))
+        done, past = self.compiled.resume(
+            np.concatenate([[start.time], times]), *(command or given.command), *given.forcing, *none,
+            self.parameters if parameters is None else parameters,
+            np.ascontiguousarray(start.state), self.max_step, out, start.past,
+        )  # fmt: skip
+        if done <= len(times) or not np.abs(out[-1]).max() < DIVERGED:
+            return None
+        return out[1:], past
+
+    def run(
+        self,
+        given: Inputs,
+        start: Start,
+        block: int,
+        scatter: Array,
+        sizes: Array | None,
+    ) -> Run | None:
+        """Simulate a stretch whose samples are a multiple of `block`.
+
+        `scatter` (q,) are the usual sizes of the states, `sizes` (p,) those of the changes; None leaves out what changes do.
+        None where the run diverges.
+        """
+        nominal = self.rows(given, start)
+        if nominal is None:
+            return None
+        rows, past = nominal
+        q, p = self.states, len(self.changes)
+
+        def averaged(output: Array) -> Array:
+            return output.reshape(-1, block).mean(axis=1)
+
+        output = averaged(rows[:, q])
+        by_start, end_by_start = np.zeros((len(output), q)), np.zeros((q, q))
+        by_change, end_by_change = np.zeros((len(output), p)), np.zeros((q, p))
+
+        def moved(other: tuple[Array, Array] | None, size: float) -> tuple[Array, Array]:
+            if other is None:
+                return np.zeros(len(output)), np.zeros(q)
+            return averaged(other[0][:, q] - rows[:, q]) / size, (other[0][-1, :q] - rows[-1, :q]) / size
+
+        for i in range(q):
+            size = SMALL * scatter[i]
+            state = start.state.copy()
+            state[i] += size
+            there = Start(start.time, state, start.past)
+            by_start[:, i], end_by_start[:, i] = moved(self.rows(given, there), size)
+        for i, change in enumerate(self.changes if sizes is not None else ()):
+            assert sizes is not None
+            if change.name == "measurement_delay.delay":
+                by_change[:, i] = -averaged(np.gradient(rows[:, q], given.times))
+            elif change.delay:
+                other = self.rows(given, start, command=given.later)
+                by_change[:, i], end_by_change[:, i] = moved(other, DELAY_STEP)
+            elif (place := self.places[i]) is not None:
+                size = SMALL * sizes[i]
+                parameters = self.parameters.copy()
+                parameters[place] += size
+                other = self.rows(given, start, parameters=parameters)
+                by_change[:, i], end_by_change[:, i] = moved(other, size)
+        return Run(output, rows[-1, :q].copy(), by_start, by_change, end_by_start, end_by_change, past)
+
+
+def _hermite(time: Array, value: Array) -> Array:
+    """Coefficients (4, n + 1) of cubic pieces through samples (n,), with central differences for slopes; constant outside.
+
+    E. Catmull, R. Rom, A class of local interpolating splines, in Computer Aided Geometric Design, 1974.
+    """
+    step, slope = np.diff(time), np.gradient(value, time)
+    rise = np.diff(value) / step
+    found = np.zeros((4, len(time) + 1))
+    found[0, 0], found[0, -1] = value[0], value[-1]
+    found[0, 1:-1], found[1, 1:-1] = value[:-1], slope[:-1]
+    found[2, 1:-1] = (3.0 * rise - 2.0 * slope[:-1] - slope[1:]) / step
+    found[3, 1:-1] = (slope[:-1] + slope[1:] - 2.0 * rise) / step**2
+    return found

@@ -1,0 +1,230 @@
+"""The live twin: a model that runs beside the machine, corrected by what is measured, and says when the two part.
+
+It is fed with samples as they come and judges them segment by segment. No ROS, no clock: time is that of the samples.
+"""
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.elements.catalogue import Catalogue, load_catalogue
+from rhythmid.model import Model
+from rhythmid.twin.calibration import Calibration, calibrate
+from rhythmid.twin.changes import DELAYS, without_own_forcing
+from rhythmid.twin.detector import Threshold
+from rhythmid.twin.isolation import DelayNow, Isolation, delays_now, isolate
+from rhythmid.twin.observer import Observer
+from rhythmid.twin.samples import Samples
+from rhythmid.twin.score import Score, Whitener
+from rhythmid.twin.segment import Simulation
+from rhythmid.twin.settings import Settings
+
+Array = NDArray[np.float64]
+Level = Literal["learning", "ok", "warn", "error"]
+Role = Literal["input", "output", "forcing"]
+CONFIRMED = 10.0  # s of mismatch after which a warning becomes an error
+PATIENCE = 1.0  # s that commands and forcing may be older than the measurement, before they are taken as held
+
+
+@dataclass(frozen=True)
+class Status:
+    """What the twin says after a segment.
+
+    Attributes
+    ----------
+    time : of the newest measurement judged [s].
+    level : learning in the healthy stretch; warn with the first mismatch, error when it has lasted ten seconds.
+    mismatch : the largest statistic as a multiple of its threshold.
+    innovation : rms of the normalised innovations of the last second, 1 in healthy operation.
+    since : when the mismatch was seen first [s], None without one.
+    isolation : where it lives, None without one.
+    delays : as the last window shows them: input, measurement and their sum.
+    """
+
+    time: float
+    level: Level
+    mismatch: float = 0.0
+    innovation: float = 1.0
+    since: float | None = None
+    isolation: Isolation | None = None
+    delays: dict[str, DelayNow] = field(default_factory=dict)
+
+
+class Twin:
+    """A model beside its machine.
+
+    Parameters
+    ----------
+    model : as identified, with its delays.
+    settings : how the signals are to be read, and the allowed rate of false alarms.
+    forced : whether the forcing is measured; else the model's own drives act.
+    calibration : of an earlier run of the twin; None: the first `settings.healthy` seconds are taken for healthy.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        settings: Settings,
+        forced: bool = True,
+        calibration: Calibration | None = None,
+        catalogue: Catalogue | None = None,
+    ) -> None:
+        self.model = without_own_forcing(model) if forced else model
+        self.settings, self.calibration = settings, calibration
+        self.samples: dict[Role, Samples] = {"input": Samples(), "output": Samples()}
+        if forced:
+            self.samples["forcing"] = Samples()
+        self._catalogue = load_catalogue() if catalogue is None else catalogue
+        self._taken = 0  # measurements of the buffer that have been judged
+        self._observer: Observer | None = None
+        self._since: float | None = None
+        self._below: float | None = None
+        self._after = 0  # segments since the mismatch was seen
+        if calibration is not None:
+            self._engage(calibration)
+
+    def push(self, role: Role, time: Array, value: Array) -> None:
+        """Samples of one signal: times [s] on one clock for all signals, increasing, and values; shapes (n,), (n,)."""
+        self.samples[role].append(np.asarray(time, dtype=float), np.asarray(value, dtype=float))
+
+    def advance(self) -> list[Status]:
+        """Judge all segments for which everything has come in; what is said of each.
+
+        Raises InputError when the healthy stretch is over and shows no motion, or motion that the model does not make.
+        """
+        output = self.samples["output"]
+        if self.calibration is None:
+            if not len(output) or output.newest - output.time[0] < self.settings.healthy + PATIENCE:
+                return [Status(output.newest, "learning")] if len(output) else []
+            self._learn()
+        calibration = self.calibration
+        assert calibration is not None
+        said = []
+        size = calibration.filter.samples
+        while self._taken + size <= len(output) and self._complete(
+            float(output.time[self._taken + size - 1])
+        ):
+            part = slice(self._taken, self._taken + size)
+            status = self._judge(calibration, output.time[part], output.value[part])
+            self._taken += size
+            if status is not None:
+                said.append(status)
+        self._forget()
+        return said
+
+    @property
+    def refused(self) -> int:
+        """Samples left out, not finite or not newer than the one before."""
+        return sum(one.refused for one in self.samples.values())
+
+    def _complete(self, time: float) -> bool:
+        """Whether all signals are known up to a time, or their sources silent."""
+        newest = self.samples["output"].newest
+        return all(
+            one.newest >= time or newest >= time + PATIENCE
+            for role, one in self.samples.items()
+            if role != "output"
+        )
+
+    def _learn(self) -> None:
+        output = self.samples["output"]
+        end = int(np.searchsorted(output.time, output.time[0] + self.settings.healthy))
+        stretch = Samples()
+        stretch.append(output.time[:end], output.value[:end])
+        self.calibration = calibrate(
+            self.model,
+            self._catalogue,
+            self.settings,
+            stretch,
+            self.samples["input"],
+            self.samples.get("forcing"),
+        )
+        self._engage(self.calibration)
+        self._taken = max(0, end - self.calibration.filter.samples)
+
+    def _engage(self, calibration: Calibration) -> None:
+        simulation = Simulation(calibration.model, calibration.changes, self.settings, calibration.period)
+        self._observer = Observer(simulation, calibration.filter, calibration.sizes)
+        self._whitener = Whitener(calibration.noise, len(calibration.changes))
+        longest = max(one.segments for one in calibration.healthy.thresholds)
+        self._scores: deque[Score] = deque(maxlen=longest)
+        self._settling = longest  # segments until what the filter was begun with is forgotten
+
+    def _judge(self, calibration: Calibration, time: Array, value: Array) -> Status | None:
+        assert self._observer is not None
+        found = self._observer.take(time, value, self.samples["input"], self.samples.get("forcing"))
+        if found is None:
+            self._settling = self._scores.maxlen or 1
+            return None
+        score = self._whitener(found)
+        if self._settling:
+            self._settling -= 1
+            return Status(float(time[-1]), "learning")
+        self._scores.append(score)
+        sums = [(self._last(one.segments), one) for one in calibration.healthy.thresholds]
+        if len(self._scores) < sums[-1][1].segments:
+            return Status(float(time[-1]), "ok")
+        return self._say(calibration, float(time[-1]), sums)
+
+    def _last(self, segments: int) -> Score:
+        """Score of the last segments."""
+        scores = list(self._scores)[-segments:]
+        return sum(scores[1:], scores[0])
+
+    def _say(self, calibration: Calibration, now: float, sums: list[tuple[Score, Threshold]]) -> Status:
+        """Status from the scores of all windows, the shortest first."""
+        healthy, (shortest, fast), (longest, slow) = calibration.healthy, sums[0], sums[-1]
+        mismatch = max(healthy.mismatch(total, one) for total, one in sums)
+        level = self._level(now, mismatch)
+        where = None
+        excess = slow.score_excess
+        if level != "ok":
+            longest = self._last(self._since_onset(fast.segments, slow.segments))
+            where = isolate(longest, healthy, calibration.changes, excess)
+            excess = where.excess
+            self._after += 1
+        values = [_delay(calibration.model, name) for name in DELAYS]
+        beside = None if where is None or not where.changes else where.changes[0].name
+        delays = delays_now(longest, healthy, calibration.changes, values, beside, excess)
+        squares = shortest.squares / max(shortest.count * fast.squares_mean, 1e-300)
+        return Status(now, level, mismatch, float(np.sqrt(squares)), self._since, where, delays)
+
+    def _since_onset(self, fast: int, slow: int) -> int:
+        """Segments that tell of a mismatch: those since it was seen, later without the transient of the short window."""
+        settled = self._after - fast
+        return min(settled if settled >= fast else max(self._after, 1), slow)
+
+    def _level(self, now: float, mismatch: float) -> Level:
+        """A mismatch lasts until it has been below its threshold for as long as the longest window."""
+        if mismatch >= 1.0:
+            if self._since is None:
+                self._since, self._after = now, 0
+            self._below = None
+        elif self._since is not None:
+            self._below = now if self._below is None else self._below
+            if now - self._below >= CONFIRMED:
+                self._since = self._below = None
+        if self._since is None:
+            return "ok"
+        return "error" if now - self._since >= CONFIRMED else "warn"
+
+    def _forget(self) -> None:
+        """Drop samples that no later segment needs."""
+        output = self.samples["output"]
+        if self._observer is None or self._taken == 0 or self._observer.start is None:
+            return
+        simulation = self._observer.simulation
+        keep = min(self._observer.start.time, float(output.time[self._taken - 1]))
+        keep -= simulation.longest_delay + PATIENCE
+        output.time, output.value = output.time[self._taken :], output.value[self._taken :]
+        self._taken = 0
+        for role, one in self.samples.items():
+            if role != "output":
+                one.forget(keep, keep=8)
+
+
+def _delay(model: Model, name: str) -> float:
+    return model.value(name) if name in model.parameters else 0.0

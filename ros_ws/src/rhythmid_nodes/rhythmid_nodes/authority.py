@@ -1,0 +1,79 @@
+"""Who may command: one publisher a topic. A second one is named, counted, and never obeyed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from .sequence_check import SequenceCheck
+
+_LOOK_PERIOD = (
+    0.02  # seconds between two looks at who publishes: a fifth of the time in which effort has to be zero
+)
+
+UNNAMED = "unnamed node"
+"""What a publisher's node is called while its name, which comes after the publisher, is not known."""
+
+
+class Authority:
+    """Watches who publishes on `topic`; `intrusion(reason)` is called whenever a second publisher comes, and again when its node's
+    name has come, too.
+
+    Attributes
+    ----------
+    topic : its full name.
+    """
+
+    def __init__(self, node: Node, topic: str, intrusion: Callable[[str], None]) -> None:
+        self.topic = node.resolve_topic_name(topic)
+        self._node, self._intrusion = node, intrusion
+        self._sequence = SequenceCheck()
+        self._told = ""  # the conflict that there is now
+        self._publishers = ""  # the newest conflict that there was
+        self._timer = node.create_timer(_LOOK_PERIOD, self._look)
+
+    @property
+    def foreign(self) -> int:
+        """Messages of other publishers, which were not obeyed."""
+        return self._sequence.foreign
+
+    def figures(self) -> dict[str, str]:
+        """For /diagnostics; the publishers only where there are too many."""
+        said = {"foreign_messages": str(self.foreign)}
+        return {**said, "conflict": self._publishers} if self._publishers else said
+
+    def admits(self, about: Mapping[str, Any]) -> bool:
+        """Whether a message is the one publisher's, by what the middleware says about it."""
+        admitted = self._sequence.admits(about["publication_sequence_number"], self._count)
+        if not admitted:
+            self._look()
+        return admitted
+
+    def conflict(self) -> str:
+        """Which publishers there are, if there is more than one; else empty."""
+        if self._count() <= 1:
+            return ""
+        found = self._node.get_publishers_info_by_topic(self.topic)
+        names = sorted(map(_name, found))
+        return f"{len(names)} publishers of {self.topic}: {', '.join(names)}" if len(names) > 1 else ""
+
+    def _count(self) -> int:
+        return self._node.count_publishers(self.topic)
+
+    def _look(self) -> None:
+        conflict = self.conflict()
+        if conflict and conflict != self._told:
+            self._publishers = conflict
+            if not self._told or UNNAMED in self._told:
+                self._intrusion(conflict)
+        self._told = conflict
+
+
+def _name(publisher: TopicEndpointInfo) -> str:
+    """Full name of a publisher's node; the publisher's own identifier while the node's name has not come yet."""
+    if "UNKNOWN" in publisher.node_name:
+        return f"{UNNAMED} {bytes(publisher.endpoint_gid).hex()}"
+    return f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"

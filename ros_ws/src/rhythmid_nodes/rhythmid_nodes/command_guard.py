@@ -1,0 +1,181 @@
+"""command_guard: the last node before a robot. Passes `command` on within limits, and ends what nobody renews.
+
+It sends at the robot's rate the newest command, never a backlog, as the robot's type on the robot's topic. The effort, its rate and
+the power stay within their limits whoever commands. A second commander, a command that is no number, or a machine in danger
+(see `watch`) stop it: zero effort at once, and exit code 1.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from typing import Any
+
+from rclpy.duration import Duration
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import JointState
+
+from rhythmid.errors import InputError
+from rhythmid.simulation.command_hold import RAMP, TIMEOUT, CommandHold
+
+from .authority import Authority
+from .clock import Clock, Grid
+from .command import STAMPED, TYPES, Commander
+from .effort_limits import EffortLimits
+from .joint_state import JointStateReader
+from .node import JOINT, PRIORITY, RATE, TIME_MODE, GraphNode, lapse_notice, run
+from .parameters import Parameter
+from .qos import stream, subscribe_informed
+from .watch import Watch
+from .watch_parameters import PARAMETERS as WATCHED
+from .watch_parameters import limits
+
+_FAR = math.inf
+_INSIST = (
+    0.5  # seconds for which zero is sent on after the end of a command: best-effort drives may miss a message
+)
+PARAMETERS = (
+    RATE,
+    TIME_MODE,
+    JOINT,
+    PRIORITY,
+    Parameter("max_effort", 0.0, "largest |effort|", "N", (0.0, _FAR)),
+    Parameter("max_effort_rate", _FAR, "largest change of the effort", "N/s", (0.0, _FAR)),
+    Parameter("max_power", _FAR, "largest |effort times speed|, by joint_states", "W", (0.0, _FAR)),
+    Parameter("command_timeout", TIMEOUT, "hold of a command that is not renewed; 0: for ever", "s", (0.0, 3600.0)),
+    Parameter("command_ramp", RAMP, "fading of a command after that", "s", (0.0, 3600.0)),
+    *WATCHED,
+    Parameter("command_type", STAMPED, "message type that the robot takes", choices=tuple(TYPES)),
+    Parameter("command_topic", "robot/command", "topic of the robot's commands"),
+    Parameter("command_joints", None, "order of a Float64MultiArray's joints; not given: the one joint", items=str),
+)  # fmt: skip
+
+
+class CommandGuard(GraphNode):
+    """Samples the newest command on its own grid; silent until the first one, and again when the last one has ended."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("command_guard", PARAMETERS, **options)
+        values = self.values
+        if self.lockstep:
+            raise InputError("parameter time_mode = 'lockstep': a robot has no simulated time")
+        self._limits = EffortLimits(values["max_effort"], values["max_effort_rate"], values["max_power"])
+        self._watch = Watch(limits(values))
+        self._hold = CommandHold(values["command_timeout"], values["command_ramp"], self.period_ns)
+        self._reader = JointStateReader(values["joint"])
+        self._wall = Clock()
+        self._lock = threading.Lock()  # of the hold: messages come on another thread than ticks
+        self._sending = threading.Lock()
+        self._obeys = True
+        self._given = 0.0  # effort sent last
+        self._given_ns = 0
+        self._quiet_ns = 0  # when to fall silent
+        self._commands = self._limited = self._other_joint = 0
+        self._output = Commander(
+            self, values["command_topic"], values["command_type"], values["joint"], values["command_joints"] or (),
+            stream(lockstep=False),
+        )  # fmt: skip
+        self._authority = Authority(self, "command", self._stop)
+        self._output_authority = Authority(self, self._output.publisher.topic, self._stop)
+        subscribe_informed(self, JointState, "command", self._on_command, stream(lockstep=False))
+        self.create_subscription(
+            JointState, "joint_states", self._on_measurement, qos_profile_sensor_data, raw=True
+        )
+        self._grid = Grid(self._wall, self.period_ns, self._tick, values["priority"])
+        self.workers.append(self._grid)
+
+    def figures(self) -> dict[str, str]:
+        return {
+            "commands": str(self._commands),
+            "limited_commands": str(self._limited),
+            "lapsed_commands": str(self._hold.lapses),
+            "commands_of_other_joints": str(self._other_joint),
+            **self._authority.figures(),
+            **self._grid.figures(),
+        }
+
+    def obstacles(self) -> list[str]:
+        found = [self._watch.danger(self._wall.now())]
+        if self.count_publishers(self._authority.topic) == 0:
+            found.append(f"no publisher of {self._authority.topic}")
+        if self._output.publisher.get_subscription_count() == 0:
+            found.append(f"no subscriber of {self._output.publisher.topic}")
+        return [obstacle for obstacle in found if obstacle]
+
+    def stand_down(self) -> None:
+        """A guard that is ended obeys no more, and leaves a last command of zero."""
+        self._obeys = False
+        if self._given_ns:
+            self._zero()
+            self._output.publisher.wait_for_all_acked(Duration(seconds=0.5))
+
+    def _on_command(self, data: bytes, about: dict[str, Any]) -> None:
+        if not self._obeys or not self._authority.admits(about):
+            return
+        sample = self._reader.read(data)
+        if sample is None:
+            self._other_joint += 1
+        elif not math.isfinite(sample.effort):
+            self._stop(f"a command of {sample.effort} on {self._authority.topic}")
+        else:
+            with self._lock:
+                self._commands += 1
+                # its arrival counts, not when a busy machine gets round to it
+                self._hold.renew(min(self._wall.now(), about["received_timestamp"]), sample.effort)
+
+    def _on_measurement(self, data: bytes) -> None:
+        sample = self._reader.read(data)
+        if sample is None:
+            return
+        now = self._wall.now()
+        self._watch.hear(sample, now)
+        if self._engaged(now) and (danger := self._watch.danger(now)):
+            self._stop(danger)
+
+    def _engaged(self, now_ns: int) -> bool:
+        """Whether effort is being given, or was a moment ago."""
+        return now_ns <= self._quiet_ns
+
+    def _stop(self, reason: str) -> None:
+        """Zero effort at once, whatever its rate may be, and an end of the process."""
+        self._obeys = False
+        self._zero()
+        self.trip(reason)
+
+    def _tick(self, stamp_ns: int) -> None:
+        with self._lock:
+            self._hold.until(stamp_ns)
+            wanted = self._hold.effort if self._obeys else 0.0
+        engaged = self._engaged(stamp_ns)
+        danger = self._watch.danger(self._wall.now()) if wanted or engaged else ""
+        if not danger and (wanted or engaged):
+            self._give(stamp_ns, wanted)
+        if self._hold.lapses:
+            self.notice(lapse_notice(self.values["command_timeout"]))
+        if danger and engaged:
+            self._stop(danger)
+
+    def _give(self, stamp_ns: int, wanted: float) -> None:
+        effort = self._limits.apply(wanted, self._given, self.period_ns * 1e-9, self._watch.speed)
+        self._limited += effort != wanted
+        if effort:
+            self._quiet_ns = stamp_ns + round(_INSIST * 1e9)
+        self._send(stamp_ns, effort)
+
+    def _zero(self) -> None:
+        if self._given_ns:
+            self._send(self._wall.now(), 0.0)
+
+    def _send(self, stamp_ns: int, effort: float) -> None:
+        with self._sending:
+            effort = effort if self._obeys else 0.0  # nothing follows a last zero
+            self._output.send(stamp_ns, effort)
+            self._given, self._given_ns = effort, stamp_ns
+
+
+def main() -> None:
+    run(CommandGuard)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+"""Whether a machine may be excited, judged by its measurements: fresh, without gaps, moving, and within its limits."""
+
+from __future__ import annotations
+
+import math
+import threading
+from dataclasses import dataclass
+
+from .sample import Sample
+
+_DRIFT = 1e-3
+"""Seconds a second by which the offset of a robot's clock may drift: ten times what quartz clocks do."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What measurements must keep to; the default allows all but what is stale or no number.
+
+    Attributes
+    ----------
+    stale_after : largest age [s] of the newest measurement, by its arrival and by its stamp; 0: any.
+    low, high : range of positions [m].
+    speed : largest |v| [m/s].
+    frozen_after : time [s] for which the position may stay exactly the same; 0: any.
+    gap : largest step [s] from one stamp to the next, forwards or backwards; 0: as `stale_after`.
+    other_clock : whether the stamps come from another clock than ours. Their age then counts from the best one seen.
+    """
+
+    stale_after: float = 0.5
+    low: float = -math.inf
+    high: float = math.inf
+    speed: float = math.inf
+    frozen_after: float = 0.0
+    gap: float = 0.0
+    other_clock: bool = False
+
+
+class Watch:
+    """Judges measurements one by one (`hear`) and their absence (`danger`), from any thread. Times are nanoseconds of our clock.
+
+    Attributes
+    ----------
+    speed : of the newest measurement [m/s], from successive positions where the message does not tell it; NaN before there is one.
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        self.speed = math.nan
+        self._limits = limits
+        self._lock = (
+            threading.Lock()
+        )  # its own: a busy clock thread that holds another for long keeps no measurement waiting
+        self._newest: Sample | None = None
+        self._gap = 0.0
+        self._arrived_ns = self._moved_ns = 0
+        self._offset_ns = (
+            math.inf
+        )  # smallest arrival - stamp: the difference of the clocks and the shortest way
+
+    def hear(self, sample: Sample, arrived_ns: int) -> None:
+        """Take note of a measurement; `danger` judges it."""
+        with self._lock:
+            self._take(sample, arrived_ns)
+
+    def _take(self, sample: Sample, arrived_ns: int) -> None:
+        before = self._newest
+        self._gap = 0.0 if before is None else (sample.stamp_ns - before.stamp_ns) * 1e-9
+        self.speed = _speed(sample, before)
+        if before is None or sample.position != before.position:
+            self._moved_ns = arrived_ns
+        drifted = _DRIFT * (arrived_ns - self._arrived_ns)
+        self._offset_ns = min(self._offset_ns + drifted, arrived_ns - sample.stamp_ns)
+        self._newest, self._arrived_ns = sample, arrived_ns
+
+    def danger(self, now_ns: int) -> str:
+        """Why the machine must not be excited now; empty when it may."""
+        with self._lock:
+            sample, stale = self._newest, self._limits.stale_after
+            if sample is None:
+                return "no measurement on joint_states yet" if stale > 0.0 else ""
+            return self._state(sample) or self._age(sample, now_ns)
+
+    def _state(self, sample: Sample) -> str:
+        limits = self._limits
+        if not math.isfinite(sample.position) or not limits.low <= sample.position <= limits.high:
+            return f"the position {sample.position:g} m is outside the envelope [{limits.low:g}, {limits.high:g}] m"
+        if abs(self.speed) > limits.speed:
+            return f"the speed of {self.speed:g} m/s exceeds {limits.speed:g} m/s"
+        return ""
+
+    def _age(self, sample: Sample, now_ns: int) -> str:
+        limits = self._limits
+        stale = limits.stale_after or math.inf
+        age = (now_ns - self._arrived_ns) * 1e-9
+        if age > stale:
+            return f"the newest measurement is {age:.3f} s old, allowed are {stale:g} s"
+        behind = (now_ns - sample.stamp_ns - (self._offset_ns if limits.other_clock else 0)) * 1e-9
+        if abs(behind) > stale:
+            side = "ago" if behind > 0.0 else "ahead"
+            return (
+                f"the newest measurement is stamped {abs(behind):.3f} s {side}, allowed are {stale:g} s"
+                " (for a robot with another clock set measurement_clock: other)"
+            )
+        if abs(self._gap) > (limits.gap or stale):
+            return (
+                f"the measurements' stamps step by {self._gap:.3f} s, allowed are {limits.gap or stale:g} s"
+            )
+        still = (self._arrived_ns - self._moved_ns) * 1e-9
+        if still > limits.frozen_after > 0.0:
+            return f"the position has been exactly {sample.position:g} m for {still:.3f} s, allowed are {limits.frozen_after:g} s"
+        return ""
+
+
+def _speed(sample: Sample, before: Sample | None) -> float:
+    if not math.isnan(sample.velocity):
+        return sample.velocity
+    if before is None or sample.stamp_ns == before.stamp_ns:
+        return math.nan
+    return (sample.position - before.position) / ((sample.stamp_ns - before.stamp_ns) * 1e-9)

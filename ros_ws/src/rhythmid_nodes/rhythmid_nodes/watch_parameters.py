@@ -1,0 +1,34 @@
+"""Parameters of the nodes that watch a machine's measurements."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from rhythmid.errors import InputError
+
+from .parameters import Parameter
+from .watch import Limits
+
+_FAR = math.inf
+PARAMETERS = (
+    Parameter("stale_after", 0.5, "realtime: stop when the newest measurement is older, by arrival or stamp; 0: never", "s", (0.0, _FAR)),
+    Parameter("envelope", [-_FAR, _FAR], "realtime: stop when the position leaves [low, high] in m"),
+    Parameter("max_speed", _FAR, "realtime: stop when the machine is faster", "m/s", (0.0, _FAR)),
+    Parameter("frozen_after", 0.0, "realtime: stop when the position stays exactly the same for so long; 0: never", "s", (0.0, _FAR)),
+    Parameter("max_gap", 0.0, "realtime: stop when stamps step by more; 0: as stale_after", "s", (0.0, _FAR)),
+    Parameter("measurement_clock", "system", "clock of the stamps: this system's, or another one", choices=("system", "other")),
+)  # fmt: skip
+
+
+def limits(values: Mapping[str, Any]) -> Limits:
+    """The limits that the values of `PARAMETERS` say. Raises InputError where the envelope is none."""
+    envelope = values["envelope"]
+    if len(envelope) != 2 or not envelope[0] < envelope[1]:
+        raise InputError(f"parameter envelope = {envelope}: two positions low < high in m are expected")
+    low, high = envelope
+    return Limits(
+        values["stale_after"], low, high, values["max_speed"], values["frozen_after"], values["max_gap"],
+        values["measurement_clock"] == "other",
+    )  # fmt: skip

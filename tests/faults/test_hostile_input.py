@@ -1,0 +1,337 @@
+"""Files made to do harm: refused in one line or read, in little time and memory, and nothing in them is carried out."""
+
+import gzip
+import io
+import resource
+import sqlite3
+import struct
+import tempfile
+import time
+import zipfile
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import lz4.frame
+import numpy as np
+import pytest
+from fuzz import MEMORY_LIMIT, Watch, attempt
+from fuzz_bags import OWN
+from fuzz_targets import TARGETS
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from rhythmid import document
+from rhythmid.errors import LONGEST, InputError
+from rhythmid.record import compression
+from rhythmid.record.bag import Bag
+from rhythmid.record.bag_writer import write_bag
+from rhythmid.record.block import Block, Topic
+from rhythmid.record.columns import read_columns
+from rhythmid.record.compression import compress
+from rhythmid.record.field import Field
+from rhythmid.record.inventory import inventory
+from rhythmid.record.message_types import stamp_path, type_fields, typestore
+from rhythmid.record.messages import Messages
+from rhythmid.record.read import read_record
+from rhythmid.record.signals import Signals
+from rhythmid.record.table import Table
+
+SECONDS = 10.0  # of the processor that a few hostile kB may take: without the limits it would be hours
+ZEROS = b"\0" * (1 << 20)
+
+
+@pytest.fixture(scope="module")
+def watch() -> Watch:
+    return Watch()
+
+
+@pytest.fixture
+def bounded():
+    """The test takes little time and memory; the process gets no more."""
+    before, begun = resource.getrlimit(resource.RLIMIT_AS), time.process_time()
+    with open("/proc/self/statm", encoding="ascii") as file:
+        used = int(file.read().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + (2 * MEMORY_LIMIT << 20), before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_AS, before)
+    assert time.process_time() - begun < SECONDS
+
+
+@pytest.mark.parametrize("name", TARGETS)
+@settings(max_examples=15)
+@given(number=st.integers(0, 2**32))
+def test_a_spoilt_file_is_read_or_refused_in_one_line(name, number, tmp_path_factory, watch):
+    target = TARGETS[name]
+    folder = tmp_path_factory.mktemp("hostile")
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(tempfile, "tempdir", str(folder))
+        outcome, kind = attempt(target, target.hostile(0, number), folder, number, watch)
+    assert outcome in ("accepted", "refused"), kind
+
+
+# YAML
+
+
+def refusal(read: Callable[[], object]) -> str:
+    with pytest.raises(InputError) as caught:
+        read()
+    return str(caught.value)
+
+
+def test_aliases_that_stand_for_billions_of_values_are_refused(bounded):
+    lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
+    lines += [f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 10)}]" for k in range(1, 12)]
+    assert "holds more than 200000 values" in refusal(lambda: document.parse("\n".join(lines), "model.yaml"))
+
+
+@pytest.mark.parametrize("text", ["[" * 20_000, "- " * 20_000, "{a: " * 20_000, "&a [*a]", "? " * 20_000])
+def test_deep_and_endless_yaml_is_refused(text, bounded):
+    refusal(lambda: document.parse(text, "model.yaml"))
+
+
+def test_long_keys_above_many_values_take_no_memory(bounded):
+    text = "? " + "k" * 1_000_000 + "\n: [" + "0, " * 50_000 + "0]"
+    assert "a key of more than" in refusal(lambda: document.parse(text, "model.yaml"))
+
+
+def test_a_document_of_many_megabytes_is_not_even_read(tmp_path, bounded):
+    (tmp_path / "model.yaml").write_bytes(b"# \n" * (document.LARGEST // 3 + 10))
+    assert "is too large" in refusal(lambda: document.read(tmp_path / "model.yaml"))
+
+
+@pytest.mark.parametrize(
+    "tag", ["!!timestamp x", "!!int ''", "!!bool x", "!!float ''", "!!python/name:os.system x"]
+)
+def test_a_value_that_its_tag_does_not_fit_is_refused_with_its_line(tag):
+    assert refusal(lambda: document.parse(f"a: 1\nb: {tag}", "model.yaml")).startswith("model.yaml:2")
+
+
+def test_what_a_refusal_quotes_can_neither_break_the_line_nor_command_the_terminal():
+    line = str(InputError("a\nb\x1b[2Jc" + "x" * 10_000))
+    assert line.startswith("a b [2Jc") and line.isprintable() and len(line) == LONGEST
+
+
+# Bags
+
+
+@pytest.mark.parametrize(
+    "listed", ["[metadata.yaml]", "[../../etc/passwd]", "[x.zstd]", "[" + "x" * 5000 + ".mcap]", "!!timestamp x", "7", "[[" * 3000]
+)  # fmt: skip
+def test_metadata_that_names_anything_else_is_damaged_metadata(listed, tmp_path):
+    bag = write_bag(tmp_path / "bag", {"/a": Messages(np.arange(9), np.arange(9.0))})
+    (bag / "metadata.yaml").write_text(f"rosbag2_bagfile_information: {{relative_file_paths: {listed}}}")
+    found = Bag(bag)
+    assert [file.name for file in found.files] == ["bag.mcap"] and "metadata.yaml is damaged" in found.notes[
+        0
+    ]
+
+
+def test_files_are_put_in_order_whatever_digits_their_names_hold(tmp_path):
+    for name in ("²1.mcap", "2.mcap", "10.mcap"):
+        (tmp_path / name).write_bytes(b"")
+    assert [file.name for file in Bag(tmp_path).files] == ["2.mcap", "10.mcap", "²1.mcap"]
+
+
+def chunk(plain_size: int, method: bytes, packed: bytes) -> bytes:
+    body = (
+        struct.pack("<QQQI", 0, 0, plain_size, 0)
+        + struct.pack("<I", len(method))
+        + method
+        + struct.pack("<Q", len(packed))
+        + packed
+    )
+    return b"\x89MCAP0\r\n" + b"\x06" + struct.pack("<Q", len(body)) + body
+
+
+@pytest.mark.parametrize("method", ["zstd", "lz4"])
+def test_a_chunk_that_would_fill_the_memory_is_skipped_and_told(method, tmp_path, monkeypatch, bounded):
+    monkeypatch.setattr(compression, "HARMLESS", 1 << 20)
+    packed = compress(ZEROS * 64) if method == "zstd" else lz4.frame.compress(ZEROS * 64)
+    monkeypatch.setattr(compression, "EXPANSION", 8)
+    (tmp_path / "bomb.mcap").write_bytes(chunk(64 << 20, method.encode(), packed))
+    bag = Bag(tmp_path / "bomb.mcap")
+    assert not list(bag.blocks())
+    assert "it holds more than" in bag.notes[0]
+
+
+def test_a_packed_bag_that_would_fill_the_disk_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(compression, "HARMLESS", 1 << 20)
+    (tmp_path / "bomb.mcap.zstd").write_bytes(compress(ZEROS * 64))
+    assert "cannot be decompressed: it holds more than" in refusal(
+        lambda: list(Bag(tmp_path / "bomb.mcap.zstd").blocks())
+    )
+
+
+@pytest.mark.parametrize("size", [0, 21, 2**60, 2**64 - 1])
+def test_a_message_that_is_too_short_or_of_any_length_ends_the_file_at_most(size, tmp_path, bounded):
+    (tmp_path / "a.mcap").write_bytes(b"\x89MCAP0\r\n\x05" + struct.pack("<Q", size) + bytes(min(size, 21)))
+    bag = Bag(tmp_path / "a.mcap")
+    assert not list(bag.blocks()) and bag.truncated
+
+
+def database(path: Path, statement: str) -> Path:
+    bag = write_bag(path / "bag", {"/a": Messages(np.arange(9), np.arange(9.0))}, storage="sqlite3")
+    with closing(sqlite3.connect(bag / "bag.db3")) as open_:
+        open_.executescript(statement)
+    return bag
+
+
+def test_a_database_that_computes_gigabytes_is_refused(tmp_path, bounded):
+    bag = database(
+        tmp_path,
+        "DROP TABLE messages; CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER,"
+        " data BLOB GENERATED ALWAYS AS (zeroblob(999999999)));"
+        "INSERT INTO messages(topic_id, timestamp) VALUES (1, 1), (1, 2), (1, 3)",
+    )
+    assert "not a readable sqlite3 bag" in refusal(lambda: list(Bag(bag).blocks()))
+
+
+def test_large_messages_of_a_database_are_fetched_few_at_once(tmp_path, bounded):
+    bag = database(tmp_path, f"UPDATE messages SET data = zeroblob({32 << 20})")
+    assert max(len(block) for block in Bag(bag).blocks()) <= 3
+
+
+@pytest.mark.parametrize("cell", ["NULL", "x'00'", "7"])
+def test_a_database_whose_definitions_are_no_texts_is_refused(cell, tmp_path):
+    bag = database(
+        tmp_path,
+        "CREATE TABLE IF NOT EXISTS x(a); UPDATE message_definitions SET encoding = 'ros2msg';"
+        "DROP TABLE message_definitions; CREATE TABLE message_definitions(topic_type, encoding, encoded_message_definition);"
+        f"INSERT INTO message_definitions VALUES ('sensor_msgs/msg/JointState', 'ros2msg', {cell})",
+    )
+    assert "holds no texts" in refusal(lambda: list(Bag(bag).blocks()))
+
+
+# Messages
+
+
+def own(definition: str) -> Topic:
+    return Topic("/legs", OWN, definition=definition, definition_format="ros2msg")
+
+
+@pytest.mark.parametrize(
+    "definition",
+    [
+        "Legs inner\n",
+        "Leg[1000000000] legs\n" + "=" * 80 + "\nMSG: robot_msgs/Leg\nfloat64 angle\n",
+        "string[1000000000] names\n",
+        "float64[99999999999] angles\n",
+        "float64[0] nothing\n",
+        "Leg[] legs\n" + "=" * 80 + "\nMSG: robot_msgs/Leg\nfloat64[0] angle\n",
+        "Leg[9000] legs\n"
+        + "=" * 80
+        + "\nMSG: robot_msgs/Leg\nToe[9000] toes\n"
+        + "=" * 80
+        + "\nMSG: robot_msgs/Toe\nint64[9] a\n",
+    ],
+)
+def test_types_that_no_message_could_have_are_refused(definition, bounded):
+    assert "cannot be read" in refusal(lambda: type_fields(own(definition)))
+
+
+def test_types_that_double_at_every_level_take_no_time(bounded):
+    levels = "".join("=" * 80 + f"\nMSG: robot_msgs/A{k}\nA{k + 1} a\nA{k + 1} b\n" for k in range(40))
+    end = "=" * 80 + "\nMSG: robot_msgs/A40\nint8 a\n"
+    assert "cannot be read" in refusal(lambda: type_fields(own("A0 a\n" + levels + end)))
+
+
+def test_fields_whose_names_clash_are_refused():
+    assert "cannot be read" in refusal(lambda: typestore(own("int8 a\nint8 a\n")))
+
+
+def test_a_header_that_is_none_has_no_stamp():
+    header = "std_msgs/Header header\n" + "=" * 80 + "\nMSG: std_msgs/Header\nstring when\n"
+    assert stamp_path(own(header)) is None
+    header = "std_msgs/Header header\n" + "=" * 80 + "\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\n"
+    clock = "=" * 80 + "\nMSG: builtin_interfaces/Time\nstring sec\nuint32 nanosec\n"
+    assert stamp_path(own(header + clock)) is None
+
+
+@pytest.mark.parametrize("text", ["data[²]", "data[" + "1" * 5000 + "]"])
+def test_a_position_is_no_number_of_any_length(text):
+    assert isinstance(Field.parse(text).steps[1], tuple)
+
+
+def test_a_truth_value_of_any_byte_is_one_or_zero_by_either_way_of_reading():
+    topic, data = own("bool on\n"), b"\0\1\0\0\x08"
+    place = np.array([0])
+    block = Block(topic, data, place, place + len(data), place)
+    field = Field.parse("on")
+    for direct in (True, False):
+        assert read_columns([block], {topic.name: [field]}, direct)[topic.name].values[field] == [1.0]
+
+
+# Tables
+
+
+def saved(path: Path, **arrays) -> Path:
+    np.savez_compressed(path, **arrays)
+    return path
+
+
+def test_archives_and_packed_texts_that_would_fill_the_memory_are_refused(tmp_path, monkeypatch, bounded):
+    monkeypatch.setattr(compression, "HARMLESS", 1 << 20)
+    path = saved(tmp_path / "bomb.npz", a=np.zeros(8 << 20))
+    assert "claims to hold" in refusal(lambda: Table.load(path))
+    (tmp_path / "bomb.csv.gz").write_bytes(gzip.compress(b"t,u\n" + b"0,0\n" * (8 << 20), 9))
+    assert "holds more than" in refusal(lambda: Table.load(tmp_path / "bomb.csv.gz"))
+
+
+def test_an_array_that_claims_to_be_endless_is_refused(tmp_path, bounded):
+    file = io.BytesIO()
+    np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": (2**60,)})
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("a.npy", file.getvalue() + bytes(64))
+    assert "cannot be read as a table" in refusal(lambda: Table.load(tmp_path / "a.npz"))
+
+
+class Told:
+    """A pickle that would say so when it is loaded."""
+
+    def __reduce__(self):
+        return print, ("a pickle was loaded",)
+
+
+def test_no_pickle_is_loaded(tmp_path, capsys):
+    np.savez(tmp_path / "a.npz", t=np.arange(9.0), a=np.array([Told()], dtype=object))
+    refusal(lambda: Table.load(tmp_path / "a.npz"))
+    with (tmp_path / "b.npz").open("wb") as file:
+        np.save(file, np.array([Told()], dtype=object), allow_pickle=True)
+    refusal(lambda: Table.load(tmp_path / "b.npz"))
+    assert "loaded" not in capsys.readouterr().out
+
+
+def test_a_matlab_file_that_kills_its_reader_is_refused(tmp_path):
+    file = io.BytesIO()
+    savemat(file, {"u": np.arange(50.0)})
+    spoilt = bytearray(file.getvalue())
+    at = spoilt.index(struct.pack("<II", 9, 400))  # double precision, 50 numbers
+    spoilt[at : at + 4] = struct.pack("<I", 0x2009)  # a type far beyond those that there are
+    (tmp_path / "a.mat").write_bytes(spoilt)
+    assert "cannot be read as a table" in refusal(lambda: Table.load(tmp_path / "a.mat"))
+
+
+def test_one_long_cell_does_not_make_all_others_as_long(tmp_path, bounded):
+    rows = b"".join(b"%d,a\n" % k for k in range(20_000))
+    (tmp_path / "a.csv").write_bytes(b"t,note\n" + b"0," + b"x" * 100_000 + b"\n" + rows)
+    assert len(Table.load(tmp_path / "a.csv").columns["note"]) == 20_001
+
+
+def test_numbers_near_the_largest_are_no_time(tmp_path, recwarn):
+    (tmp_path / "a.csv").write_text("q,u\n" + "".join(f"{k}e200,{k % 7}\n" for k in range(1, 50)))
+    assert "goes forward like a time" in refusal(lambda: inventory(tmp_path / "a.csv"))
+    assert not recwarn.list
+
+
+# Records
+
+
+def test_a_forcing_too_fast_to_be_followed_is_refused(tmp_path, bounded):
+    (tmp_path / "run.csv").write_text("t,y\n" + "".join(f"{k},{k % 7}\n" for k in range(50)))
+    signals = Signals.from_text(
+        "time: {column: t}\noutput: {column: y}\nforcing: {amplitude: 1, frequency: 1.0e9}",
+        tmp_path / "signals.yaml",
+    )
+    assert "cannot be followed" in refusal(lambda: read_record(tmp_path / "run.csv", signals))

@@ -1,0 +1,105 @@
+"""Ctrl-C while identify and diagnose work: exit code 130, nothing written, no process left behind."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.errors import InputError
+from rhythmid.excitation.sequence import build
+from rhythmid.model import Model
+from rhythmid.output import write_text
+from rhythmid.simulation.signal import zero_order_hold
+from rhythmid.simulation.simulate import simulate
+
+NOMINAL = """
+inertia: {mass: {value: 1.0, unit: kg, fixed: true}}
+force:
+  - linear_spring: {stiffness: {value: 220.0, unit: N/m}, rest_length: {value: 0.0, unit: m}}
+  - viscous_damper: {damping: {value: 2.5, unit: N*s/m}}
+"""
+PATIENCE = 120.0  # s
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A table of a mass on a spring with friction, and the files that describe it."""
+    made = tmp_path_factory.mktemp("interrupted")
+    machine = Model.from_text(NOMINAL).with_element(load_catalogue()["coulomb_friction"], {"force": 0.3})
+    time = np.arange(6000) / 300.0
+    command = build({"type": "multisine", "rms": 3.0, "period": 10.0, "periods": 2, "band": [0.3, 6.0]})(time)
+    output = simulate(machine, time, zero_order_hold(time, command)).output
+    output += np.random.default_rng(0).normal(0.0, 2e-5, len(time))
+    table = np.column_stack([time, command, output])
+    np.savetxt(made / "log.csv", table, delimiter=",", header="t,u,y", comments="")
+    (made / "model.yaml").write_text(NOMINAL)
+    (made / "signals.yaml").write_text(
+        "time: {column: t}\ntables: {file: log.csv}\ninput: {column: u, unit: N, hold: zero}\noutput: {column: y, unit: m}\n"
+    )
+    return made
+
+
+def children(group: int) -> list[int]:
+    """Processes of a group that still run."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, of = stat.read_text().rpartition(")")[2].split()[:3]
+        except OSError:
+            continue
+        if int(of) == group and state != "Z":
+            found.append(int(stat.parent.name))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("command", "stage", "to"),
+    [("identify", "fitting the model", "process"), ("diagnose", "refitting with", "terminal")],
+)
+def test_ctrl_c_ends_with_130_and_leaves_neither_files_nor_processes(folder, command, stage, to):
+    before = sorted(folder.iterdir())
+    arguments = [
+        command,
+        "signals.yaml",
+        "--model",
+        "model.yaml",
+        "--json",
+        "found.json",
+        "--report",
+        "found.html",
+    ]
+    if command == "identify":
+        arguments += ["--save", "latency.yaml"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rhythmid.cli", *arguments],
+        cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    assert process.stderr is not None
+    assert any(stage in line for line in process.stderr)
+    time.sleep(0.3)  # into the work that was told
+    if to == "terminal":
+        os.killpg(process.pid, signal.SIGINT)
+    else:
+        process.send_signal(signal.SIGINT)
+    said = process.stderr.read()
+    process.stderr.close()
+    assert process.wait(PATIENCE) == 130
+    assert "Traceback" not in said
+    assert sorted(folder.iterdir()) == before
+    deadline = time.monotonic() + PATIENCE
+    while children(process.pid) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not children(process.pid)
+
+
+def test_a_result_that_cannot_be_put_in_its_place_leaves_nothing(tmp_path):
+    (tmp_path / "taken").mkdir()
+    with pytest.raises(InputError, match="cannot be written"):
+        write_text(tmp_path / "taken", "found")
+    assert [path.name for path in tmp_path.iterdir()] == ["taken"]

@@ -1,0 +1,165 @@
+"""Damaged bags recovered: everything whole comes back, what was lost is listed, and no damage passes unnoticed."""
+
+import shutil
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from read_back import by_us, require_readable_by_others
+
+from rhythmid.errors import InputError
+from rhythmid.record.bag_report import quality_report
+from rhythmid.record.bag_writer import BagWriter, add_topic
+from rhythmid.record.mcap_writer import CHUNK
+from rhythmid.record.messages import Messages
+from rhythmid.record.recover import recover
+
+N, PART = 600, 60  # messages of each topic, and those between two flushes
+STAMPS = np.arange(N, dtype=np.int64) * 1_000_000
+VALUES = np.random.default_rng(11).standard_normal(N)
+TOPICS = {
+    "/hopper/excitation": Messages(STAMPS, effort=VALUES),
+    "/hopper/joint_states": Messages(STAMPS, position=VALUES),
+}
+STORAGES = ("mcap", "sqlite3")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> dict[str, Path]:
+    """The same recording in both kinds of storage, flushed ten times, as a recorder does."""
+    made = {}
+    for storage in STORAGES:
+        made[storage] = tmp_path_factory.mktemp(storage) / "bag"
+        writer = BagWriter(made[storage], storage, numbered=True)
+        writer.open()
+        rows = [
+            (add_topic(writer, name, "sensor_msgs/msg/JointState"), m.serialised())
+            for name, m in TOPICS.items()
+        ]
+        for k in range(N):
+            for connection, data in rows:
+                writer.write(connection, int(STAMPS[k]), data[k].tobytes())
+            if k % PART == PART - 1:
+                writer.flush()
+        writer.close()
+    return made
+
+
+@pytest.fixture
+def spoilt(whole, tmp_path):
+    """spoilt(storage, change): a copy of the recording whose storage file `change(bytearray)` has damaged."""
+
+    def make(storage, change) -> Path:
+        bag = tmp_path / "spoilt"
+        shutil.rmtree(bag, ignore_errors=True)
+        shutil.copytree(whole[storage], bag)
+        (file,) = bag.glob("bag_0.*")
+        data = bytearray(file.read_bytes())
+        file.write_bytes(change(data) or data)
+        return bag
+
+    return make
+
+
+def chunks(data: bytes) -> list[int]:
+    """Where the chunks of an MCAP file begin."""
+    found, at = [], 8
+    while at < len(data) - 8:
+        op, size = struct.unpack_from("<BQ", data, at)
+        if op == CHUNK:
+            found.append(at)
+        at += 9 + size
+    return found
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+@settings(max_examples=25)
+@given(share=st.floats(0.0, 1.0, exclude_max=True), flipped=st.integers(0, 7))
+def test_a_flipped_bit_is_told_or_changes_nothing(storage, whole, share, flipped, tmp_path_factory):
+    bag = tmp_path_factory.mktemp("flipped") / "bag"
+    shutil.copytree(whole[storage], bag)
+    (file,) = bag.glob("bag_0.*")
+    data = bytearray(file.read_bytes())
+    data[int(share * len(data))] ^= 1 << flipped
+    file.write_bytes(data)
+    try:
+        report = quality_report(bag)
+    except InputError:
+        return
+    if not report.damage and report.usable:
+        assert storage == "sqlite3" and by_us(bag) == by_us(whole[storage])
+    elif report.damage:
+        assert not any(line.endswith(": flawless") for line in report.lines())
+    shutil.rmtree(bag)
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_a_whole_bag_is_said_to_be_whole_and_recovered_as_it_is(storage, whole, tmp_path):
+    assert quality_report(whole[storage]).damage == ()
+    done = recover(whole[storage], tmp_path / "out")
+    assert not done.notes and not done.lost
+    assert sorted(by_us(tmp_path / "out")) == sorted(by_us(whole[storage]))
+    require_readable_by_others(tmp_path / "out")
+
+
+@pytest.mark.parametrize("damage", ["length", "content", "header"])
+def test_behind_a_broken_chunk_the_next_one_is_found_and_the_loss_is_counted(damage, spoilt, whole, tmp_path):
+    def change(data):
+        at = chunks(data)[4]
+        place = {"length": at + 3, "content": at + 2000, "header": at + 40}[damage]
+        data[place] ^= 0xFF
+
+    bag = spoilt("mcap", change)
+    done = recover(bag, tmp_path / "out")
+    assert dict(done.lost) == dict.fromkeys(TOPICS, PART)
+    assert any("damaged" in note for note in done.notes)
+    kept = sorted(by_us(tmp_path / "out"))
+    expected = [row for row in sorted(by_us(whole["mcap"])) if not 4 * PART <= row[1] / 1e6 < 5 * PART]
+    assert kept == expected
+    require_readable_by_others(tmp_path / "out")
+
+
+def test_of_a_database_with_a_broken_page_all_other_pages_are_read(spoilt, whole, tmp_path):
+    def change(data):
+        at = data.index(VALUES[N // 2].tobytes()) // 4096 * 4096  # a page of messages in the middle
+        data[at : at + 4096] = b"\xff" * 4096
+
+    done = recover(spoilt("sqlite3", change), tmp_path / "out")
+    assert 0 < sum(done.lost.values()) < 100
+    assert any("are lost: " in note for note in done.notes)
+    kept, sent = by_us(tmp_path / "out"), set(by_us(whole["sqlite3"]))
+    assert set(kept) < sent and len(kept) == 2 * N - sum(done.lost.values())
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_a_bag_without_its_end_gives_what_precedes(storage, spoilt, whole, tmp_path):
+    bag = spoilt(storage, lambda data: data[: int(0.7 * len(data))])
+    done = recover(bag, tmp_path / "out")
+    assert sum(done.lost.values()) == 2 * N - sum(done.counts.values()) > 0
+    assert set(by_us(tmp_path / "out")) < set(by_us(whole[storage]))
+
+
+class TestCommand:
+    """`rhythmid recover BAG [--out DIR]`."""
+
+    def test_it_says_what_was_recovered_and_what_was_lost(self, command, spoilt):
+        bag = spoilt("mcap", lambda data: data[: int(0.7 * len(data))])
+        answer = command("recover", bag)
+        assert answer.code == 0, answer
+        assert f"{bag}_recovered: " in answer.out and " lost" in answer.out and "breaks off" in answer.out
+        assert command("check", f"{bag}_recovered").out.count("flawless") == 2
+        assert "files are damaged" in command("check", bag).out
+
+    def test_a_place_that_is_taken_is_refused(self, refused, spoilt, tmp_path):
+        bag = spoilt("mcap", lambda data: data)
+        (tmp_path / "taken").mkdir()
+        assert "exists already" in refused("recover", bag, "--out", tmp_path / "taken")
+
+    def test_what_holds_nothing_is_refused_and_leaves_nothing(self, refused, tmp_path):
+        (tmp_path / "empty.mcap").write_bytes(b"")
+        refused("recover", tmp_path / "empty.mcap")
+        refused("recover", tmp_path / "nothing")
+        assert {path.name for path in tmp_path.iterdir()} == {"empty.mcap"}

@@ -1,0 +1,83 @@
+"""A lift at work for the live twin: simulated stretches that go on where the last one ended, and changes of its physics."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.excitation.multisine import Multisine
+from rhythmid.model import Model
+from rhythmid.simulation.compiled import compile_model
+from rhythmid.simulation.signal import spline, zero_order_hold
+from rhythmid.simulation.simulate import simulate, start_states
+
+Array = NDArray[np.float64]
+RATE = 250.0  # Hz
+LIFT = """
+inertia: {mass: {value: 2.0, unit: kg, fixed: true}}
+command: [{input_delay: {delay: {value: 0.01, unit: s}}}]
+force:
+  - gravity: {acceleration: {value: 9.81, unit: m/s^2, fixed: true}}
+  - linear_spring: {stiffness: {value: 800.0, unit: N/m}, rest_length: {value: 0.0, unit: m}}
+  - viscous_damper: {damping: {value: 8.0, unit: N*s/m}}
+  - coulomb_friction: {force: {value: 1.0, unit: N}, transition: {value: 0.005, unit: m/s, fixed: true}}
+sensor: [{measurement_delay: {delay: {value: 0.005, unit: s}}}]
+"""
+EXCITATION = Multisine(rms=5.0, period=20.0, periods=1, band=(0.3, 8.0), seed=3)
+
+
+def _changed(name: str, factor: float, more: float = 0.0) -> Callable[[Model], Model]:
+    return lambda model: model.with_values({name: model.value(name) * factor + more})
+
+
+CHANGED = {
+    "friction": _changed("coulomb_friction.force", 2.0),
+    "payload": _changed("inertia.mass", 1.05),
+    "command": _changed("input_delay.delay", 1.0, 0.005),
+    "measurement": _changed("measurement_delay.delay", 1.0, 0.005),
+}
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Times [s], command and forcing [N], the measurement [m] with its stamps [s], and the machine's state at the end."""
+
+    time: Array
+    command: Array
+    forcing: Array
+    stamp: Array
+    measured: Array
+    end: Array
+
+    @property
+    def channels(self) -> list[tuple[Any, Array, Array]]:
+        """Role, times and values of each signal."""
+        return [
+            ("input", self.time, self.command),
+            ("forcing", self.time, self.forcing),
+            ("output", self.stamp, self.measured),
+        ]
+
+    def then(self, other: "Signals") -> "Signals":
+        """These and what follows, whose first sample is the last of these."""
+        arrays = [np.concatenate([a[:-1], b]) for a, b in zip(vars(self).values(), vars(other).values())]
+        return Signals(*arrays[:-1], other.end)
+
+
+def at_work(
+    model: Model, start: float, end: float, state: Array | None = None, seed: int = 0, noise: float = 1e-4
+) -> Signals:
+    """The lift from `start` to `end` [s], from a state or from rest, its position measured with white noise [m]."""
+    delay = model.value("measurement_delay.delay")
+    free = model.without("measurement_delay")
+    if state is None:
+        state = start_states(free, compile_model(free), -9.81 * 2.0 / 800.0, 0.0)
+    time = np.arange(round(start * RATE), round(end * RATE) + 1) / RATE
+    known = np.arange(round(start * RATE) - 50, round(end * RATE) + 1) / RATE
+    command = EXCITATION(np.mod(known, EXCITATION.period))
+    forcing = 6.0 * np.cos(2.0 * np.pi * 1.4 * known)
+    run = simulate(free, time, zero_order_hold(known, command), spline(known, forcing), state)
+    measured = run.output + noise * np.random.default_rng(seed).standard_normal(len(time))
+    return Signals(time, command[50:], forcing[50:], time + delay, measured, run.states[-1])
