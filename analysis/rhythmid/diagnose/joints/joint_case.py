@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from threadpoolctl import threadpool_limits
 
 from rhythmid.diagnose.case import Budget, Case
-from rhythmid.diagnose.effort.candidate import DELAY
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST_EFFECTS
 from rhythmid.elements.catalogue import Catalogue
@@ -16,6 +15,7 @@ from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
+from rhythmid.simulation.transport import INPUT_DELAY
 
 # gain of log likelihood that a score test has to promise for an addition to be fitted: 1 in 70 reaches it by chance (chi-square), and
 # what is named has to gain more than twice as much
@@ -86,6 +86,6 @@ def name_of(joint: str, label: str) -> tuple[str, str]:
         return "armature", joint
     if label.endswith(".mass"):
         return "link_mass", label.removeprefix("body.").removesuffix(".mass")
-    if label == DELAY:
+    if label == INPUT_DELAY:
         return "actuator_delay", joint
     return label, joint

@@ -6,12 +6,12 @@ from rhythmid.body.body import BODY
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
 from rhythmid.diagnose.answer.wording import SENTENCES
-from rhythmid.diagnose.effort.candidate import DELAY
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, name_of
 from rhythmid.identify.inverse_dynamics.estimate import size_of
 from rhythmid.model import INERTIA
+from rhythmid.simulation.transport import INPUT_DELAY
 
 EQUATIONS = {  # of what is no element: its slot and what it says
     "armature": ("body", "M_jj → M_jj + ΔI"),
@@ -108,7 +108,7 @@ def _own(element: str) -> str:
 
 
 def _value(one: JointResult, answer: Diagnosis, label: str) -> Estimate:
-    if label == DELAY:
+    if label == INPUT_DELAY:
         late = answer.delays["sum"]
         return Estimate(late["value"], late["std"], "s")
     said = answer.parameters[label]

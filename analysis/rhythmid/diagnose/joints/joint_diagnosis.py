@@ -14,7 +14,6 @@ from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import STATED
-from rhythmid.diagnose.effort.candidate import DELAY
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
@@ -25,6 +24,7 @@ from rhythmid.identify.joints.reference_delay import reference_delay
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.joint_record import JointRecord
+from rhythmid.simulation.transport import INPUT_DELAY
 
 MOST_LINKS = 2  # links whose masses are put right, at most
 MATTERS = 0.02  # of a mass or an inertia, below which it is as right as a balance tells
@@ -109,7 +109,7 @@ def stated_at(one: JointResult) -> tuple[str, ...]:
 
 def _differs(one: JointResult, label: str) -> bool:
     """Whether a value of the body has come out other than it was."""
-    if label == DELAY or label not in one.case.nominal.parameters:
+    if label == INPUT_DELAY or label not in one.case.nominal.parameters:
         return True
     before = one.case.nominal.value(label)
     return abs(one.result.chosen.model.value(label) - before) > MATTERS * abs(before)
