@@ -34,7 +34,11 @@ def files(folder: Path) -> tuple[Path, Path]:
     )
     joints = [f"{leg}_{part}_joint" for leg in LEGS for part in PARTS]
     model, signals = folder / "go2.yaml", folder / "signals.yaml"
-    lines = [f"body: {{mjcf: {DATA / 'go2.xml'}, base: fixed, step: 0.001, contacts: false}}", "joints:"]
+    lines = [
+        f"body: {{mjcf: {DATA / 'go2.xml'}, base: fixed, step: 0.001, contacts: false,",
+        f"       free: {{{', '.join(f'{joint}.armature: {{}}' for joint in joints)}}}}}",
+        "joints:",
+    ]
     model.write_text("\n".join([*lines, *(f"  {joint}: {{{path}}}" for joint in joints)]) + "\n")
     signals.write_text(
         f"joints: [{', '.join(joints)}]\ntables: {{file: {DATA / 'traj_0.npz'}}}\ntime: {{column: time}}\n"

@@ -27,6 +27,7 @@ from rhythmid.record.joint_record import JointRecord
 from rhythmid.simulation.transport import INPUT_DELAY
 
 MOST_LINKS = 2  # links whose masses are put right, at most
+LIGHTEST = 0.1  # of the mass that the file gives a link, below which another effect has swallowed it
 MATTERS = 0.02  # of a mass or an inertia, below which it is as right as a balance tells
 
 
@@ -112,6 +113,8 @@ def _differs(one: JointResult, label: str) -> bool:
     if label == INPUT_DELAY or label not in one.case.nominal.parameters:
         return True
     before = one.case.nominal.value(label)
+    if one.result.chosen.model.value(label) < LIGHTEST * before:
+        return False  # what takes a link's mass away is something else
     return abs(one.result.chosen.model.value(label) - before) > MATTERS * abs(before)
 
 

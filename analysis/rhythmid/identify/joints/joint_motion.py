@@ -183,7 +183,8 @@ def joint_model(machine: Machine, joint: str, taken: Taken, links: Sequence[str]
     armature = machine.inertial.get(f"{joint}.armature")
     mass = path.mass
     if armature is not None and not armature.fixed:
-        mass = replace(mass, fixed=False)
+        least = max(mass.value - armature.value, 0.0)  # no rotor has a negative inertia
+        mass = replace(mass, fixed=False, bounds=(least, np.inf))
     return replace(path, mass=mass, terms=(*terms, Term(element, BODY, values)))
 
 
