@@ -141,7 +141,7 @@ def test_losses_that_the_bodys_file_gives_a_joint_become_elements(tmp_path: Path
         ("body: {mjcf: leg.xml, base: rail}\njoints: {rail: {}}", "joint of the base"),
         ("body: {mjcf: leg.xml, free: {tail.mass: {}}}\njoints: {knee: {}}", "no such parameter"),
         ("body: {mjcf: leg.xml, free: {shank.mass: 0}}\njoints: {knee: {}}", "a mapping"),
-        ("body: {mjcf: leg.xml, step: 1}\njoints: {knee: {}}", "outside"),
+        ("body: {mjcf: leg.xml, step: 1}\njoints: {knee: {}}", "too large"),
         ("body: {mjcf: leg.xml}\njoints: {knee: {force: [{frictions: {}}]}}", "unknown element"),
     ],
 )

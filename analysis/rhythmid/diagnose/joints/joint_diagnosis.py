@@ -100,12 +100,26 @@ def stated_at(one: JointResult) -> tuple[str, ...]:
     decision, chosen = one.result.decision, one.result.selection.chosen
     if decision.verdict == "missing_physics":
         return decision.named
-    if chosen.kind not in ("freed_value", "delay") or decision.joint < STATED:
+    alike = _held_by_alike(one) >= STATED
+    if alike and chosen.kind == "effects" and decision.verdict == "undecided":
+        return chosen.elements
+    if chosen.kind not in ("freed_value", "delay") or not (alike or decision.joint >= STATED):
         return ()
     own = [label for label in chosen.elements if one.result.chosen.fit.model.term(label) is None]
     if not all(label == INERTIA or name_of(one.joint, label)[0] != label for label in own):
         return ()  # another value of the path: that is its author's to check
     return decision.named if all(_differs(one, label) for label in own) else ()
+
+
+def _held_by_alike(one: JointResult) -> float:
+    """Share of the evidence for one effect alone that is the chosen one or predicts as well as it does: where it is large the joint is
+    certain although the name is not, and the answer lists the others as indistinguishable."""
+    decision, chosen = one.result.decision, one.result.selection.chosen
+    if len(chosen.elements) != 1:
+        return 0.0
+    names = {chosen.names[0], *(name for group in decision.equivalent for name in group)}
+    rivals = [h for h in one.result.contest.hypotheses if len(h.elements) == 1 and h.names[0] in names]
+    return sum(decision.weights.get(rival.key, 0.0) for rival in rivals)
 
 
 def _differs(one: JointResult, label: str) -> bool:
