@@ -108,7 +108,9 @@ def run(number: int, seed: int, bodies: Sequence[str]) -> Case:
     time = np.arange(0.0, LASTS[body], 0.002)
     given = asked(body, machine, time, rng)
     joint = str(rng.choice(machine.joints))
-    effect = "none" if rng.uniform() < NULLS else str(rng.choice(EFFECTS))
+    there = {family(term.element.name) for term in machine.paths[joint].terms}
+    lacking = [name for name in EFFECTS if family(name) not in there]  # what a path has, a fit takes in
+    effect = "none" if rng.uniform() < NULLS else str(rng.choice(lacking))
     plain = recorded(machine, given, time, np.random.default_rng(0))
     channel = plain.joints[joint].effort
     assert channel is not None

@@ -59,7 +59,7 @@ def compose_machine(
         unknown=unknown,
         undecided=undecided,
         indistinguishable=tuple(
-            tuple(f"{joint}: {name}" for name in group)
+            tuple(f"{joint}: {name_of(joint, name)[0]}" for name in group)
             for joint, one in answers.items()
             if joint in named or joint in undecided
             for group in one.indistinguishable
