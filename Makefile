@@ -7,7 +7,7 @@ PACKAGES := analysis $(patsubst %/setup.py,%,$(wildcard ros_ws/src/*/setup.py))
 METADATA := $(wildcard $(foreach package,$(PACKAGES),$(addprefix $(package)/,*.py *.cfg *.toml *.xml launch/* config/* layouts/*)))
 
 .DEFAULT_GOAL := help
-.PHONY: help install test lint format demo picture benchmark naming docker lock clean
+.PHONY: help install test lint format demo picture benchmark naming docker dist lock clean
 
 help: ## Show this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -68,11 +68,16 @@ picture: install ## Draw the pictures of the README
 docker: install ## Build the image and run the graph in containers, with buildah and without any engine
 	$(BIN)/python docker/without_engine.py
 
+dist: install ## Build the package's wheel and sdist into dist/ and check them
+	$(BIN)/python -m pip install --quiet build twine
+	$(BIN)/python -m build --outdir dist analysis
+	$(BIN)/python -m twine check --strict dist/*
+
 lock: install ## Resolve the requirements anew into requirements.lock
 	$(BIN)/python -m pip install --quiet uv
 	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.11 \
 		--custom-compile-command "make lock" --output-file requirements.lock \
-		analysis/pyproject.toml --group pyproject.toml:ros --group pyproject.toml:test
+		analysis/pyproject.toml --extra ros --group pyproject.toml:test
 
 clean: ## Remove what was built, not what was recorded
 	rm -rf $(VENV) build install log .pytest_cache .ruff_cache .hypothesis

@@ -1,3 +1,77 @@
-"""rhythmid identifies rhythmic robots: harmonic transfer functions, parameters, delays and missing physics, from bags."""
+"""rhythmid identifies rhythmic robots: harmonic transfer functions, parameters, delays and missing physics, from bags.
+
+Start with `load`, `Model.load`, `identify` and `diagnose`; docs/python.md shows the whole way. Everything is imported where it is
+first used, so that `import rhythmid` itself is fast.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rhythmid.compare.compare import Comparison, compare
+    from rhythmid.design.designer import Design, design
+    from rhythmid.design.requirements import Requirements
+    from rhythmid.diagnose.diagnosis import Answer, diagnose
+    from rhythmid.elements.catalogue import load_catalogue
+    from rhythmid.errors import InputError
+    from rhythmid.experiment import Experiment
+    from rhythmid.identify.identification import Identification
+    from rhythmid.identify.identify import identify, paper_hopper
+    from rhythmid.model import Model
+    from rhythmid.offline_run import OfflineRun, simulate
+    from rhythmid.record.load import load
+    from rhythmid.record.record import Record
 
 __version__ = "0.1.0"
+__all__ = [
+    "Answer",
+    "Comparison",
+    "Design",
+    "Experiment",
+    "Identification",
+    "InputError",
+    "Model",
+    "OfflineRun",
+    "Record",
+    "Requirements",
+    "__version__",
+    "compare",
+    "design",
+    "diagnose",
+    "identify",
+    "load",
+    "load_catalogue",
+    "paper_hopper",
+    "simulate",
+]
+
+_MODULES = {
+    "Answer": "rhythmid.diagnose.diagnosis",
+    "Comparison": "rhythmid.compare.compare",
+    "Design": "rhythmid.design.designer",
+    "Experiment": "rhythmid.experiment",
+    "Identification": "rhythmid.identify.identification",
+    "InputError": "rhythmid.errors",
+    "Model": "rhythmid.model",
+    "OfflineRun": "rhythmid.offline_run",
+    "Record": "rhythmid.record.record",
+    "Requirements": "rhythmid.design.requirements",
+    "load": "rhythmid.record.load",
+    "load_catalogue": "rhythmid.elements.catalogue",
+    "paper_hopper": "rhythmid.identify.identify",
+    "simulate": "rhythmid.offline_run",
+}
+_PACKAGES = ("compare", "design", "diagnose", "identify")  # that can be called: see callable_package.py
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PACKAGES:
+        return import_module(f"rhythmid.{name}")
+    if name not in _MODULES:
+        raise AttributeError(f"module 'rhythmid' has no attribute {name!r}")
+    found = globals()[name] = getattr(import_module(_MODULES[name]), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

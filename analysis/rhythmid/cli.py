@@ -2,27 +2,32 @@
 
 import importlib
 import pkgutil
+import shutil
 import sys
 from importlib.metadata import entry_points
 from typing import Annotated, NoReturn
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 
 from rhythmid import __version__, commands
+from rhythmid.commands.begin import BEGIN
+from rhythmid.commands.examples import epilog
 from rhythmid.errors import InputError
 
+NAME = "rhythmid"
+NARROW = 80  # columns below which framed help would cut off the options' names
 app = typer.Typer(
-    name="rhythmid",
+    name=NAME,
     help="Identify rhythmic robots from their recordings, and name the physics that a model lacks.",
-    no_args_is_help=True,
-    add_completion=False,
+    epilog=epilog(["rhythmid diagnose bag --model model.yaml", "rhythmid COMMAND --help"]),
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
+    rich_markup_mode="rich" if shutil.get_terminal_size().columns >= NARROW else None,
 )
 COMMAND_GROUP = "rhythmid.commands"
 SEVERAL = ("--holdout", "--elements")  # options that may be followed by several values
-console = Console(stderr=True)
+PARTS = ("begin", "examples", "machines", "options", "terminal")  # modules of `commands` that are no command
 
 
 def _version(show: bool) -> None:
@@ -33,17 +38,20 @@ def _version(show: bool) -> None:
 
 @app.callback()
 def _main(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    pass
+    if context.invoked_subcommand is None:
+        typer.echo(BEGIN, nl=False)
 
 
 for _module in pkgutil.iter_modules(commands.__path__):
-    if _module.name not in ("options", "machines"):
+    if _module.name not in PARTS:
         _name = _module.name
-        app.command(name=_name)(getattr(importlib.import_module(f"rhythmid.commands.{_name}"), _name))
+        _code = importlib.import_module(f"rhythmid.commands.{_name}")
+        app.command(name=_name, epilog=epilog(getattr(_code, "EXAMPLES", ())))(getattr(_code, _name))
 
 
 def main() -> None:
@@ -51,7 +59,7 @@ def main() -> None:
     for entry in entry_points(group=COMMAND_GROUP):
         entry.load()(app)
     try:
-        code = app(spread(sys.argv[1:]), standalone_mode=False)
+        code = app(spread(sys.argv[1:]), prog_name=NAME, standalone_mode=False)
     except InputError as error:
         _refuse(str(error))
     except (typer.Abort, KeyboardInterrupt):
@@ -81,10 +89,11 @@ def spread(arguments: list[str]) -> list[str]:
 
 
 def _refuse(problem: str) -> NoReturn:
-    if problem:  # there is none when the command is called with nothing and shows its help
-        console.print(
-            "[bold red]error:[/]", escape(" ".join(problem.split())), highlight=False, soft_wrap=True
-        )
+    from rich.console import Console
+    from rich.markup import escape
+
+    console = Console(stderr=True)
+    console.print("[bold red]error:[/]", escape(" ".join(problem.split())), highlight=False, soft_wrap=True)
     sys.exit(2)
 
 

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import sys
 import tempfile
 from contextlib import suppress
 from pathlib import Path
@@ -10,10 +11,12 @@ from typing import Any
 
 from rhythmid.errors import InputError
 
+STANDARD_OUTPUT = Path("-")  # the name by which JSON goes there instead of to a file
+
 
 def require_new(*paths: Path | None) -> None:
     """Refuse, before any work, results that would overwrite something or one another, or that cannot be written."""
-    given = [path for path in paths if path is not None]
+    given = [path for path in paths if path is not None and path != STANDARD_OUTPUT]
     for number, path in enumerate(given):
         if os.path.lexists(path):
             raise InputError(f"{path}: exists already; name another file or remove it")
@@ -48,8 +51,12 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write a JSON result; numbers that are not finite become null."""
-    write_text(path, json.dumps(_finite(content), indent=2, allow_nan=False) + "\n")
+    """Write a JSON result, to standard output where the path is `-`; numbers that are not finite become null."""
+    text = json.dumps(_finite(content), indent=2, allow_nan=False) + "\n"
+    if path == STANDARD_OUTPUT:
+        sys.stdout.write(text)
+    else:
+        write_text(path, text)
 
 
 def _finite(value: Any) -> Any:

@@ -52,9 +52,9 @@ def spent_words(elapsed: float, seconds: float) -> str:
 
 
 @contextmanager
-def progress(console: Console, budget: float | None = None) -> Iterator[Tell]:
+def progress(console: Console, budget: float | None = None, log: bool = True) -> Iterator[Tell]:
     """While this is open, what is told stands in a line with the time since it was opened, and with a `budget` [s] the share of
-    it that is spent; each thing that was told is also printed with the time at which it began."""
+    it that is spent. With `log` each thing that was told is also printed, with the time at which it began."""
     columns: list[ProgressColumn] = [
         SpinnerColumn(table_column=Column(min_width=1)),
         TimeElapsedColumn(table_column=Column(min_width=len("0:00:00"))),
@@ -67,7 +67,8 @@ def progress(console: Console, budget: float | None = None) -> Iterator[Tell]:
     began = time.monotonic()
 
     def printed(what: str) -> None:
-        console.print(f"[dim]{time.monotonic() - began:6.1f} s  {escape(what)}[/]")
+        if log:
+            console.print(f"[dim]{time.monotonic() - began:6.1f} s  {escape(what)}[/]")
 
     if not console.is_interactive:  # a bar would leave an empty line there
         yield printed

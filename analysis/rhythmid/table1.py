@@ -1,12 +1,13 @@
 """The paper's nine experiments, simulated, recorded to bags, and each identified from its bag alone: its Table 1."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
 from threadpoolctl import threadpool_limits
 
 from rhythmid.errors import InputError
@@ -15,9 +16,12 @@ from rhythmid.identify.identification import Identification
 from rhythmid.identify.identify import identify, paper_hopper
 from rhythmid.ltp.htf import theoretical_htf
 from rhythmid.parallel import fork_map
+from rhythmid.progress import Tell, counted, silent
 from rhythmid.record.bag_writer import write_bag
 from rhythmid.record.read import read_record
 from rhythmid.report.figures import Curve, magnitude_figure, phase_figure, save_figure
+from rhythmid.report.quantity import rounded
+from rhythmid.report.terminal_table import print_table
 
 # Paper, equation (14): nine chirps of 30 s that start at nine phases of the period T = 1 s. One more comes first, so that
 # the response to the nine is periodic when they are analysed.
@@ -136,17 +140,17 @@ def table1(
     folder: Path,
     cases: Sequence[Case] = CASES,
     workers: int | None = None,
-    tell: Callable[[str], None] | None = None,
+    tell: Tell = silent,
 ) -> list[Row]:
     """All experiments, on all cores; bags and figures go to `folder`. Raises InputError when one of them fails."""
     folder.mkdir(parents=True, exist_ok=True)
     rows: dict[int, Row] = {}
-    for index, row in fork_map(lambda case: run_case(case, folder), cases, workers):
+    tell("simulating and identifying")
+    done = fork_map(lambda case: run_case(case, folder), cases, workers)
+    for index, row in counted(done, len(cases), "experiments", tell):
         if isinstance(row, Exception):
             raise InputError(f"experiment {cases[index].number}: {row}")
         rows[index] = row
-        if tell is not None:
-            tell(f"experiment {cases[index].number} done ({len(rows)} of {len(cases)})")
         if row.magnitude is not None and row.phase is not None:
             save_figure(magnitude_figure(row.magnitude), folder / "figure2_magnitude.png")
             save_figure(phase_figure(row.phase), folder / "figure3_phase.png")
@@ -154,55 +158,67 @@ def table1(
 
 
 def _pair(ours: float, paper: float) -> str:
-    return f"{1e3 * ours:7.2f} {f'({1e3 * paper:.1f})':>8}"
+    return f"{1e3 * ours:.2f} ({1e3 * paper:.1f})"
 
 
-def _lines(heads: Sequence[str], widths: Sequence[int], body: Sequence[Sequence[str]]) -> list[str]:
-    return ["".join(f"{cell:>{width}}" for cell, width in zip(cells, widths)) for cells in (heads, *body)]
+def show(rows: Sequence[Row], console: Console) -> None:
+    """Print both tables: the paper's method, ours beside its, and joint maximum likelihood."""
+    _show_paper(rows, console)
+    _show_joint(rows, console)
 
 
-def format_table(rows: Sequence[Row]) -> str:
-    """Both tables as text: the paper's method, ours beside its, and joint maximum likelihood."""
-    return "\n".join([*_paper_table(rows), "", *_joint_table(rows)])
+def _case_cells(case: Case) -> tuple[str, str, str]:
+    return f"#{case.number}", f"{1e3 * case.input:.0f}", f"{1e3 * case.measurement:.0f}"
 
 
-def _paper_table(rows: Sequence[Row]) -> list[str]:
+def _show_paper(rows: Sequence[Row], console: Console) -> None:
     body = []
     for row in rows:
         case, found = row.case, row.result["methods"]["paper"]
         body.append(
             (
-                f"#{case.number}", f"{1e3 * case.input:.0f}", f"{1e3 * case.measurement:.0f}",
-                _pair(found["G0"]["sum"], case.sum),
+                *_case_cells(case), _pair(found["G0"]["sum"], case.sum),
                 _pair(found["G-1"]["input"], case.minus[0]), _pair(found["G-1"]["measurement"], case.minus[1]),
                 _pair(found["G+1"]["input"], case.plus[0]), _pair(found["G+1"]["measurement"], case.plus[1]),
                 f"{row.fitted['linear_spring.stiffness']:.3f}", f"{row.fitted['switched_damper.stance']:.4f}",
             )
         )  # fmt: skip
-    heads = ("", "τu", "τy", "G0 τu+τy", "G-1 τu", "G-1 τy", "G+1 τu", "G+1 τy", "k", "c")
-    return [
-        "The paper's method: delays [ms], ours and in brackets the paper's; k [N/m], c [N s/m] (the paper: 200 and 2.12)",
-        *_lines(heads, (4, 4, 5, 17, 17, 17, 17, 17, 9, 8), body),
-        f"largest error of a delay: ours {1e3 * worst_error(rows):.2f} ms, the paper's {1e3 * _paper_worst(rows):.2f} ms",
-    ]
+    heads = ("case", "τu", "τy", "G0 τu+τy", "G-1 τu", "G-1 τy", "G+1 τu", "G+1 τy", "k", "c")
+    title = "The paper's method: delays [ms], ours and in brackets the paper's; k [N/m], c [N s/m] (the paper: 200 and 2.12)"
+    print_table(console, title, heads, body, right=heads[1:])
+    worst = f"ours {1e3 * worst_error(rows):.2f} ms, the paper's {1e3 * _paper_worst(rows):.2f} ms"
+    console.print(f"largest error of a delay: {worst}", highlight=False)
 
 
-def _joint_table(rows: Sequence[Row]) -> list[str]:
+def _show_joint(rows: Sequence[Row], console: Console) -> None:
     body = []
     for row in rows:
-        case, delays, values = row.case, row.result["delays"], row.result["parameters"]
-        cells = [f"#{case.number}", f"{1e3 * case.input:.0f}", f"{1e3 * case.measurement:.0f}"]
-        for estimate, scale, digits in (
-            (delays["input"], 1e3, 5), (delays["measurement"], 1e3, 5),
-            (values["linear_spring.stiffness"], 1.0, 5), (values["switched_damper.stance"], 1.0, 6),
+        delays, values = row.result["delays"], row.result["parameters"]
+        cells = _case_cells(row.case)
+        for estimate, scale in (
+            (delays["input"], 1e3), (delays["measurement"], 1e3),
+            (values["linear_spring.stiffness"], 1.0), (values["switched_damper.stance"], 1.0),
         ):  # fmt: skip
-            cells += [f"{scale * estimate['value']:.{digits}f}", f"± {scale * estimate['std']:.0e}"]
+            cells += (
+                rounded(scale * estimate["value"], scale * estimate["std"]),
+                f"{scale * estimate['std']:.0e}",
+            )
         body.append(cells)
-    heads = ("", "τu", "τy", "joint τu", "bound", "joint τy", "bound", "joint k", "bound", "joint c", "bound")
-    return [
-        "Joint maximum likelihood: delays [ms], k, c, and the bound for the noise that each record shows",
-        *_lines(heads, (4, 4, 5, 12, 9, 12, 9, 12, 9, 11, 9), body),
-    ]
+    heads = (
+        "case",
+        "τu",
+        "τy",
+        "joint τu",
+        "bound",
+        "joint τy",
+        "bound",
+        "joint k",
+        "bound",
+        "joint c",
+        "bound",
+    )
+    title = "Joint maximum likelihood: delays [ms], k, c, and the bound for the noise that each record shows"
+    print_table(console, title, heads, body, right=heads[1:])
 
 
 def worst_error(rows: Sequence[Row]) -> float:

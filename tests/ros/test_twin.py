@@ -78,7 +78,7 @@ def test_it_tells_a_change_on_diagnostics_and_plots_its_figures(graph, tmp_path)
         pump(wrench)
         if k % 20 == 0:
             graph.spin(0.01)
-    said = lambda: [s for m in heard for s in m.status if s.name == "/hopper/twin: model"]  # noqa: E731
+    said = lambda: [s for m in heard for s in m.status if s.name == "rhythmid: hopper/twin/model"]  # noqa: E731
     graph.until(lambda: any(s.level != DiagnosticStatus.OK for s in said()), "a warning", 40.0)
     graph.until(
         lambda: plotted and plotted[-1].header.stamp.sec >= int(signals.stamp[-1] - 1.0), "the end", 40.0
@@ -136,7 +136,9 @@ def test_the_command_watches_until_it_is_interrupted(graph, tmp_path):
     heard = graph.listen("/diagnostics", DiagnosticArray, latched(1000))
     process = subprocess.Popen(line, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
     try:
-        graph.until(lambda: any(s.name == "/hopper/twin" for m in heard for s in m.status), "the twin", 60.0)
+        graph.until(
+            lambda: any(s.name == "rhythmid: hopper/twin" for m in heard for s in m.status), "the twin", 60.0
+        )
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=40.0)
     finally:

@@ -53,7 +53,9 @@ def test_executables_and_shared_files_are_where_ros_looks_for_them(install):
         "launch/experiment.launch.py",
         "config/demo.yaml",
         "config/paper_hopper.yaml",
+        "config/diagnostic_aggregator.yaml",
         "layouts/hopper.xml",
+        "layouts/hopper.foxglove.json",
     ):
         assert (share / file).is_file()
 

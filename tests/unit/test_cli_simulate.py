@@ -130,15 +130,13 @@ def test_a_place_that_nobody_may_write_is_refused(folder, rhythmid):
 def test_square_brackets_in_a_message_are_printed_as_they_are(folder, rhythmid):
     (folder / "run.yaml").write_text(EXPERIMENT + "safety: {envelope: [1]}\n", encoding="utf-8")
     done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "bag")
-    assert "two positions [low, high] in m are expected" in done.stderr
+    assert "two numbers [low, high] are expected" in done.stderr
 
 
 def test_help_and_version_are_answers(rhythmid):
     assert rhythmid("--help").returncode == 0
     version = rhythmid("--version")
     assert (version.returncode, version.stdout) == (0, f"rhythmid {package.__version__}\n")
-    nothing = rhythmid()
-    assert nothing.returncode == 2 and "simulate" in nothing.stdout + nothing.stderr
 
 
 def test_compiled_models_that_cannot_be_kept_are_refused_with_what_to_do(folder, rhythmid):

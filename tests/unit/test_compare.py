@@ -84,8 +84,8 @@ def test_with_neither_the_motions_are_aligned_and_a_delay_is_not_claimed(simulat
 def test_another_excitation_is_called_not_comparable_in_one_line(simulation):
     found = compare(simulation, [record(hopper(), CHIRP | {"amplitude": 0.7})])
     assert not found.comparable
-    assert found.summary.startswith("Not comparable: different excitation (the commands differ by 30 %")
-    assert "\n" not in found.summary
+    assert found.headline.startswith("Not comparable: different excitation (the commands differ by 30 %")
+    assert "\n" not in found.headline
     assert found.explanations == ()
 
 
@@ -130,7 +130,7 @@ def test_a_recordings_outliers_are_left_out_and_told(simulation):
 def test_where_nothing_differs_but_noise_they_agree(simulation, correlation):
     found = compare(simulation, [record(hopper(), CHIRP, delays=NONE, correlation=correlation)])
     assert not found.parted and found.slot is None
-    assert "agree within the noise" in found.summary
+    assert "agree within the noise" in found.headline
 
 
 @pytest.mark.parametrize(
@@ -199,7 +199,7 @@ def test_another_start_is_not_mistaken_for_physics():
     ringing = 2e-3 * np.exp(-0.5 * time) * np.cos(2 * np.pi * 2.24 * time)
     found = compare(one, [replace(one, output=replace(one.output, value=one.output.value + ringing))])
     assert not found.parted
-    assert "another start" in found.summary
+    assert "another start" in found.headline
 
 
 def test_the_comparison_is_plain_json(simulation):

@@ -57,7 +57,16 @@ def test_the_files_of_other_machines_are_read_and_fit_together(machine, tmp_path
 
 
 @pytest.mark.parametrize(
-    "document", ["README.md", "docs/files.md", "docs/machines.md", "docs/real.md", "docs/diagnose.md"]
+    "document",
+    [
+        "README.md",
+        "docs/files.md",
+        "docs/machines.md",
+        "docs/real.md",
+        "docs/diagnose.md",
+        "docs/python.md",
+        "docs/export.md",
+    ],
 )
 def test_links_lead_to_files_that_exist(document):
     text = (ROOT / document).read_text(encoding="utf-8")

@@ -60,3 +60,10 @@ def test_work_of_many_parts_tells_now_and_then_how_long_the_rest_takes():
     assert list(counted(parts(), 20, "records", told.append, lambda: clock[0])) == list(range(20))
     assert told[:2] == ["records: 2 of 20 done, about 54 s left", "records: 4 of 20 done, about 48 s left"]
     assert len(told) == 9
+
+
+def test_nothing_is_printed_where_there_is_no_log_and_no_terminal():
+    console = Console(file=io.StringIO())
+    with progress(console, log=False) as tell:
+        tell("reading")
+    assert isinstance(console.file, io.StringIO) and console.file.getvalue() == ""

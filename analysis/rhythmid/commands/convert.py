@@ -5,9 +5,15 @@ from typing import Annotated
 
 import typer
 
-from rhythmid.commands.options import SignalsFile
+from rhythmid.commands.options import Quiet, SignalsFile
+from rhythmid.commands.terminal import Terminal
 from rhythmid.errors import InputError
 from rhythmid.output import require_new
+
+EXAMPLES = (
+    "rhythmid convert run.csv --out bag",
+    "rhythmid convert run.mat --signals signals.yaml --joint knee --out bag",
+)
 
 
 def convert(
@@ -21,6 +27,7 @@ def convert(
         float | None,
         typer.Option("--rate", metavar="HZ", help="Rate of the rows, where the table holds no time."),
     ] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Write a table as a rosbag2 (MCAP) of joint states, with a signals.yaml inside that reads it back.
 
@@ -33,14 +40,15 @@ def convert(
     from rhythmid.start.start import guess
 
     require_new(out)
+    terminal = Terminal(quiet)
     if is_bag(table):
         raise InputError(f"{table}: is a bag already; convert takes a table")
     if signals is None and table.suffix not in (".yaml", ".yml"):
         guessed = guess(table, rate=rate)
         for line in guessed.lines():
-            typer.echo(line)
+            terminal.say(line)
         record = read_record(table, Signals.from_text(guessed.signals))
     else:
         record = read_record(table, signals)
     write_record(record, out, joint)
-    typer.echo(f"{out}: {', '.join(record.channels)}; read it with --signals {out / 'signals.yaml'}")
+    terminal.say(f"{out}: {', '.join(record.channels)}; read it with --signals {out / 'signals.yaml'}")

@@ -1,14 +1,17 @@
 """`rhythmid design`: a signal to play, and what it will tell, before the run."""
 
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, cast
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from rhythmid.commands.options import Elements, JsonFile
+from rhythmid.commands.options import Elements, JsonFile, Quiet
+from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new, write_json
+
+EXAMPLES = (
+    "rhythmid design model.yaml --duration 60 --band 0 7 --max-effort 0.02 --envelope 0.13 0.17 --noise-std 1e-5 --output plan",
+)
 
 
 def design(
@@ -96,61 +99,31 @@ def design(
     ] = 0,
     elements: Elements = None,
     json: JsonFile = None,
+    quiet: Quiet = False,
 ) -> None:
     """Design an experiment: the signal to play, as large as the machine bears, and every parameter's predicted uncertainty."""
     from rhythmid.design.design_folder import save_design
     from rhythmid.design.designer import design as make
-    from rhythmid.design.designer import forcing_of
     from rhythmid.design.requirements import Kind, Requirements
     from rhythmid.elements.catalogue import load_catalogue
-    from rhythmid.ltp.htf import transport_delays
     from rhythmid.model import Model
+    from rhythmid.progress_bar import progress
     from rhythmid.settings import Forcing
 
     require_new(output, json)
+    terminal = Terminal(quiet, json)
     catalogue = load_catalogue(elements or ())
     known = Model.load(model, catalogue)
-    input_delay, measurement_delay = delays or transport_delays(known)
-    wanted = Requirements(
-        duration, band, max_effort, envelope, noise_std, cast(Kind, kind), rate, harmonics,
-        forcing_of(known) if forcing is None else Forcing(*forcing), input_delay, measurement_delay, longest_delay,
-        max_distortion, shifts, period, spacing, seed,
+    wanted = Requirements.of(
+        known, duration, band, max_effort, envelope, noise_std, kind=cast(Kind, kind), rate=rate, harmonics=harmonics,
+        forcing=None if forcing is None else Forcing(*forcing), delays=delays, longest_delay=longest_delay,
+        max_distortion=max_distortion, shifts=shifts, period=period, spacing=spacing, seed=seed,
     )  # fmt: skip
-    with Console(stderr=True).status("designing") as status:
-        found = make(known, wanted, catalogue, status.update)
-        status.update("writing")
+    with progress(terminal.progress, log=False) as tell:
+        found = make(known, wanted, catalogue, tell)
+        tell("writing")
         save_design(found, model, output, elements or ())
-    result = found.to_dict()
-    show(result)
+    found.show(terminal.answer)
     if json is not None:
-        write_json(json, result)
-    typer.echo(f"{output}: play it with `rhythmid run {output / 'experiment.yaml'}`")
-
-
-def show(result: dict[str, Any]) -> None:
-    """Print a design."""
-    console = Console()
-    table = Table(title="predicted standard deviations")
-    for column in ("name", "value", "std", "unit"):
-        table.add_column(column)
-    rows = result["parameters"] | {f"delay: {name}": estimate for name, estimate in result["delays"].items()}
-    for name, estimate in rows.items():
-        table.add_row(name, f"{estimate['value']:.6g}", f"{estimate['std']:.2g}", estimate["unit"])
-    console.print(table)
-    size, position, signal, bent = (result[key] for key in ("amplitude", "position", "signal", "distortion"))
-    console.print(
-        f"{result['kind']}: {len(signal['frequencies'])} lines, peak {size['peak']:.4g} {size['unit']} "
-        f"(limit: {size['limited_by']}), rms {size['rms']:.4g}, crest factor {size['crest_factor']:.2f}"
-    )
-    low, high = position["cycle"]
-    console.print(
-        f"position {position['low']:.6g} to {position['high']:.6g} {position['unit']}, the limit cycle alone {low:.6g} to "
-        f"{high:.6g}"
-    )
-    console.print(
-        f"repeats over {signal['window']:.6g} s after a lead-in of {signal['lead_in']:.4g} s; harmonics up to "
-        f"±{signal['harmonics']} stay apart"
-    )
-    console.print(f"distortion of the response: even {bent['even']:.2%}, odd {bent['odd']:.2%}")
-    for note in result["notes"]:
-        console.print(f"note: {note}")
+        write_json(json, found.to_dict())
+    terminal.say(f"{output}: play it with `rhythmid run {output / 'experiment.yaml'}`")

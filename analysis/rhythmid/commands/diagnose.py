@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from rhythmid.commands import machines
-from rhythmid.commands.options import Bags, Elements, JsonFile, ReportFile, SignalsFile, command_line
+from rhythmid.commands.options import Bags, Elements, JsonFile, Quiet, ReportFile, SignalsFile, command_line
+from rhythmid.commands.terminal import Terminal
 from rhythmid.errors import InputError
 from rhythmid.output import require_new, write_json
 
@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 Model_ = Annotated[
     Path | None, typer.Option("--model", help="Nominal model, the one that may lack something.")
 ]
+
+EXAMPLES = (
+    "rhythmid diagnose bag --model model.yaml",
+    "rhythmid diagnose a b --signals signals.yaml --model model.yaml --holdout c --report page.html --save-model better.yaml",
+    "rhythmid diagnose real --sim simulated",
+)
 
 
 def diagnose(
@@ -54,6 +60,7 @@ def diagnose(
             help="Begin no further round of the search after so many seconds; the answer says what was not tried.",
         ),
     ] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Say where records and model part, which physics the model lacks, and how much better it fits with it.
 
@@ -75,12 +82,22 @@ def diagnose(
         )
     if model is not None and machines.is_machine(model):
         machines.refuse(sim=sim, report=report)
-        machines.diagnose_files(bags, model, signals, holdout or (), elements or (), json, save_model, budget)
+        machines.diagnose_files(
+            bags,
+            model,
+            signals,
+            holdout or (),
+            elements or (),
+            json,
+            save_model,
+            budget,
+            Terminal(quiet, json),
+        )
         return
     catalogue = load_catalogue(elements or ())
     nominal = None if model is None else Model.load(model, catalogue)
-    console = Console(stderr=True)
-    with progress(console) as tell:
+    terminal = Terminal(quiet, json)
+    with progress(terminal.progress) as tell:
         records = load_records(bags, signals, tell)
         unseen = load_records(holdout or (), signals, tell)
     simulation = None if sim is None else _simulation(sim, signals, sim_signals)
@@ -88,18 +105,17 @@ def diagnose(
     if simulation is not None:
         from rhythmid.compare.compare import compare
 
-        with progress(console) as tell:
+        with progress(terminal.progress) as tell:
             comparison = compare(simulation, records, nominal, tell)
         result["comparison"] = comparison.to_dict()
-        show_comparison(result["comparison"])
+        comparison.show(terminal.answer)
     if nominal is not None:
-        from rhythmid.diagnose.answer.printed import show
         from rhythmid.diagnose.diagnosis import diagnose as find
 
-        with progress(console, budget) as tell:
+        with progress(terminal.progress, budget) as tell:
             answer = find(records, nominal, unseen, catalogue, tell, budget)
-        result = answer.diagnosis.to_dict() | result
-        show(answer.diagnosis, Console())
+        result = answer.to_dict() | result
+        answer.show(terminal.answer)
     if json is not None:
         write_json(json, result)
     if save_model is not None and answer is not None:
@@ -114,7 +130,7 @@ def diagnose(
             assert comparison is not None and simulation is not None
             page = present_comparison(comparison, simulation, records, command_line())
         write_page(report, page)
-        typer.echo(f"report: {report}")
+        terminal.say(f"report: {report}")
 
 
 def _simulation(path: Path, signals: Path | None, own: Path | None) -> "Record":
@@ -130,17 +146,3 @@ def _simulation(path: Path, signals: Path | None, own: Path | None) -> "Record":
             return read_record(path)
         except InputError:
             raise error from None
-
-
-def show_comparison(result: dict) -> None:
-    """Print a comparison."""
-    console = Console()
-    alignment = result["alignment"]
-    offset = alignment["offset"]
-    console.print(
-        f"[bold]{result['simulation']}[/] against [bold]{result['recording']}[/]: aligned by the {alignment['by']}, the "
-        f"recording is {offset['value']:.6f} ± {2.0 * offset['std']:.2g} s later; {result['overlap']['value']:.4g} s in common"
-    )
-    console.print(result["summary"])
-    for note in result["notes"]:
-        console.print(f"note: {note}")

@@ -8,9 +8,15 @@ from typing import Annotated
 
 import typer
 
-from rhythmid.commands.options import Elements
+from rhythmid.commands.options import Elements, Quiet
+from rhythmid.commands.terminal import Terminal
 from rhythmid.errors import InputError
 from rhythmid.output import require_new, require_writable, write_text
+
+EXAMPLES = (
+    "rhythmid init run.csv",
+    "rhythmid init bag --joint knee --out files --yes",
+)
 
 
 def init(
@@ -30,6 +36,7 @@ def init(
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite files that exist.")] = False,
     elements: Elements = None,
+    quiet: Quiet = False,
 ) -> None:
     """Guess which channel is what, and a nominal model to begin with; write both, every guess with its reason."""
     from rhythmid.elements.catalogue import load_catalogue
@@ -41,16 +48,17 @@ def init(
     signals, model = out / "signals.yaml", out / "model.yaml"
     for path in (signals, model):
         require_writable(path) if force else require_new(path)
-    asking = not yes and sys.stdin.isatty()
+    asking = not yes and not quiet and sys.stdin.isatty()
     begun = start(sources, joint, rate, _prompt if asking else first_answer, load_catalogue(elements or ()))
     write_text(signals, begun.guess.signals)
     write_text(model, begun.model)
+    terminal = Terminal(quiet)
     for line in begun.lines():
-        typer.echo(line)
+        terminal.say(line)
     given = " ".join(map(str, sources))
-    typer.echo(f"{signals}, {model}: every guess is a comment there; go on with")
-    typer.echo(f"  rhythmid check {sources[0]} --signals {signals}")
-    typer.echo(f"  rhythmid diagnose {given} --signals {signals} --model {model}")
+    terminal.say(f"{signals}, {model}: every guess is a comment there; go on with")
+    terminal.say(f"  rhythmid check {sources[0]} --signals {signals}")
+    terminal.say(f"  rhythmid diagnose {given} --signals {signals} --model {model}")
 
 
 def _prompt(question: str, answers: Sequence[str]) -> int:

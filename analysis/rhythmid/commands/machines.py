@@ -5,17 +5,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
-
 from rhythmid.errors import InputError
 from rhythmid.output import write_json
 from rhythmid.report.quantity import rounded
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from rhythmid.body.machine import Machine
+    from rhythmid.commands.terminal import Terminal
     from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
     from rhythmid.elements.catalogue import Catalogue
     from rhythmid.identify.joints.joint_identification import MachineIdentification
@@ -68,6 +66,7 @@ def diagnose_files(
     json: Path | None,
     save_model: Path | None,
     budget: float | None,
+    terminal: "Terminal",
 ) -> None:
     """Diagnose the machine of several joints in a model file, print and write the answer."""
     from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
@@ -78,16 +77,19 @@ def diagnose_files(
     catalogue = load_catalogue(elements)
     machine, records = loaded(model, catalogue, bags, signals)
     unseen = load_joint_records(holdout, _signals(bags, signals)) if holdout else []
-    with progress(Console(stderr=True), budget) as tell:
+    with progress(terminal.progress, budget) as tell:
         answer = diagnose_machine(records, machine, unseen, catalogue, tell, budget)
-    show_diagnosis(answer.diagnosis, Console())
+    show_diagnosis(answer.diagnosis, terminal.answer)
     if json is not None:
         write_json(json, answer.diagnosis.to_dict())
-    saved(answer.machine, save_model)
+    saved(answer.machine, save_model, terminal)
 
 
-def show_diagnosis(found: "MachineDiagnosis", console: Console) -> None:
+def show_diagnosis(found: "MachineDiagnosis", console: "Console") -> None:
     """Print a diagnosis: the verdict, what is missing at which joint, then a row for every joint."""
+    from rich.markup import escape
+    from rich.table import Table
+
     console.print(f"[bold]{found.verdict.replace('_', ' ')}[/]: {escape(found.summary)}")
     for one in found.missing:
         what = f"mass of {one.link}" if one.link else one.element
@@ -122,14 +124,14 @@ def _share(error: float | None) -> str:
     return "—" if error is None else f"{100.0 * error:.3g} %"
 
 
-def saved(machine: "Machine", path: Path | None) -> None:
+def saved(machine: "Machine", path: Path | None, terminal: "Terminal") -> None:
     """Write a machine where that is asked for: as YAML, or as MJCF (.xml) or URDF (.urdf)."""
     if path is None:
         return
     from rhythmid.body.write_back import save_machine
 
     if left := save_machine(machine, path):
-        typer.echo(f"{path}: cannot express {', '.join(left)}; a .yaml can")
+        terminal.say(f"{path}: cannot express {', '.join(left)}; a .yaml can")
 
 
 def identify_files(
@@ -139,6 +141,7 @@ def identify_files(
     elements: Sequence[Path],
     json: Path | None,
     save_model: Path | None,
+    terminal: "Terminal",
 ) -> None:
     """Identify the machine of several joints in a model file, print and write the answer."""
     from rhythmid.elements.catalogue import load_catalogue
@@ -146,16 +149,19 @@ def identify_files(
     from rhythmid.progress_bar import progress
 
     machine, records = loaded(model, load_catalogue(elements), bags, signals)
-    with progress(Console(stderr=True), None) as tell:
+    with progress(terminal.progress) as tell:
         found = identify_machine(records, machine, tell=tell)
-    show_identification(found, Console())
+    show_identification(found, terminal.answer)
     if json is not None:
         write_json(json, found.to_dict())
-    saved(found.machine, save_model)
+    saved(found.machine, save_model, terminal)
 
 
-def show_identification(found: "MachineIdentification", console: Console) -> None:
+def show_identification(found: "MachineIdentification", console: "Console") -> None:
     """Print an identification: parameters, inertias, errors, and what the records do not tell apart."""
+    from rich.markup import escape
+    from rich.table import Table
+
     table = Table(title="parameters")
     for column in ("name", "value", "std", "unit"):
         table.add_column(column)
@@ -180,7 +186,9 @@ def show_identification(found: "MachineIdentification", console: Console) -> Non
             console.print(f"{label}: {escape(line)}")
 
 
-def simulate_files(model: Path, experiment: Path, out: Path, elements: Sequence[Path]) -> None:
+def simulate_files(
+    model: Path, experiment: Path, out: Path, elements: Sequence[Path], terminal: "Terminal"
+) -> None:
     """Run an experiment with the machine of several joints in a model file, and write its bag."""
     from rhythmid.body.joint_experiment import JointExperiment, perform
     from rhythmid.body.machine import Machine
@@ -190,4 +198,4 @@ def simulate_files(model: Path, experiment: Path, out: Path, elements: Sequence[
     machine = Machine.load(model, load_catalogue(elements))
     made = perform(machine, JointExperiment.load(experiment))
     write_joint_bag(out, {topic: (made.stamp_ns, *rest) for topic, rest in made.topics.items()})
-    typer.echo(f"{out}: {len(made.stamp_ns)} samples of {', '.join(made.topics)}")
+    terminal.say(f"{out}: {len(made.stamp_ns)} samples of {', '.join(made.topics)}")

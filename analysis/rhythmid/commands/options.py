@@ -11,8 +11,11 @@ Bags = Annotated[
     list[Path], typer.Argument(help="Bag directories, .mcap/.db3 files, or signals.yaml files of tables.")
 ]
 SignalsFile = Annotated[Path | None, typer.Option("--signals", help="Which recorded channel is what.")]
-JsonFile = Annotated[Path | None, typer.Option("--json", help="Write the result as JSON.")]
+JsonFile = Annotated[
+    Path | None, typer.Option("--json", help="Write the result as JSON; - is standard output.")
+]
 ReportFile = Annotated[Path | None, typer.Option("--report", help="Write a self-contained HTML page.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Elements = Annotated[
     list[Path] | None, typer.Option("--elements", help="Folder with elements of your own; may be repeated.")
 ]

@@ -1,24 +1,24 @@
 """`rhythmid proof`: conceal effects, diagnose, open the seals and count."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
-from rich.console import Console
-from rich.markdown import Markdown
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
+from rhythmid.commands.options import Quiet
+from rhythmid.commands.terminal import Terminal
 from rhythmid.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 Kinds = Literal["single", "pairs", "null", "left-out", "all"]
 Machines = Literal["hopper", "axis", "joint", "pendulum", "shaken", "servo", "decay", "motor", "all"]
+
+EXAMPLES = (
+    "rhythmid proof --cases 8 --kind single --out folder",
+    "rhythmid proof --out folder --resume",
+)
 
 
 def proof(
@@ -46,8 +46,19 @@ def proof(
     keep: Annotated[
         bool, typer.Option("--keep-bags", help="Keep the records of cases that are done.")
     ] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Draw machines with concealed effects, seal the truth, diagnose from their records, open the seals and score."""
+    from rich.markdown import Markdown
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
     from rhythmid.proof.campaign import Campaign, Sealed, Task, begin, carry_out, scores_in, write_card
 
     def chosen(campaign: Campaign) -> list[Task]:
@@ -57,7 +68,8 @@ def proof(
             raise InputError(f"--only {unknown[0]}: is none of the cases {tasks[0].name} … {tasks[-1].name}")
         return [task for task in tasks if not only or task.name in only]
 
-    console = Console()
+    terminal = Terminal(quiet)
+    console = terminal.answer
     if again:
         _replay(out, console, chosen)
         return
@@ -71,7 +83,7 @@ def proof(
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True)) as progress:
+    with Progress(*columns, console=terminal.progress) as progress:
         bar = progress.add_task("cases", total=len(tasks), completed=len(scores_in(out, tasks)))
 
         def report(news) -> None:
@@ -97,8 +109,10 @@ def proof(
         raise typer.Exit(1)
 
 
-def _replay(out: Path, console: Console, chosen) -> None:
+def _replay(out: Path, console: "Console", chosen) -> None:
     """Score kept answers of the campaign that the folder holds."""
+    from rich.markdown import Markdown
+
     from rhythmid.proof.campaign import read_campaign
     from rhythmid.proof.replay import replay_campaign
 

@@ -5,7 +5,11 @@ from typing import Annotated
 
 import typer
 
+from rhythmid.commands.options import Quiet
+from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new
+
+EXAMPLES = ("rhythmid recover bag", "rhythmid recover broken.mcap --out whole")
 
 
 def recover(
@@ -14,6 +18,7 @@ def recover(
         Path | None,
         typer.Option("--out", metavar="DIR", help="Bag to write: a new folder; BAG_recovered if not given."),
     ] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Write every whole message of a damaged recording to a new bag, and list what was lost. BAG is left as it is."""
     from rhythmid.record.bag import Bag
@@ -21,5 +26,6 @@ def recover(
 
     out = out or bag.with_name(f"{Bag(bag).name}_recovered")
     require_new(out)
+    terminal = Terminal(quiet)
     for line in write_recovered(bag, out).lines():
-        typer.echo(line)
+        terminal.say(line)

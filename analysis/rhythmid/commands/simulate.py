@@ -6,8 +6,14 @@ from typing import Annotated
 import typer
 
 from rhythmid.commands import machines
-from rhythmid.commands.options import Elements
+from rhythmid.commands.options import Elements, Quiet
+from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new
+
+EXAMPLES = (
+    "rhythmid simulate model.yaml --experiment experiment.yaml --out bag",
+    "rhythmid simulate model.yaml --experiment experiment.yaml --out bag --all-topics",
+)
 
 
 def simulate(
@@ -18,27 +24,21 @@ def simulate(
         bool, typer.Option("--all-topics", help="Record the true output and command too.")
     ] = False,
     elements: Elements = None,
+    quiet: Quiet = False,
 ) -> None:
     """Run an experiment without ROS: writes the bag that the graph would record."""
-    from rhythmid.experiment import Experiment, perform
-    from rhythmid.record.bag_writer import write_bag
+    from rhythmid.offline_run import simulate as run
+    from rhythmid.progress_bar import progress
 
     require_new(out)
     if machines.is_machine(model):
         machines.refuse(all_topics=all_topics)
-        machines.simulate_files(model, experiment, out, elements or ())
+        machines.simulate_files(model, experiment, out, elements or (), Terminal(quiet))
         return
-    described = Experiment.load(experiment, tuple(elements or ()), model)
-    messages = perform(described)
-    wanted = (
-        list(messages) if all_topics else [topic for topic in described.record.topics if topic in messages]
-    )
-    write_bag(
-        out,
-        {f"{described.namespace}/{topic}": messages[topic] for topic in wanted},
-        storage=described.record.storage,
-        run=described.description(),
-        joint=described.joint,
-        namespace=described.namespace,
-    )
-    typer.echo(f"{out}: {described.count} samples at {described.time.rate} Hz of {', '.join(wanted)}")
+    terminal = Terminal(quiet)
+    with progress(terminal.progress, log=False) as tell:
+        tell("simulating")
+        found = run(model, experiment, elements or ())
+        tell("writing the bag")
+        found.save(out, all_topics)
+    terminal.say(f"{out}: {found.headline} of {', '.join(found.topics(all_topics))}")

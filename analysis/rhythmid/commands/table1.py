@@ -4,10 +4,15 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from rhythmid.commands.options import JsonFile
+from rhythmid.commands.options import JsonFile, Quiet
+from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new, write_json
+
+EXAMPLES = (
+    "rhythmid table1",
+    "rhythmid table1 --out folder --json table1.json",
+)
 
 
 def table1(
@@ -15,18 +20,21 @@ def table1(
     out: Annotated[
         Path | None, typer.Option("--out", help="New folder that keeps the nine bags and the figures.")
     ] = None,
+    quiet: Quiet = False,
 ) -> None:
     """Simulate the paper's nine experiments, identify each from its bag alone, and print its Table 1 beside ours."""
     import tempfile
 
-    from rhythmid.table1 import format_table
+    from rhythmid.progress_bar import progress
+    from rhythmid.table1 import show
     from rhythmid.table1 import table1 as run
 
     require_new(json, out)
+    terminal = Terminal(quiet, json)
     folder = out or Path(tempfile.mkdtemp(prefix="rhythmid_table1_"))
-    with Console(stderr=True).status("simulating") as status:
-        rows = run(folder, tell=status.update)
-    typer.echo(format_table(rows))
-    typer.echo(f"bags and figures: {folder}")
+    with progress(terminal.progress, log=False) as tell:
+        rows = run(folder, tell=tell)
+    show(rows, terminal.answer)
+    terminal.say(f"bags and figures: {folder}")
     if json is not None:
         write_json(json, [row.result for row in rows])

@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 
-from rhythmid.commands.options import Elements, JsonFile, SignalsFile
+from rhythmid.commands.options import Elements, JsonFile, Quiet, SignalsFile
+from rhythmid.commands.terminal import Terminal
 from rhythmid.errors import InputError
 from rhythmid.output import require_new, write_json
 
@@ -17,6 +16,10 @@ if TYPE_CHECKING:
     from rhythmid.twin.watch import Watch
 
 LIVE_GROUP = "rhythmid.live"  # entry points of packages that know how to reach a running robot
+EXAMPLES = (
+    "rhythmid watch model.yaml --signals signals.yaml",
+    "rhythmid watch model.yaml --bag bag --healthy 120 --json -",
+)
 
 
 def watch(
@@ -45,12 +48,17 @@ def watch(
     ] = True,
     elements: Elements = None,
     json: JsonFile = None,
+    quiet: Quiet = False,
 ) -> None:
     """Run a model beside its machine and say when, where and by how much the two part.
 
     Without --bag the running machine is watched over ROS 2 until Ctrl-C.
     """
     require_new(json, save_calibration)
+    if bag is None and quiet:
+        raise InputError(
+            "--quiet belongs to a recording: give --bag, or leave it out to see the running machine"
+        )
     if bag is None:
         raise typer.Exit(
             _live(
@@ -58,6 +66,8 @@ def watch(
                 save_calibration=save_calibration, diagnose=diagnose, elements=tuple(elements or ()), json=json,
             )
         )  # fmt: skip
+    from rich.markup import escape
+
     from rhythmid.elements.catalogue import load_catalogue
     from rhythmid.model import Model
     from rhythmid.record.read import read_record
@@ -72,7 +82,7 @@ def watch(
     forced = record.forcing is not None
     known = None if calibration is None else load(calibration, machine, settings, forced, catalogue)
     watching = Watch(machine, settings, forced, known, catalogue, diagnose, tuple(elements or ()))
-    console, seen = Console(), _Told(watching)
+    console, seen = Terminal(quiet, json).answer, _Told(watching)
     watch_record(record, watching, seen.take)
     if save_calibration is not None and watching.twin.calibration is not None:
         save(watching.twin.calibration, save_calibration)

@@ -1,0 +1,5 @@
+"""A simulation's record beside a real one; `rhythmid.compare(...)` calls `compare.compare.compare`."""
+
+from rhythmid.callable_package import make_callable
+
+make_callable(__name__)

@@ -7,9 +7,9 @@ with the recording's inputs.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rhythmid.compare.align import Alignment, align
 from rhythmid.compare.explain import Explanation, explain
 from rhythmid.compare.pair import Pair, harmonic_columns, pair_of
+from rhythmid.compare.place import HARMONICS, Place, place_of
 from rhythmid.diagnose.answer.wording import SENTENCES
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import estimate, start_only
@@ -27,34 +28,13 @@ from rhythmid.record.outlier import without_outliers
 from rhythmid.record.record import Channel, Record
 from rhythmid.report.comparison import LABELS
 from rhythmid.report.run import Run
+from rhythmid.result import Result, Row, axis_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from rich.console import Console
 
 Array = NDArray[np.float64]
-HARMONICS = 6  # that are listed
-LOUD = 4.0  # times the noise's variance: from there the motions have parted
-SMOOTHED = 4  # bins on either side over which a coherence is averaged
-PHASES, CELLS = 24, 6  # parts of a cycle; cells along position and along velocity
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where the difference is greatest. Shares are of its power; None where unknown.
-
-    `first` and `strongest` [s] on the recording's clock, `growth` the power relative to the motion's in the last quarter over that in the first; `phase` [cycles after the
-    forcing's peak] with its share in the quarter cycle around; `position`, `velocity` of the worst cell; `frequency` [Hz] with
-    its share; `harmonic` of the forcing there; `coherence` with the command there.
-    """
-
-    first: float | None
-    strongest: float
-    growth: float
-    phase: float | None
-    phase_share: float | None
-    position: float
-    velocity: float
-    frequency: float
-    frequency_share: float
-    harmonic: int | None
-    coherence: float | None
 
 
 @dataclass(frozen=True)
@@ -67,7 +47,7 @@ class HarmonicRatio:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Result):
     """A simulation beside a recording. `left` (n,) is what the explanations leave of the difference."""
 
     simulation: str
@@ -105,7 +85,7 @@ class Comparison:
         return {
             "simulation": self.simulation,
             "recording": self.recording,
-            "summary": self.summary,
+            "summary": self.headline,
             "comparable": self.comparable,
             "through_model": self.through_model,
             "parted": self.parted,
@@ -140,8 +120,8 @@ class Comparison:
         }  # fmt: skip
 
     @property
-    def summary(self) -> str:
-        """The answer in a few sentences."""
+    def headline(self) -> str:
+        """The answer in a few sentences; the JSON's `summary`."""
         if not self.comparable:
             return f"Not comparable: different excitation ({self.alignment.mismatch}); with --model the model is run in the simulation's place."
         size = f"{100 * self.nrmse:.3g} % of the motion"
@@ -155,6 +135,32 @@ class Comparison:
         causes = [one for one in self.explanations if one.slot is not None]
         said = "; then ".join(_cause(one) for one in causes)
         return f"They part by {size}, {SENTENCES[causes[0].slot or 'force']}: {said}. {self._where()}"
+
+    def tables(self) -> Mapping[str, Sequence[Row]]:
+        """`explanations` of the difference, the largest first, and `harmonics` of the forcing, recording over simulation."""
+        return {
+            "explanations": [
+                {"name": one.name, "slot": one.slot, "explained": one.explained, "also": ", ".join(one.also)}
+                for one in self.explanations
+            ],
+            "harmonics": [{"number": h.number, "gain": h.gain, "late": h.late} for h in self.harmonics],
+        }
+
+    def show(self, console: "Console") -> None:
+        """Print how the two were aligned, the answer and its notes."""
+        from rhythmid.compare.printed import show
+
+        show(self.to_dict(), console)
+
+    def plot(self, axis: "Axes | None" = None) -> "Axes":
+        """Draw recording, simulation and their difference over time; on a new figure where no axis is given."""
+        axis, pair = axis_or_new(axis), self.pair
+        axis.plot(pair.time, pair.recording, color="black", linewidth=1.0, label=self.recording)
+        axis.plot(pair.time, pair.simulation, linestyle="--", label=f"{self.simulation} (simulation)")
+        axis.plot(pair.time, pair.recording - pair.simulation, linewidth=0.8, label="difference")
+        axis.set(xlabel="time [s]", ylabel=f"output [{self.unit}]")
+        axis.legend(loc="upper right")
+        return axis
 
     def _where(self) -> str:
         place = self.place
@@ -214,12 +220,36 @@ def run_of(found: Comparison) -> Run:
 
 
 def compare(
-    simulation: Record, recordings: Sequence[Record], model: Model | None = None, tell: Tell = lambda _: None
+    simulation: Record,
+    recordings: Record | Sequence[Record],
+    model: Model | None = None,
+    tell: Tell = lambda _: None,
 ) -> Comparison:
     """Compare a simulation with the recording of the same excitation, the best match of several.
 
-    Raises InputError when there is too little in common.
+    Parameters
+    ----------
+    simulation : record of the simulation.
+    recordings : one or more records of the machine.
+    model : runs in the simulation's place, fitted to it, where the excitations differ.
+    tell : is told what begins.
+
+    Raises
+    ------
+    InputError
+        Where there is too little in common.
+
+    Examples
+    --------
+    >>> import rhythmid as rh
+    >>> run = {"excitation": {"type": "chirp", "amplitude": 0.02, "sweep": 3.0}, "noise": {"measurement_std": 1e-5}}
+    >>> machine = rh.paper_hopper()
+    >>> real = rh.simulate(machine.with_values({"linear_spring.stiffness": 190.0}), run).record
+    >>> found = rh.compare(rh.simulate(machine, run).record, real)
+    >>> found.parted
+    True
     """
+    recordings = [recordings] if isinstance(recordings, Record) else recordings
     for one in recordings:
         if one.output_kind != simulation.output_kind:
             raise InputError(
@@ -277,78 +307,6 @@ def in_its_place(simulation: Record, recording: Record, model: Model) -> Record:
     one = series[0]
     output = Channel(one.centres, one.averaged + run.residuals[0], simulation.output.unit, "model")
     return replace(recording, name=simulation.name, output=output)
-
-
-def place_of(pair: Pair, difference: Array) -> Place:
-    """Where a difference (n,) is greatest."""
-    square = np.where(pair.used, difference**2, 0.0)
-    width = max(1, round(1.0 / (pair.frequency * pair.step)))
-    local = np.convolve(square, np.ones(width) / width, mode="same")
-    level = max(LOUD * pair.noise**2, 0.1 * float(np.mean(square)))
-    loud = np.flatnonzero(local > level)
-    quarter = max(1, len(square) // 4)
-    share = [
-        float(np.mean(square[part]) / max(np.var(pair.recording[part]), 1e-300))
-        for part in (slice(quarter), slice(-quarter, None))
-    ]
-    growth = share[1] / max(share[0], 1e-300)
-    phase, phase_share = None, None
-    if pair.phase is not None:
-        sums = np.bincount((pair.phase * PHASES).astype(int) % PHASES, square, PHASES)
-        around = np.array(
-            [
-                np.take(sums, range(i - PHASES // 8, i + PHASES // 8 + 1), mode="wrap").sum()
-                for i in range(PHASES)
-            ]
-        )
-        phase = (int(np.argmax(around)) + 0.5) / PHASES
-        phase_share = float(around.max() / max(sums.sum(), 1e-300))
-    x, v = pair.recording, pair.velocity
-    edges = [np.linspace(float(np.quantile(q, 0.01)), float(np.quantile(q, 0.99)), CELLS + 1) for q in (x, v)]
-    weight = np.histogram2d(x, v, edges, weights=square)[0]
-    count = np.histogram2d(x, v, edges)[0]
-    mean = np.where(count > 0.005 * len(x), weight / np.maximum(count, 1), 0.0)
-    i, j = np.unravel_index(int(np.argmax(mean)), mean.shape)
-    middle = [0.5 * (e[:-1] + e[1:]) for e in edges]
-    frequency, share, harmonic, coherence = _strongest(pair, difference)
-    return Place(
-        float(pair.time[loud[0]]) if len(loud) else None, float(pair.time[int(np.argmax(local))]), growth, phase, phase_share,
-        float(middle[0][i]), float(middle[1][j]), frequency, share, harmonic, coherence,
-    )  # fmt: skip
-
-
-def _strongest(pair: Pair, difference: Array) -> tuple[float, float, int | None, float | None]:
-    """Strongest frequency of the difference [Hz], its share, the forcing's harmonic there, coherence with the command there."""
-    n = len(difference)
-    window = np.hanning(n)
-    power = np.abs(np.fft.rfft((difference - difference.mean()) * window)) ** 2
-    power[0] = 0.0
-    peak = int(np.argmax(power))
-    frequency = peak / (n * pair.step)
-    share = float(power[max(0, peak - 2) : peak + 3].sum() / max(power.sum(), 1e-300))
-    harmonic = None
-    if pair.pumping is not None:
-        number = round(frequency / pair.pumping)
-        if number >= 1 and abs(frequency - number * pair.pumping) < 1.5 / (n * pair.step):
-            harmonic = number
-    return frequency, share, harmonic, _follows_command(pair, difference, peak)
-
-
-def _follows_command(pair: Pair, difference: Array, peak: int) -> float | None:
-    """Coherence of the difference, the forcing's harmonics taken out, with the oscillator's response to the command, around bin
-    `peak`: 1 where the difference is that response, filtered."""
-    if pair.command is None or np.ptp(pair.command) == 0.0:
-        return None
-    rest = difference
-    if pair.pumping is not None:
-        columns = harmonic_columns(pair.time, pair.pumping, HARMONICS)
-        rest = difference - columns @ np.linalg.lstsq(columns, difference, rcond=1e-10)[0]
-    window = np.hanning(len(rest))
-    one = np.fft.rfft(rest * window)
-    other = np.fft.rfft(pair.oscillator.response(pair.command, pair.step) * window)
-    near = slice(max(1, peak - SMOOTHED), peak + SMOOTHED + 1)
-    energy = float(np.sum(np.abs(one[near]) ** 2) * np.sum(np.abs(other[near]) ** 2))
-    return float(np.abs(np.sum(one[near] * np.conj(other[near]))) ** 2 / energy) if energy > 0.0 else None
 
 
 def _ratios(pair: Pair) -> tuple[HarmonicRatio, ...]:

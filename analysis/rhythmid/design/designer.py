@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,17 @@ from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment
 from rhythmid.identify.harmonic_likelihood import DELAYS, INPUT_DELAY, MEASUREMENT_DELAY, visible_sidebands
 from rhythmid.identify.joint import without_forcing
+from rhythmid.identify.joint_covariance import JointCovariance
 from rhythmid.ltp.htf import LinearisedModel, linearised
 from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
 from rhythmid.progress import Tell
-from rhythmid.settings import Delay, Forcing, Noise, TimeMode
+from rhythmid.result import Result, Row, axis_or_new
+from rhythmid.settings import Delay, Noise, TimeMode
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from rich.console import Console
 
 Array = NDArray[np.float64]
 LOOKED_AT = range(1, 9)  # harmonics that may stand out of the noise
@@ -35,7 +41,7 @@ BIASED = 1.0  # standard deviations of bias that deserve a word
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class Design(Result):
     """An experiment ready to be played, with what is predicted of it.
 
     `command` holds the samples that the file will hold; `machine` is the model linearised about its limit cycle,
@@ -80,6 +86,42 @@ class Design:
                 f"--harmonics {beyond[-1]} would keep them apart"
             )
         return tuple(found)
+
+    @property
+    def headline(self) -> str:
+        """Kind, length and size of the command."""
+        unit = self.experiment.model.units.force
+        return (
+            f"{self.requirements.kind} of {self.command.duration:.4g} s with {len(self.plan.response.lines)} lines, peak "
+            f"{self.command.peak:.4g} {unit} (limit: {self.amplitude.limited_by})"
+        )
+
+    @property
+    def covariance(self) -> JointCovariance:
+        """Predicted covariance of all free parameters, delays included."""
+        fit = self.prediction.fit
+        values = fit.model.parameters
+        return JointCovariance.of(fit.names, [values[name].unit for name in fit.names], fit.covariance)
+
+    def tables(self) -> Mapping[str, Sequence[Row]]:
+        """`estimates`: each parameter and delay with its predicted standard deviation."""
+        delays = {f"delay: {name}": one for name, one in self.prediction.delays.items()}
+        known = {**self.prediction.parameters, **delays}
+        return {"estimates": [{"name": name} | one.to_dict() for name, one in known.items()]}
+
+    def show(self, console: "Console") -> None:
+        """Print the prediction and what the run will do."""
+        from rhythmid.design.printed import show
+
+        show(self.to_dict(), console)
+
+    def plot(self, axis: "Axes | None" = None) -> "Axes":
+        """Draw the command over its first repetition; on a new figure where no axis is given."""
+        from rhythmid.design.figure import draw_command
+
+        axis = axis_or_new(axis)
+        draw_command(axis, self)
+        return axis
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `design --json`; plain numbers, lists and strings."""
@@ -141,14 +183,6 @@ def planned_experiment(model: Model, command: Waveform, requirements: Requiremen
     )  # fmt: skip
 
 
-def forcing_of(model: Model) -> Forcing:
-    """The model's own forcing where it has one, else the paper's."""
-    term = model.term("periodic_forcing")
-    return (
-        Forcing() if term is None else Forcing(**{name: value.value for name, value in term.values.items()})
-    )
-
-
 def design(
     model: Model,
     requirements: Requirements,
@@ -157,8 +191,28 @@ def design(
 ) -> Design:
     """Design a run of the `model`, whose values are taken for the truth.
 
-    Raises InputError, in one line, for a design that aliases, does not fit into its duration or envelope, or could not
-    determine a free parameter.
+    Parameters
+    ----------
+    model : the machine; every parameter that is not fixed is to be determined.
+    requirements : length, limits and circumstances of the run; `Requirements.of(model, …)` takes forcing and delays from the model.
+    catalogue : elements beside the built-in ones.
+    progress : is told what begins.
+
+    Raises
+    ------
+    InputError
+        In one line, for a design that aliases, does not fit into its duration or envelope, or could not determine a free parameter.
+
+    Examples
+    --------
+    >>> import rhythmid as rh
+    >>> machine = rh.paper_hopper()
+    >>> wanted = rh.Requirements.of(
+    ...     machine, duration=24.0, band=(0.0, 5.0), max_effort=0.02, envelope=(0.1, 0.2), noise_std=1e-5, harmonics=1
+    ... )
+    >>> plan = rh.design(machine, wanted)
+    >>> plan.command.peak <= 0.02
+    True
     """
     told = progress or (lambda _: None)
     machine = with_delays(model, requirements, load_catalogue() if catalogue is None else catalogue)

@@ -33,7 +33,8 @@ def _harmonics(axis: Axes, design: Design) -> None:
     axis.set_xlabel("frequency [Hz]; red: harmonics of the forcing")
 
 
-def _command(axis: Axes, design: Design) -> None:
+def draw_command(axis: Axes, design: Design) -> None:
+    """The command over one repetition, or less where that is long, with its limits."""
     first = round(design.plan.lead_in * design.requirements.rate)
     length = min(design.plan.repeat, CYCLES / design.requirements.band[1])
     shown = slice(first, first + round(length * design.requirements.rate))
@@ -128,7 +129,7 @@ def design_figure(design: Design) -> Figure:
     figure = Figure(figsize=(13.0, 8.0), layout="constrained")
     (one, two), (three, four) = figure.subplots(2, 2)
     spectrum = _over_window(design, design.command.values)
-    _command(one, design)
+    draw_command(one, design)
     _motion(two, design)
     _command_spectrum(three, design, spectrum)
     _response_spectrum(four, design, spectrum)

@@ -2,9 +2,11 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from rhythmid.errors import InputError
+from rhythmid.ltp.htf import transport_delays
+from rhythmid.model import Model
 from rhythmid.settings import Forcing
 
 Kind = Literal["comb", "multisine"]
@@ -40,6 +42,35 @@ class Requirements:
     period: float | None = None
     spacing: float | None = None
     seed: int = 0
+
+    @classmethod
+    def of(
+        cls,
+        model: Model,
+        duration: float,
+        band: tuple[float, float],
+        max_effort: float,
+        envelope: tuple[float, float],
+        noise_std: float,
+        *,
+        forcing: Forcing | None = None,
+        delays: tuple[float, float] | None = None,
+        **further: Any,
+    ) -> "Requirements":
+        """Requirements whose forcing and delays are the model's own where they are not given.
+
+        Parameters
+        ----------
+        model, duration, band, max_effort, envelope, noise_std : as for `design` and `Requirements`.
+        forcing : on the robot.
+        delays : of command and measurement [s].
+        further : the other attributes of `Requirements`.
+        """
+        late = transport_delays(model) if delays is None else delays
+        return cls(
+            duration, band, max_effort, envelope, noise_std, input_delay=late[0], measurement_delay=late[1],
+            forcing=forcing_of(model) if forcing is None else forcing, **further,
+        )  # fmt: skip
 
     def __post_init__(self) -> None:
         for name, value in (
@@ -96,3 +127,11 @@ class Requirements:
                 f"sideband +{self.harmonics} of {high:g} Hz lies at {top:g} Hz and aliases: at {self.rate} Hz nothing beyond "
                 f"{nyquist:g} Hz is sampled; lower --band or --harmonics, or raise --rate"
             )
+
+
+def forcing_of(model: Model) -> Forcing:
+    """The model's own forcing where it has one, else the paper's."""
+    term = model.term("periodic_forcing")
+    return (
+        Forcing() if term is None else Forcing(**{name: value.value for name, value in term.values.items()})
+    )

@@ -5,10 +5,10 @@ searched for what the nominal model lacks, the hypotheses are weighed on data th
 it is.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from threadpoolctl import threadpool_limits
 
@@ -29,17 +29,30 @@ from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import with_declared
 from rhythmid.identify.inverse_dynamics.applicability import Applicability, applicable
+from rhythmid.identify.joint_covariance import JointCovariance
 from rhythmid.identify.plausibility import check_plausible
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.parallel import cores
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
+from rhythmid.result import Result, Row, axis_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from rich.console import Console
 
 
 @dataclass(frozen=True)
-class Answer:
-    """A diagnosis, the augmented model, and all that is behind them."""
+class Answer(Result):
+    """A diagnosis, the augmented model, and all that is behind them.
+
+    Attributes
+    ----------
+    diagnosis : verdict, names, sizes, hypotheses and rejections: the content of `diagnose --json`.
+    model : the nominal model with what it lacked, refitted.
+    result : everything behind the decision.
+    """
 
     diagnosis: Diagnosis
     model: Model
@@ -55,15 +68,82 @@ class Answer:
         """Whether it stands by names."""
         return self.diagnosis.verdict == "missing_physics"
 
+    @property
+    def headline(self) -> str:
+        """The verdict in a few sentences."""
+        return self.diagnosis.summary
+
+    @property
+    def covariance(self) -> JointCovariance:
+        """Covariance of the chosen model's parameters, given that model; what the choice of the model adds is in `diagnosis` only.
+
+        Raises InputError where effort was scored: its standard deviations are those of each parameter alone.
+        """
+        if not isinstance(self.result, FreeRunResult):
+            raise InputError("parameters that were fitted to the recorded effort have no joint covariance")
+        fit = self.result.search.fit
+        values = fit.model.parameters
+        return JointCovariance.of(fit.names, [values[name].unit for name in fit.names], fit.covariance)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON of `diagnose --json`."""
+        return self.diagnosis.to_dict()
+
+    def tables(self) -> Mapping[str, Sequence[Row]]:
+        """`hypotheses`, the best first; `parameters` of the model; `missing` effects' parameters; `rejections`."""
+        found = self.to_dict()
+        return {
+            "hypotheses": [
+                one | {"elements": " + ".join(one["elements"]) or "nominal model"}
+                for one in found["hypotheses"]
+            ],
+            "parameters": [{"name": name} | one for name, one in found["parameters"].items()],
+            "missing": [
+                {"element": one["element"], "name": name} | value
+                for one in found["missing"]
+                for name, value in one["parameters"].items()
+            ],
+            "rejections": [
+                one | {"hypothesis": " + ".join(one["hypothesis"])} for one in found["rejections"]
+            ],
+        }
+
+    def show(self, console: "Console") -> None:
+        """Print the verdict, names, hypotheses, what is left, and what is not believed."""
+        from rhythmid.diagnose.answer.printed import show
+
+        show(self.diagnosis, console)
+
+    def plot(self, axis: "Axes | None" = None, most: int = 8) -> "Axes":
+        """Draw how much worse than the best each hypothesis predicts unseen data, with its standard error.
+
+        Parameters
+        ----------
+        axis : Matplotlib axis; one of a new figure where None.
+        most : hypotheses that are drawn.
+        """
+        axis, shown = axis_or_new(axis), self.diagnosis.hypotheses[:most]
+        places = range(len(shown))
+        axis.barh(
+            places,
+            [one.score_difference for one in shown],
+            xerr=[one.standard_error for one in shown],
+            height=0.6,
+        )
+        axis.set_yticks(places, [" + ".join(one.elements) or "nominal model" for one in shown])
+        axis.invert_yaxis()
+        axis.set_xlabel("log density of unseen data, less than the best hypothesis")
+        return axis
+
     def ledger(self) -> dict[str, Any]:
         """All that the decision depends on, as plain data; see `replay`."""
         return ledger(self.result.contest, self.result.detectable)
 
 
 def diagnose(
-    records: Sequence[Record],
+    records: Record | Sequence[Record],
     model: Model,
-    holdout: Sequence[Record] = (),
+    holdout: Record | Sequence[Record] = (),
     catalogue: Catalogue | None = None,
     tell: Tell = lambda _: None,
     budget: float | None = None,
@@ -72,16 +152,34 @@ def diagnose(
 
     Parameters
     ----------
-    records : what the models are fitted to.
+    records : one or more, to which the models are fitted.
     model : the nominal model.
     holdout : records to judge by only; without any, the last fifth of every record is held out.
     catalogue : elements that may be missing; the built-in ones by default.
     tell : is told what begins.
     budget : seconds that the search may take; the answer says what was not tried.
 
-    The result is the same whenever the records are, but for a budget that ends the search. Raises InputError for records or
-    models that cannot be judged.
+    Returns
+    -------
+    Answer
+        The same whenever the records are, but for a budget that ends the search.
+
+    Raises
+    ------
+    InputError
+        For records or models that cannot be judged.
+
+    Examples
+    --------
+    >>> import rhythmid as rh
+    >>> run = {"excitation": {"type": "chirp", "amplitude": 0.3, "sweep": 6.0}, "noise": {"measurement_std": 1e-4}}
+    >>> record = rh.simulate(rh.paper_hopper(), run).record
+    >>> answer = rh.diagnose(record, rh.paper_hopper())
+    >>> answer.diagnosis.verdict
+    'consistent'
     """
+    records = (records,) if isinstance(records, Record) else records
+    holdout = (holdout,) if isinstance(holdout, Record) else holdout
     if not records:
         raise InputError("no record is given; name at least one bag or table")
     model = with_declared(model, (*records, *holdout))

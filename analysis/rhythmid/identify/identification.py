@@ -3,19 +3,28 @@
 `Identification.to_dict` is the contract of `rhythmid identify --json`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.errors import InputError
 from rhythmid.identify.caution import Caution
 from rhythmid.identify.joint import JointFit
+from rhythmid.identify.joint_covariance import JointCovariance
 from rhythmid.identify.paper import PaperResult
 from rhythmid.ltp.harmonic_estimate import HarmonicEstimate, HarmonicEstimates
 from rhythmid.model import Model
 from rhythmid.record.record import Record
+from rhythmid.report.quantity import percent
+from rhythmid.result import Result, Row, axis_or_new
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from rich.console import Console
 
 Array = NDArray[np.float64]
 POINTS = 600  # of an HTF that are written out at most
@@ -118,7 +127,7 @@ class Shown:
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class Identification(Result):
     """The answer to `rhythmid identify`.
 
     Attributes
@@ -150,6 +159,107 @@ class Identification:
         """Whether the fit explains enough of the records to be called an identification."""
         return not any(caution.name == "not_identified" for caution in self.cautions)
 
+    @property
+    def headline(self) -> str:
+        """How many parameters were found, and what of the motion they leave."""
+        found = sum(one.value is not None for one in self.parameters.values())
+        left = percent(self.quality["nrmse"])
+        if not self.usable:
+            return f"Not identified: the fit leaves {left} of the motion"
+        return f"{found} of {len(self.parameters)} parameters identified; the free run leaves {left} of the motion"
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """All estimates by name: the parameters, then `delay: input`, `delay: measurement` and `delay: sum` [s]."""
+        delays = {"input": self.delays.input, "measurement": self.delays.measurement, "sum": self.delays.sum}
+        return dict(self.parameters) | {f"delay: {name}": one for name, one in delays.items()}
+
+    @property
+    def covariance(self) -> JointCovariance:
+        """Covariance of the estimates, delays included; `covariance.correlation` is their correlation.
+
+        Raises InputError for the paper's method, which estimates magnitudes and phases apart.
+        """
+        if self.joint is None:
+            raise InputError("the paper's method has no joint covariance; identify with method='joint'")
+        fit = self.joint.fit
+        values = fit.model.parameters
+        return JointCovariance.of(fit.names, [values[name].unit for name in fit.names], fit.covariance)
+
+    def tables(self) -> Mapping[str, Sequence[Row]]:
+        """`estimates`, and `harmonics`: the transfer functions, frequency by frequency."""
+        functions = self.shown.functions
+        return {
+            "estimates": [{"name": name} | one.to_dict() for name, one in self.estimates.items()],
+            "harmonics": [
+                {"m": one.m, "frequency": frequency, "magnitude": abs(value), "phase": float(np.angle(value)), "std": std}
+                for one in (() if functions is None else functions.functions)
+                for frequency, value, std in zip(one.frequency.tolist(), one.value.tolist(), one.std.tolist())
+            ],
+        }  # fmt: skip
+
+    def show(self, console: "Console") -> None:
+        """Print estimates, delays and what casts doubt on them."""
+        from rhythmid.identify.printed import show
+
+        show(self.to_dict(), console)
+
+    def _functions(self) -> HarmonicEstimates:
+        if self.shown.functions is None:
+            raise InputError(f"no transfer functions: {self.shown.missing}")
+        return self.shown.functions
+
+    def to_xarray(self) -> "xr.Dataset":
+        """The transfer functions as an xarray Dataset over `harmonic` and `frequency`; see `HarmonicEstimates.to_xarray`.
+
+        Raises InputError, saying what is missing, where none were found.
+        """
+        return self._functions().to_xarray(f"{self.model.units.position}/{self.model.units.force}")
+
+    def plot(self, axis: "Axes | None" = None, record: int = 0) -> "Axes":
+        """Draw the measured motion and the identified model's free run over time.
+
+        Parameters
+        ----------
+        axis : Matplotlib axis; one of a new figure where None.
+        record : which of the records.
+
+        Raises
+        ------
+        InputError
+            For the paper's method, which simulates nothing.
+        """
+        if self.joint is None:
+            raise InputError("the paper's method has no free run to draw; identify with method='joint'")
+        axis, fit = axis_or_new(axis), self.joint.fit
+        series = fit.run.series[record]
+        axis.plot(series.centres, series.averaged, color="black", linewidth=1.0, label="measured")
+        axis.plot(
+            series.centres, series.averaged + fit.residuals[record], linestyle="--", label="identified model"
+        )
+        axis.set(xlabel="time [s]", ylabel=f"output [{self.records[0].output.unit}]")
+        axis.legend(loc="upper right")
+        return axis
+
+    def plot_transfer_function(self, m: int = 0, axis: "Axes | None" = None) -> "Axes":
+        """Draw the magnitude of harmonic m over frequency with its 95 % region.
+
+        Raises InputError where no transfer functions were found, or not this one.
+        """
+        one = self._functions().of(m)
+        axis = axis_or_new(axis)
+        size = np.abs(one.value)
+        axis.fill_between(
+            one.frequency, np.maximum(size - one.radius, 0.0), size + one.radius, alpha=0.3, label="95 %"
+        )
+        axis.plot(one.frequency, size, ".", markersize=3, color="black", label="estimate")
+        units = self.model.units
+        axis.set(
+            xlabel="output frequency [Hz]", ylabel=f"|{harmonic_name(m)}| [{units.position}/{units.force}]"
+        )
+        axis.legend(loc="upper right")
+        return axis
+
     def to_dict(self) -> dict[str, Any]:
         """The JSON of `identify --json`; plain numbers, lists and strings."""
         functions = self.shown.functions
@@ -159,6 +269,7 @@ class Identification:
             "warnings": [caution.to_dict() for caution in self.cautions],
             "parameters": {name: estimate.to_dict() for name, estimate in self.parameters.items()},
             "delays": self.delays.to_dict(),
+            "covariance": None if self.joint is None else self.covariance.to_dict(),
             "harmonics": [] if functions is None else [_harmonic(one) for one in functions.functions],
             "transfer_functions": {
                 "method": None if functions is None else functions.method,

@@ -119,9 +119,40 @@ def identify(
         method brings its own, equation (5), where this is `auto`.
     tell : is told what begins.
 
-    A fit that leaves more than a fifth of the motion is returned as not `usable`. Raises InputError when a channel seems to be in
-    another unit, to have its sign turned round or to be exchanged with another, and by the paper's method when a record has no
-    input, is shorter than a period, or the model has no limit cycle.
+    Returns
+    -------
+    Identification
+        A fit that leaves more than a fifth of the motion is not `usable`.
+
+    Raises
+    ------
+    InputError
+        When a channel seems to be in another unit, to have its sign turned round or to be exchanged with another, and by the
+        paper's method when a record has no input, is shorter than a period, or the model has no limit cycle.
+
+    Examples
+    --------
+    >>> import rhythmid as rh
+    >>> machine = rh.Model.from_text(
+    ...     '''
+    ... inertia: {mass: {value: 1.0, unit: kg, fixed: true}}
+    ... force:
+    ...   - linear_spring: {stiffness: {value: 200.0, unit: N/m}, rest_length: {value: 0.0, unit: m, fixed: true}}
+    ...   - viscous_damper: {damping: {value: 1.0, unit: N*s/m}}
+    ... '''
+    ... )
+    >>> run = {
+    ...     "excitation": {"type": "chirp", "amplitude": 1.0, "sweep": 6.0},
+    ...     "forcing": {"amplitude": 0.0},
+    ...     "noise": {"measurement_std": 1e-5},
+    ... }
+    >>> guess = machine.with_values({"linear_spring.stiffness": 180.0})
+    >>> found = rh.identify(rh.simulate(machine, run).record, guess)
+    >>> stiffness = found.parameters["linear_spring.stiffness"]
+    >>> abs(stiffness.value - 200.0) < 5 * stiffness.std < 0.01
+    True
+    >>> found.covariance.correlation.shape == (len(found.covariance.names),) * 2
+    True
     """
     given = (records,) if isinstance(records, Record) else tuple(records)
     if not given:

@@ -1,12 +1,16 @@
 """What an estimator of harmonic transfer functions returns: each function with all that is known of its error."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
 from rhythmid.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -81,3 +85,17 @@ class HarmonicEstimates:
             if one.m == m:
                 return one
         raise InputError(f"harmonic {m} is not among {', '.join(map(str, self.harmonics))}")
+
+    def to_xarray(self, unit: str = "") -> "xr.Dataset":
+        """The functions as an xarray Dataset over `harmonic` and `frequency` [Hz].
+
+        Its variables are `value` (complex), `std`, `radius` (of the disk that holds the truth with 95 %) and `noise`; `unit` is
+        written beside them. Raises InputError where xarray is not installed.
+        """
+        from rhythmid.ltp.dataset import dataset
+
+        columns = {
+            name: ([getattr(one, name) for one in self.functions], unit)
+            for name in ("value", "std", "radius", "noise")
+        }
+        return dataset(self.harmonics, [one.frequency for one in self.functions], columns)

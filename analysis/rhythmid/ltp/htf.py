@@ -5,6 +5,7 @@ A real system has G_−m(−jω) = conj G_m(jω).
 """
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ from rhythmid.ltp.pumping import Pumping
 from rhythmid.model import Model
 from rhythmid.simulation.generated_source import InputKind
 from rhythmid.simulation.transport import MEASUREMENT, delays
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -58,6 +62,18 @@ class HarmonicTransferFunctions:
         """H_m = G_m exp(−j[(ω − mω_p) τ_u + ω τ_y]): paper, equation (7); delays [s], pumping frequency [Hz]."""
         turn = delay_phase(self.harmonics, self.frequency, input_delay, measurement_delay, frequency)
         return replace(self, value=self.value * np.exp(-1j * turn))
+
+    def to_xarray(self, unit: str = "") -> "xr.Dataset":
+        """The functions as an xarray Dataset over `harmonic` and `frequency` [Hz]; `unit` is written beside them.
+
+        Raises InputError where xarray is not installed.
+        """
+        from rhythmid.ltp.dataset import dataset
+
+        columns = {"value": (list(self.value), unit)}
+        if self.std is not None:
+            columns["std"] = (list(self.std), unit)
+        return dataset(self.harmonics.tolist(), [self.frequency] * len(self.harmonics), columns)
 
 
 def delay_phase(

@@ -27,7 +27,7 @@ from rosbags.rosbag2.errors import WriterError
 
 from rhythmid.errors import InputError
 from rhythmid.record.mcap_writer import McapWriter
-from rhythmid.record.message_types import standard_types
+from rhythmid.record.message_types import STANDARD_DISTRO, standard_types
 from rhythmid.record.messages import Messages, string_message
 from rhythmid.record.metadata import VERSION, FileContent, bag_information, metadata_text, qos_text
 from rhythmid.record.sqlite_writer import SqliteWriter
@@ -42,12 +42,20 @@ class BagWriter(Writer):
     """rosbags' Writer with storages that also take arrays, and with files that can be split.
 
     `numbered` names the files as rosbag2's recorder does (`bag_0.mcap`, …); without it there is one, `bag.mcap`.
+    `ros_distro` is the ROS distribution that metadata.yaml names.
     """
 
-    def __init__(self, path: Path | str, storage: Storage, numbered: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path | str,
+        storage: Storage,
+        numbered: bool = False,
+        ros_distro: str = STANDARD_DISTRO,
+    ) -> None:
         super().__init__(path, version=VERSION, storage_plugin=STORAGES[storage])
         self.files: list[FileContent] = []
         self._numbered = numbered
+        self._ros_distro = ros_distro
 
     @property
     def file(self) -> FileContent:
@@ -114,7 +122,7 @@ class BagWriter(Writer):
 
     def _information(self, files: Sequence[FileContent]) -> dict[str, Any]:
         name = self.storage_plugin.name.lower()
-        return bag_information(name, files, self.connections, self.custom_data)
+        return bag_information(name, files, self.connections, self._ros_distro, self.custom_data)
 
 
 def qos(transient_local: bool = False, depth: int = 100) -> Qos:

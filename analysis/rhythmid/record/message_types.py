@@ -10,6 +10,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.block import Topic
 from rhythmid.record.field import TypeFields
 
+STANDARD_DISTRO = "jazzy"  # the ROS distribution whose types are the standard ones
 TIME_PARTS = (("sec", "int32"), ("nanosec", "uint32"))
 LENGTH_WORD = 4  # bytes in front of a string or list
 LEAST_TEXT = LENGTH_WORD + 1  # with the closing zero

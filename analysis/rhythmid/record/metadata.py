@@ -46,9 +46,10 @@ def bag_information(
     storage: str,
     files: Sequence[FileContent],
     connections: Sequence[Connection],
+    ros_distro: str,
     custom_data: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
-    """Content of metadata.yaml below its one key."""
+    """Content of metadata.yaml below its one key; `ros_distro` is the ROS distribution whose types the messages have."""
     total = FileContent("")
     for file in files:
         for number, count in file.counts.items():
@@ -68,7 +69,7 @@ def bag_information(
         "compression_mode": "",
         "files": [file.summary() for file in files],
         "custom_data": dict(custom_data) if custom_data else None,
-        "ros_distro": "rosbags",
+        "ros_distro": ros_distro,
     }
 
 

@@ -1,8 +1,8 @@
 """Record: the channels of one recording, each with its own times, and the same on one uniform grid."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,13 @@ from rhythmid.record.interpolation import interpolation_errors
 from rhythmid.record.quality import Quality
 from rhythmid.record.signals import ROLES, InputKind, OutputKind, Sinusoid
 from rhythmid.record.timing import SAME, gaps_between, nominal_period
+from rhythmid.result import Result, Row, axis_or_new, optional
 from rhythmid.simulation.signal import Hold, continuous
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from rich.console import Console
 
 Array = NDArray[np.float64]
 SHORTEST = 8  # samples that a record must have in common
@@ -70,7 +76,7 @@ class Uniform:
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class Record(Result):
     """One recording, cut to what is used of it.
 
     Attributes
@@ -114,6 +120,70 @@ class Record:
     def duration(self) -> float:
         """Time from the first to the last output sample [s]."""
         return float(self.output.time[-1] - self.output.time[0])
+
+    @property
+    def headline(self) -> str:
+        """Name, duration and what was measured."""
+        return (
+            f"{self.name}: {self.duration:.4g} s of {self.output_kind} at {1.0 / self.output.period:.4g} Hz"
+        )
+
+    def tables(self) -> Mapping[str, Sequence[Row]]:
+        """`channels`: how many samples each has, at which rate, and where they come from."""
+        return {
+            "channels": [
+                {
+                    "channel": role,
+                    "samples": len(c),
+                    "rate": 1.0 / c.period,
+                    "unit": c.unit,
+                    "source": c.source,
+                }
+                for role, c in self.channels.items()
+            ]
+        }
+
+    def to_dataframe(self, table: str | None = None) -> "pd.DataFrame":
+        """All channels at common times [s], which are the index; or the table `channels`.
+
+        Raises InputError where the channels have too little in common, or pandas is not installed.
+        """
+        if table is not None:
+            return super().to_dataframe(table)
+        pandas, uniform = optional("pandas", "to_dataframe"), self.uniform()
+        columns = {role: getattr(uniform, role) for role in self.channels}
+        return pandas.DataFrame(columns, index=pandas.Index(uniform.time, name="time"))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Name, duration, channels and quality as plain JSON data, without the samples."""
+        return {
+            "name": self.name,
+            "duration": self.duration,
+            "channels": {row["channel"]: dict(row) for row in self.tables()["channels"]},
+            "quality": {role: one.to_dict() for role, one in self.quality.channels.items()},
+            "notes": list(self.quality.notes),
+        }
+
+    def show(self, console: "Console") -> None:
+        """Print the channels and what is to be known of their quality."""
+        from rhythmid.report.terminal_table import print_table
+
+        rows = [
+            tuple(f"{v:.6g}" if isinstance(v, float) else str(v) for v in row.values())
+            for row in self.tables()["channels"]
+        ]
+        print_table(console, self.headline, ("channel", "samples", "rate [Hz]", "unit", "source"), rows)
+        for note in self.quality.notes:
+            console.print(f"note: {note}", markup=False)
+
+    def plot(self, axis: "Axes | None" = None, role: str = "output") -> "Axes":
+        """Draw one channel over time; on a new figure where no axis is given. Raises InputError where it was not recorded."""
+        if role not in self.channels:
+            raise InputError(f"{self.name}: there is no channel {role!r}; it has {', '.join(self.channels)}")
+        axis, channel = axis_or_new(axis), self.channels[role]
+        axis.plot(channel.time, channel.value, linewidth=1.0, label=f"{self.name}: {role}")
+        axis.set(xlabel="time [s]", ylabel=f"{role} [{channel.unit}]")
+        return axis
 
     def cut(self, start: float, end: float) -> "Record":
         """The part with start <= time < end [s]; of a held input, also the value in force at the start.

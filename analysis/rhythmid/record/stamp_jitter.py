@@ -162,6 +162,8 @@ def _binned(left: Array, square: Array) -> tuple[Array, Array, Array]:
 def _line(speeds: Array, variances: Array, counts: Array) -> tuple[float, float, float] | None:
     """Level and growth of the variance with the square of the slope, and the growth's standard deviation; None where it does not
     grow from a level above zero."""
+    if not variances.min() > 0.0:
+        return None
     size = max(float(speeds.mean()), 1e-300)
     columns = np.column_stack([np.ones(len(speeds)), speeds / size])
     expected = variances

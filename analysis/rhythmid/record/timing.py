@@ -14,6 +14,8 @@ OFTEN = 0.1  # share of steps longer than 1.5 periods, beyond which a channel is
 NEIGHBOURS = (
     25  # samples on either side, beyond twice as many as may be missing, whose stamps tell whether any is
 )
+FULL = 0.5  # of the periods missing, by which the earliest sample after a gap is late,
+AT_AN_END = 0.95  # and where so few samples are left that all of them may have come late by jitter
 
 Times = NDArray[np.float64]
 
@@ -96,7 +98,8 @@ def gaps_between(time: Times) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     real = np.zeros(len(wide), dtype=bool)
     for index, (before, count) in enumerate(zip(wide, 2 * lost + NEIGHBOURS, strict=True)):
         earlier, later = late[max(before + 1 - count, 0) : before + 1], late[before + 1 : before + 1 + count]
-        real[index] = later.min() - earlier.min() > 0.5 * period * lost[index]
+        share = FULL if min(len(earlier), len(later)) == count else AT_AN_END
+        real[index] = later.min() - earlier.min() > share * period * lost[index]
     return wide[real], lost[real]
 
 

@@ -12,7 +12,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
     ],
-    install_requires=["setuptools", "rhythmid"],
+    install_requires=["setuptools", "numpy", "rosbags", "rhythmid"],
     zip_safe=True,
     maintainer="The rhythmid authors",
     maintainer_email="rhythmid@example.org",

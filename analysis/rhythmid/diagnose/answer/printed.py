@@ -1,15 +1,15 @@
 """A diagnosis on the terminal: the verdict first, then names, hypotheses, what is left, and what is not believed."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
-from rhythmid.diagnose.answer.result import Diagnosis, Estimate, MissingEffect, Remainder, Scored
+from rhythmid.diagnose.answer.result import Diagnosis, Remainder, Scored
 from rhythmid.diagnose.rejections import Rejection
 from rhythmid.report.hypotheses import grouped, most_weighed
-from rhythmid.report.quantity import rounded
+from rhythmid.report.terminal_table import print_estimates, print_table
 
 HYPOTHESES_SHOWN = 6
 REJECTIONS_SHOWN = 5
@@ -29,13 +29,15 @@ def show(found: Diagnosis, console: Console) -> None:
         if found.verdict == "missing_physics":  # else the verdict does not stand by the name
             sizes = f"probability {_probability(effect.probability)}, {sizes}"
         lines.told(effect.element, f"{effect.equation}   ({sizes})")
-        console.print(_parameters(effect))
+        print_estimates(
+            console, "", {name: asdict(one) for name, one in effect.parameters.items()}, "parameter"
+        )
     if len(found.missing) > 1 and found.verdict == "missing_physics":
         lines.said("all of these names together", _probability(found.joint_probability))
     for group in found.indistinguishable:
         lines.said("indistinguishable here", ", ".join(group))
     if len(found.hypotheses) > 1:
-        console.print(_hypotheses(found))
+        _print_hypotheses(found, console)
     lines.said("left", remainder_words(found.remainder))
     lines.said("scored", scoring_words(found.scoring))
     for name, fit in found.fit.items():
@@ -69,40 +71,25 @@ class _Lines:
         self._console.print(f"{escape(label)}: {escape(text)}")
 
 
-def _parameters(effect: MissingEffect) -> Table:
-    table = Table()
-    for column in ("parameter", "value", "std", "unit"):
-        table.add_column(column)
-    for name, value in effect.parameters.items():
-        table.add_row(name, rounded(value.value, value.std), _std(value), escape(value.unit))
-    return table
-
-
-def _std(value: Estimate) -> str:
-    return NONE if value.std is None else f"{value.std:.2g}"
-
-
-def _hypotheses(found: Diagnosis) -> Table:
+def _print_hypotheses(found: Diagnosis, console: Console) -> None:
     shown = found.hypotheses[:HYPOTHESES_SHOWN]
     weighed = most_weighed([(one.elements, one.probability) for one in found.hypotheses])
-    table = Table(
-        title=f"the {len(shown)} best of {len(found.hypotheses)} hypotheses, by their predictions of unseen data"
-    )
     stands = found.verdict in ("missing_physics", "consistent")
-    table.add_column("hypothesis", overflow="fold")
-    for column in ("kind", "worse by", "probability" if stands else "weight of evidence", "held-out error"):
-        table.add_column(column, justify="left" if column == "kind" else "right")
+    figures = ("worse by", "probability" if stands else "weight of evidence", "held-out error")
+    rows = []
     for one in shown:
         behind = "best" if one.score_difference == 0.0 else _worse(one.score_difference, one.standard_error)
         held = NONE if one.heldout_nrmse is None else f"{100.0 * one.heldout_nrmse:.3g} %"
-        table.add_row(
-            escape(" + ".join(one.elements)) or NOMINAL,
-            one.kind.replace("_", " "),
-            behind,
-            _weight(one.probability, stands) if len(one.elements) <= weighed else NONE,
-            held,
-        )
-    return table
+        weight = _weight(one.probability, stands) if len(one.elements) <= weighed else NONE
+        name = " + ".join(one.elements) or NOMINAL
+        rows.append((name, one.kind.replace("_", " "), behind, weight, held))
+    print_table(
+        console,
+        f"the {len(shown)} best of {len(found.hypotheses)} hypotheses, by their predictions of unseen data",
+        ("hypothesis", "kind", *figures),
+        rows,
+        right=figures,
+    )
 
 
 def remainder_words(left: Remainder) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +25,23 @@ def ros_arguments(
     parameters = {**given_parameters(spec), **(extra or {})}
     text = yaml.safe_dump({"/**": {"ros__parameters": parameters}}, width=2**16)
     path.write_text(text, encoding="utf-8")
-    arguments = ["--ros-args", "--params-file", str(path)]
-    for source, target in {"__node": spec.name, "__ns": namespace, **spec.remappings}.items():
-        arguments += ["-r", f"{source}:={target}"]
-    return arguments
+    names = {"__node": spec.name, "__ns": namespace, **spec.remappings}
+    return ["--ros-args", "--params-file", str(path), *remapping_arguments(names)]
+
+
+def remapping_arguments(names: Mapping[str, str]) -> list[str]:
+    """Arguments that give each name another."""
+    return [word for source, target in names.items() for word in ("-r", f"{source}:={target}")]
 
 
 def command(spec: NodeSpec, arguments: list[str]) -> list[str]:
     """The command that runs the node in a process of its own."""
     return [sys.executable, "-P", "-m", f"{spec.package}.{spec.executable}", *arguments]
+
+
+def replacement_command(spec: NodeSpec, namespace: str, given: Sequence[str]) -> list[str]:
+    """The command of another's node in the place of `spec`: in its namespace, with its topics, and with its own parameters."""
+    return [*given, "--ros-args", *remapping_arguments({"__ns": namespace, **spec.remappings})]
 
 
 def compose_command(graph: Path) -> list[str]:

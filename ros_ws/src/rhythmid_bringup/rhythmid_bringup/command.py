@@ -9,15 +9,19 @@ from typing import Annotated
 
 import typer
 
+from rhythmid.commands.examples import epilog
+from rhythmid.commands.options import Quiet
 from rhythmid.errors import InputError
 
 from . import isolation
+
+EXAMPLES = ("rhythmid run experiment.yaml --out bag", "rhythmid run experiment.yaml --node plant")
 
 
 def add(app: typer.Typer) -> None:
     """Add `run` to the command."""
 
-    @app.command()
+    @app.command(epilog=epilog(EXAMPLES))
     def run(
         experiment: Annotated[Path, typer.Argument(help="Experiment file.")],
         out: Annotated[
@@ -27,22 +31,37 @@ def add(app: typer.Typer) -> None:
             str | None,
             typer.Option("--node", help="Run only this node, here and unattended (one container per node)."),
         ] = None,
+        replace: Annotated[
+            list[str] | None,
+            typer.Option(
+                "--replace",
+                metavar="NAME=COMMAND",
+                help="Run a command of yours in the place of the node plant, command_delay or measurement_delay; "
+                "it gets the namespace and the topics of that node. May be repeated.",
+            ),
+        ] = None,
         isolated: Annotated[
             bool,
             typer.Option(
                 "--isolated", help="Give the nodes a network of their own: nobody else reaches them."
             ),
         ] = False,
+        quiet: Quiet = False,
     ) -> None:
         """Run the graph of an experiment: starts, watches and stops its nodes and leaves a bag."""
+        if node is not None and replace:
+            raise InputError("--node runs a node of ours, --replace one of yours: give one of the two")
         if isolated:
             again = [argument for argument in sys.argv[1:] if argument != "--isolated"]
             line = isolation.isolated([sys.executable, "-m", "rhythmid.cli", *again])
             os.execvp(line[0], line)
         try:  # ROS is slow to load, and the other commands need none
-            from rhythmid_bringup.run import run_alone, run_graph
+            from rhythmid_bringup.run import console, replacements, run_alone, run_graph
         except ModuleNotFoundError as missing:
             raise InputError(
                 f"`rhythmid run` needs ROS 2: {missing}; see the README for both ways to get it"
             ) from None
-        raise typer.Exit(run_graph(experiment, out) if node is None else run_alone(experiment, out, node))
+        console.quiet = quiet
+        if node is not None:
+            raise typer.Exit(run_alone(experiment, out, node))
+        raise typer.Exit(run_graph(experiment, out, replacements(replace or ())))

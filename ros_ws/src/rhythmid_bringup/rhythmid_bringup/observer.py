@@ -11,7 +11,7 @@ from rclpy.node import Node
 from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 
-from rhythmid_nodes.diagnostics import NOT_READY, OK, STOPPED
+from rhythmid_nodes.diagnostics import NOT_READY, OK, STOPPED, status_name
 from rhythmid_nodes.lockstep import ACK_TOPIC
 from rhythmid_nodes.qos import latched
 
@@ -96,7 +96,7 @@ class Observer(Node):
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             namespace, _, name = status.name.rpartition("/")
-            if namespace == self.get_namespace().rstrip("/"):
+            if namespace == status_name(self.get_namespace()):
                 self.obstacles[name] = "" if status.message == OK else status.message.removeprefix(NOT_READY)
                 if status.message.startswith(STOPPED):
                     self.tripped[name] = status.message.removeprefix(STOPPED)

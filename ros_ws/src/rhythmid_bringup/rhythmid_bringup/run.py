@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import signal
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from .environment import own_domain, run_environment
 from .summary import show
 from .supervisor import Supervisor
 
+REPLACEABLE = ("plant", "command_delay", "measurement_delay")  # the others drive a run and record it
 console = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
@@ -34,8 +36,29 @@ def load(path: Path, out: Path | None) -> Experiment:
     return experiment.with_record(path=bag)
 
 
-def run_graph(path: Path, out: Path | None) -> int:
-    """Run the whole graph under supervision.
+def replacements(given: Sequence[str]) -> dict[str, list[str]]:
+    """Name of a node -> command that runs in its place, from words `NAME=COMMAND`. Raises InputError for anything else."""
+    found: dict[str, list[str]] = {}
+    for text in given:
+        name, _, line = text.partition("=")
+        try:
+            words = shlex.split(line)
+        except ValueError as error:
+            raise InputError(f"--replace {text}: {error}") from None
+        if name not in REPLACEABLE or not words:
+            raise InputError(
+                f"--replace {text}: NAME=COMMAND is expected, NAME one of {', '.join(REPLACEABLE)}"
+            )
+        if name in found:
+            raise InputError(f"--replace {text}: {name} is replaced twice")
+        if shutil.which(words[0]) is None:
+            raise InputError(f"--replace {text}: no such command: {words[0]}")
+        found[name] = words
+    return found
+
+
+def run_graph(path: Path, out: Path | None, replaced: Mapping[str, Sequence[str]] | None = None) -> int:
+    """Run the whole graph under supervision, with the commands `replaced` in the place of nodes.
 
     The exit code is 0 when the run came to its end or the user stopped it, 1 when a node died or the excitation
     stopped by itself. Raises InputError when a node refuses its parameters.
@@ -45,7 +68,7 @@ def run_graph(path: Path, out: Path | None) -> int:
     with own_domain() as domain, interruptions() as interrupted:
         environment = run_environment(os.environ, domain, folder)
         os.environ.update(environment)  # the supervisor's own node must be in the same domain
-        supervisor = Supervisor(experiment, folder, environment, console, interrupted)
+        supervisor = Supervisor(experiment, folder, environment, console, interrupted, replaced)
         outcome = supervisor.run()
     if outcome.code != 1:
         shutil.rmtree(folder, ignore_errors=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from rhythmid.experiment import Delay, Experiment
 
-from .arguments import command, compose_command, ros_arguments
+from .arguments import command, compose_command, replacement_command, ros_arguments
 from .liveness import SILENT_AFTER, Liveness, Relay
 from .observer import Observer
 from .processes import Supervised, end
@@ -28,6 +28,7 @@ from .processes import Supervised, end
 READY_WITHIN = 60.0  # seconds; importing ROS and compiling the model take most of it on a busy machine
 STALLED_AFTER = 30.0  # seconds
 FIGURES_WITHIN = 2.0  # seconds; every node tells its figures once a second
+GRAPH = "graph"  # the process that holds all nodes of a composed layout
 POST_ROLL = 0.25  # seconds recorded in real time after the last response can have arrived
 
 
@@ -51,7 +52,8 @@ class Observed:
 
 
 class Supervisor:
-    """One run of the graph. `interrupted()` says whether the user wants it to stop."""
+    """One run of the graph. `interrupted()` says whether the user wants it to stop; `replaced` has by the name of a node the
+    command that runs in its place."""
 
     def __init__(
         self,
@@ -60,14 +62,16 @@ class Supervisor:
         environment: dict[str, str],
         console: Console,
         interrupted: Callable[[], bool],
+        replaced: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
+        self._replaced = replaced or {}
         self.observed = Observed()
         self._experiment, self._folder, self._environment = experiment, folder, environment
         self._console, self._interrupted = console, interrupted
         self._processes: list[Supervised] = []
         self._lockstep = experiment.time.mode == "lockstep"
         self._length = experiment.count * experiment.time.period_ns * 1e-9
-        self._nodes = [spec.name for spec in experiment.nodes()]
+        self._nodes = [spec.name for spec in experiment.nodes() if spec.name not in self._replaced]
         self._liveness = Liveness(
             {
                 "command_delay": Relay("excitation", "sent", longest(experiment.input_delay)),
@@ -109,17 +113,22 @@ class Supervisor:
         self._console.print(f"[dim]{escape(f'[{name}]')}[/] {escape(line)}")
 
     def _launch(self) -> None:
-        specs = self._experiment.nodes()
+        everything = self._experiment.nodes()
+        specs = [spec for spec in everything if spec.name not in self._replaced]
         arguments = [ros_arguments(spec, self._experiment.namespace, self._folder) for spec in specs]
         if self._experiment.time.layout == "composed":
-            graph = self._folder / "graph.json"
+            graph = self._folder / f"{GRAPH}.json"
             listed = [
                 {"executable": spec.executable, "arguments": given} for spec, given in zip(specs, arguments)
             ]
             graph.write_text(json.dumps(listed), encoding="utf-8")
-            lines = {"graph": compose_command(graph)}
+            lines = {GRAPH: compose_command(graph)}
         else:
             lines = {spec.name: command(spec, given) for spec, given in zip(specs, arguments)}
+        for spec in everything:
+            if spec.name in self._replaced:
+                given = self._replaced[spec.name]
+                lines[spec.name] = replacement_command(spec, self._experiment.namespace, given)
         for name, line in lines.items():
             self._processes.append(Supervised(name, line, self._environment, self._tell))
             if not self._lockstep:
@@ -139,7 +148,7 @@ class Supervisor:
         heard = {name: count for name, count in observer.heard.items() if name in self._nodes}
         silent = self._liveness.silent(time.monotonic(), heard)
         for process in self._processes:
-            if process.name in silent or (silent and len(self._processes) == 1):
+            if process.name in silent or (silent and process.name == GRAPH):
                 process.signal(signal.SIGKILL)
         if silent:
             said = f"nothing was heard from {', '.join(silent)} for {SILENT_AFTER:g} s: stopped working"
@@ -262,7 +271,7 @@ def _cause(observer: Observer) -> Outcome | None:
 def _death(process: Supervised) -> Outcome:
     code = process.returncode
     assert code is not None
-    if code == 2:
+    if code == 2 and process.refusal:
         return Outcome(2, process.refusal)
     how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
     return Outcome(1, f"{process.name} {how}")

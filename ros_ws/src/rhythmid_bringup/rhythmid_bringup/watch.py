@@ -50,7 +50,7 @@ class Board(Node):
 
 def drawn(newest: Mapping[str, DiagnosticStatus]) -> RenderableType:
     """The board as a table: the models first, then the rates and lateness of all nodes."""
-    ordered = sorted(newest.items(), key=lambda item: (": model" not in item[0], item[0]))
+    ordered = sorted(newest.items(), key=lambda item: (not item[0].endswith("/model"), item[0]))
     parts: list[RenderableType] = []
     for name, status in ordered:
         colour = _COLOURS.get(status.level, "dim")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 import threading
 import time
@@ -27,11 +28,17 @@ from rosbags.typesys import Stores, get_typestore
 
 from rhythmid.errors import InputError
 from rhythmid.record.bag_writer import BagWriter
+from rhythmid.record.message_types import STANDARD_DISTRO
 
 from .clock import Worker
 from .definitions import learn
 
 _DRAIN_PERIOD = 0.1
+
+
+def running_distro() -> str:
+    """The ROS distribution that runs here; its Python wheels do not set the variable by which an installation tells."""
+    return os.environ.get("ROS_DISTRO") or STANDARD_DISTRO
 
 
 @dataclass(frozen=True)
@@ -111,7 +118,7 @@ class LiveBag(Worker):
     def _write_all(self) -> None:
         path = self._storage.path
         try:
-            writer = BagWriter(path, self._storage.kind, numbered=True)
+            writer = BagWriter(path, self._storage.kind, numbered=True, ros_distro=running_distro())
             writer.open()
         except (WriterError, OSError, sqlite3.Error) as error:
             self.failure = InputError(f"{path}: {error}")

@@ -17,7 +17,15 @@ NOT_READY = "not ready: "
 STOPPED = "stopped: "
 """What the message of a status is or begins with, for OK, WARN and ERROR."""
 
+PREFIX = "rhythmid: "
+"""What the name of every status begins with, by which an aggregator collects them."""
+
 _LOOK_PERIOD = 0.05  # a change of readiness is told within this time, everything else at 1 Hz
+
+
+def status_name(node: str) -> str:
+    """Name of a node's status by its fully qualified name: `rhythmid: hopper/plant`."""
+    return PREFIX + node.strip("/")
 
 
 class Diagnostics:
@@ -68,9 +76,9 @@ class Diagnostics:
         level = DiagnosticStatus.ERROR if message.startswith(STOPPED) else DiagnosticStatus.WARN
         status = DiagnosticStatus(
             level=DiagnosticStatus.OK if message == OK else level,
-            name=self._node.get_fully_qualified_name(),
+            name=status_name(self._node.get_fully_qualified_name()),
             message=message,
-            hardware_id="",
+            hardware_id=self._node.get_namespace().strip("/") or "machine",
             values=[KeyValue(key=key, value=value) for key, value in self._values().items()],
         )
         array = DiagnosticArray(status=[status])

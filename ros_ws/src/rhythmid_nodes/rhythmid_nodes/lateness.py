@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+PERCENTILES = (50.0, 99.0, 99.9)  # that are told
 _BIN_NS = 10_000
 _BINS = 10_000
 
@@ -52,9 +53,12 @@ class Lateness:
         }
 
     def summary(self, name: str) -> dict[str, str]:
-        """Diagnostic values `<name>_mean|p99|max` in milliseconds."""
+        """Diagnostic values `<name>_mean|p50|p99|p99.9|max` in milliseconds."""
+        percentiles = {
+            f"{name}_p{percent:g}_ms": f"{self.percentile_ns(percent) * 1e-6:.4f}" for percent in PERCENTILES
+        }
         return {
             f"{name}_mean_ms": f"{self.mean_ns * 1e-6:.4f}",
-            f"{name}_p99_ms": f"{self.percentile_ns(99.0) * 1e-6:.4f}",
+            **percentiles,
             f"{name}_max_ms": f"{self.max_ns * 1e-6:.4f}",
         }

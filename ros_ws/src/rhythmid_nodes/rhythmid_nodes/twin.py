@@ -27,6 +27,7 @@ from rhythmid.twin.twin import Status
 from rhythmid.twin.watch import Watch
 
 from .clock import Clock, Worker
+from .diagnostics import status_name
 from .joint_state import stamp_of
 from .lateness import Lateness
 from .node import JOINT, TIME_MODE, GraphNode, run
@@ -184,7 +185,7 @@ class TwinNode(GraphNode):
         told = {key: f"{value:.6g}" for key, value in quantities(status).items()}
         diagnostic = DiagnosticStatus(
             level=_LEVELS[status.level],
-            name=f"{self.get_fully_qualified_name()}: model",
+            name=status_name(f"{self.get_fully_qualified_name()}/model"),
             message=self._message(status),
             hardware_id=self._hardware,
             values=[KeyValue(key=key, value=value) for key, value in {**told, **self._diagnosis()}.items()],

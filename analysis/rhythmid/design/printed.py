@@ -1,0 +1,31 @@
+"""A design on the terminal."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+
+from rhythmid.report.terminal_table import print_estimates
+
+
+def show(result: Mapping[str, Any], console: Console) -> None:
+    """Print a design as its JSON holds it."""
+    rows = result["parameters"] | {f"delay: {name}": estimate for name, estimate in result["delays"].items()}
+    print_estimates(console, "predicted standard deviations", rows, "name")
+    size, position, signal, bent = (result[key] for key in ("amplitude", "position", "signal", "distortion"))
+    console.print(
+        f"{result['kind']}: {len(signal['frequencies'])} lines, peak {size['peak']:.4g} {size['unit']} "
+        f"(limit: {size['limited_by']}), rms {size['rms']:.4g}, crest factor {size['crest_factor']:.2f}"
+    )
+    low, high = position["cycle"]
+    console.print(
+        f"position {position['low']:.6g} to {position['high']:.6g} {position['unit']}, the limit cycle alone {low:.6g} to "
+        f"{high:.6g}"
+    )
+    console.print(
+        f"repeats over {signal['window']:.6g} s after a lead-in of {signal['lead_in']:.4g} s; harmonics up to "
+        f"±{signal['harmonics']} stay apart"
+    )
+    console.print(f"distortion of the response: even {bent['even']:.2%}, odd {bent['odd']:.2%}")
+    for note in result["notes"]:
+        console.print(f"note: {note}", markup=False)

@@ -1,0 +1,116 @@
+"""MuJoCo: an MJCF model with one body a joint, that loads as it is.
+
+Delays need MuJoCo 3.5, nonlinear springs and dampers 4.0; they are written only where the joint has them.
+`frictionloss` is a soft constraint: friction that creeps where the identified law sticks.
+"""
+
+import math
+import xml.etree.ElementTree as tree
+from collections.abc import Sequence
+
+from rhythmid.export.joint import Joint, number
+from rhythmid.export.link import link_of, world_gravity
+from rhythmid.export.xml_text import add, comment, document, vector
+
+TIMESTEP = 0.001  # [s]; the rate at which experiments are run unless they say otherwise
+EXPRESSED = frozenset(
+    (
+        "inertia", "gravity", "weight_moment", "hanging_position", "damping", "quadratic_damping", "friction", "stiffness",
+        "spring_reference", "quadratic_stiffness", "cubic_stiffness", "constant_force", "position_gain", "velocity_gain",
+        "command_delay", "command_lag", "gain", "actuator_lag", "actuator_delay", "effort_limit", "measurement_delay",
+    )
+)  # fmt: skip
+
+
+def text(joints: Sequence[Joint], source: str) -> str:
+    """The MJCF file of joints. Raises InputError where they ask for different gravities."""
+    root = tree.Element("mujoco", model=joints[0].name)
+    comment(root, f"identified by rhythmid: {source}")
+    add(root, "compiler", angle="radian")
+    gravity = vector((0.0, 0.0, -world_gravity(joints)))
+    add(root, "option", timestep=number(TIMESTEP), integrator="RK4", gravity=gravity)
+    world, actuators, sensors = (add(root, name) for name in ("worldbody", "actuator", "sensor"))
+    for joint in joints:
+        _body(world, joint)
+        add(actuators, "general", **_actuator(joint))
+        add(
+            sensors,
+            "jointpos",
+            name=f"{joint.name}_position",
+            joint=joint.name,
+            **_delay(joint.measurement_delay),
+        )
+    return document(root)  # fmt: skip
+
+
+def _body(world: tree.Element, joint: Joint) -> None:
+    link = link_of(joint)
+    body = add(world, "body", name=f"{joint.name}_link")
+    comment(
+        body,
+        f"inertia {joint.inertia:.6g} {joint.unit('inertia')} is link and rotor together: in a robot whose link has an inertia of "
+        "its own, write the difference as armature of the joint",
+    )
+    if joint.friction:
+        comment(
+            body,
+            "frictionloss is a soft constraint: at rest it creeps, where the identified friction holds or turns smoothly",
+        )
+    for line in joint.inexpressible(_expressed(joint)):
+        comment(body, line)
+    attributes = {
+        "name": joint.name,
+        "type": "hinge" if joint.rotational else "slide",
+        "axis": vector(link.axis),
+        "armature": number(0.0),
+        "damping": _polynomial(joint.damping, joint.quadratic_damping),
+        "frictionloss": number(joint.friction),
+        "stiffness": _polynomial(joint.stiffness, joint.quadratic_stiffness, joint.cubic_stiffness),
+        "springref": number(joint.spring_reference),
+    }
+    add(body, "joint", **attributes)
+    inertia = vector((link.inertia,) * 3)
+    add(body, "inertial", pos=vector(link.centre), mass=number(link.mass), diaginertia=inertia)
+
+
+def _polynomial(linear: float, *higher: float) -> str:
+    """The linear coefficient alone, where the others are zero: what older versions read."""
+    return vector((linear, *higher)) if any(higher) else number(linear)
+
+
+def _expressed(joint: Joint) -> frozenset[str]:
+    """What MJCF can say of this joint: an actuator has one low-pass and one delay, both before its control law."""
+    inside = {"actuator_lag", "actuator_delay"} if joint.control != "force" else set()
+    lags = {"actuator_lag"} if joint.command_lag else set()
+    constant = {"constant_force"} if joint.effort_limit < math.inf else set()
+    return EXPRESSED - inside - lags - constant
+
+
+def _actuator(joint: Joint) -> dict[str, str]:
+    expressed = _expressed(joint)
+    attributes = {"name": joint.name, "joint": joint.name}
+    bias = joint.constant_force if "constant_force" in expressed else 0.0
+    gain, position, velocity = joint.gain, 0.0, 0.0
+    if joint.control == "position":
+        gain, position = joint.gain * joint.position_gain, -joint.gain * joint.position_gain
+        velocity = -joint.gain * joint.velocity_gain
+    elif joint.control == "velocity":
+        gain, velocity = joint.gain * joint.velocity_gain, -joint.gain * joint.velocity_gain
+    attributes |= {"gaintype": "fixed", "gainprm": number(gain)}
+    if bias or position or velocity:
+        attributes |= {"biastype": "affine", "biasprm": vector((bias, position, velocity))}
+    lag = joint.command_lag or (joint.actuator_lag if "actuator_lag" in expressed else 0.0)
+    if lag:
+        attributes |= {"dyntype": "filterexact", "dynprm": number(lag)}
+    if joint.effort_limit < math.inf:
+        attributes |= {"forcerange": vector((-joint.effort_limit, joint.effort_limit))}
+    dead_time = joint.actuator_delay if "actuator_delay" in expressed else 0.0
+    return attributes | _delay(joint.command_delay + dead_time)
+
+
+def _delay(delay: float) -> dict[str, str]:
+    """A delay and the number of samples that it keeps; none of a joint without one."""
+    if not delay:
+        return {}
+    samples = math.ceil(round(delay / TIMESTEP, 9)) + 1
+    return {"delay": number(delay), "nsample": str(samples), "interp": "linear"}

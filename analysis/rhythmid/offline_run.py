@@ -1,0 +1,170 @@
+"""An experiment run without ROS: what every topic carries, as a record and as a bag."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rhythmid.experiment import Experiment, perform
+from rhythmid.model import Model
+from rhythmid.output import require_new
+from rhythmid.plain_yaml import plain_yaml
+from rhythmid.record.bag_writer import write_bag
+from rhythmid.record.messages import Messages
+from rhythmid.record.record import Channel, Record
+from rhythmid.record.signals import Signals
+from rhythmid.result import Result, Row, axis_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from rich.console import Console
+
+
+@dataclass(frozen=True, eq=False)
+class OfflineRun(Result):
+    """A simulated experiment.
+
+    Attributes
+    ----------
+    experiment : as it was run.
+    messages : what each topic carries, by its name within the namespace; the true motion is `plant/joint_states`.
+    """
+
+    experiment: Experiment
+    messages: Mapping[str, Messages]
+
+    @property
+    def record(self) -> Record:
+        """The run as a user of the robot sees it: command, forcing and delayed, noisy position."""
+        known = self.experiment
+        sources = Signals.default(known.namespace, known.joint).channels
+        topics = {"output": "joint_states", "input": "excitation", "forcing": "forcing"}
+        channels = {}
+        for role, topic in topics.items():
+            sent = self.messages[topic]
+            value = sent.position if role == "output" else sent.effort
+            assert value is not None
+            channels[role] = Channel(
+                (sent.stamp_ns * 1e-9).astype(np.float64), value, sources[role].unit, str(sources[role])
+            )
+        return Record(known.model_path.stem, run=known.description(), **channels)
+
+    @property
+    def headline(self) -> str:
+        """Length and rate of the run."""
+        return f"{self.experiment.count} samples at {self.experiment.time.rate} Hz"
+
+    def topics(self, all_topics: bool = False) -> tuple[str, ...]:
+        """Topics that the experiment records, or all of them."""
+        wanted = self.messages if all_topics else self.experiment.record.topics
+        return tuple(topic for topic in wanted if topic in self.messages)
+
+    def save(self, path: str | Path, all_topics: bool = False) -> Path:
+        """Write the bag that the graph would record; with `all_topics` the true output and command, too.
+
+        Raises
+        ------
+        InputError
+            Where the path exists or cannot be written.
+        """
+        path = Path(path)
+        require_new(path)
+        known = self.experiment
+        write_bag(
+            path,
+            {f"{known.namespace}/{topic}": self.messages[topic] for topic in self.topics(all_topics)},
+            storage=known.record.storage,
+            run=known.description(),
+            joint=known.joint,
+            namespace=known.namespace,
+        )
+        return path
+
+    def tables(self) -> Mapping[str, Sequence[Row]]:
+        """`topics`: how many messages each carries, and which fields."""
+        rows = [
+            {
+                "topic": f"{self.experiment.namespace}/{topic}",
+                "messages": len(sent),
+                "fields": ", ".join(
+                    n for n in ("position", "velocity", "effort") if getattr(sent, n) is not None
+                ),
+            }
+            for topic, sent in self.messages.items()
+        ]
+        return {"topics": rows}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The experiment's description and the topics; the samples are in `messages`."""
+        return {
+            "experiment": self.experiment.description(),
+            "topics": [dict(row) for row in self.tables()["topics"]],
+        }
+
+    def show(self, console: "Console") -> None:
+        """Print length, rate and topics."""
+        console.print(f"{self.headline} of {', '.join(self.messages)}", highlight=False)
+
+    def plot(self, axis: "Axes | None" = None) -> "Axes":
+        """Draw the measured position over time; see `Record.plot`."""
+        return self.record.plot(axis_or_new(axis))
+
+
+def simulate(
+    model: Model | str | Path | None,
+    experiment: Mapping[str, Any] | str | Path,
+    elements: Sequence[str | Path] = (),
+) -> OfflineRun:
+    """Run an experiment without ROS.
+
+    Parameters
+    ----------
+    model : the machine, or its file; None for the one that the experiment names.
+    experiment : an experiment.yaml, or its content as a mapping: excitation, forcing, delays, noise, duration, …
+    elements : folders with elements of your own.
+
+    Returns
+    -------
+    OfflineRun
+        With the `record` that an identification would be given; `save` writes the bag.
+
+    Raises
+    ------
+    InputError
+        In one line, naming the key that is wrong, or where the simulation diverges.
+
+    Examples
+    --------
+    >>> import rhythmid as rh
+    >>> run = rh.simulate(
+    ...     rh.paper_hopper(),
+    ...     {"excitation": {"type": "chirp", "amplitude": 0.004, "sweep": 0.5}, "delays": {"input": 0.04}},
+    ... )
+    >>> run.headline
+    '500 samples at 1000 Hz'
+    >>> run.record.output.value.shape
+    (500,)
+    """
+    with TemporaryDirectory(prefix="rhythmid_") as folder:
+        path = Path(folder) / "model.yaml" if isinstance(model, Model) else model
+        if isinstance(model, Model):
+            model.save(Path(folder) / "model.yaml")
+        described = _described(path, experiment, tuple(Path(one).resolve() for one in elements))
+    return OfflineRun(described, perform(described))
+
+
+def _described(
+    model: str | Path | None, experiment: Mapping[str, Any] | str | Path, elements: tuple[Path, ...]
+) -> Experiment:
+    """The experiment with the model in a file taking the place of its own."""
+    if not isinstance(experiment, Mapping):
+        return Experiment.load(experiment, elements, model)
+    content = dict(experiment)
+    if model is not None:
+        content["model"] = str(Path(model).resolve())
+    if elements:
+        content["elements"] = [*content.get("elements", ()), *elements]
+    return Experiment.from_text(plain_yaml(content, "experiment"))

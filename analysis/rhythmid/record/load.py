@@ -1,0 +1,49 @@
+"""A recording as a Record, in one call."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rhythmid.plain_yaml import plain_yaml
+from rhythmid.record.read import read_record
+from rhythmid.record.record import Record
+from rhythmid.record.signals import Signals
+
+
+def load(
+    source: str | Path,
+    signals: Signals | Mapping[str, Any] | str | Path | None = None,
+    use: tuple[float, float] | None = None,
+) -> Record:
+    """Read a recording.
+
+    Parameters
+    ----------
+    source : a bag directory, an .mcap or .db3 file, a table (.csv, .mat, .npz, .parquet), or a signals.yaml that names tables.
+    signals : which channel is what: a signals.yaml, or its content as a mapping; by default the topics of rhythmid's own nodes.
+    use : first and last second of the recording that are used.
+
+    Returns
+    -------
+    Record
+        Channels `output`, `input`, `forcing` and others where recorded, each with times [s] and values, float64[n].
+
+    Raises
+    ------
+    InputError
+        In one line, where the source cannot be read or lacks a channel that `signals` names.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np, rhythmid as rh
+    >>> t = np.arange(0.0, 2.0, 0.01)
+    >>> table = tempfile.mkdtemp() + "/swing.csv"
+    >>> np.savetxt(table, np.column_stack([t, 0.3 * np.cos(5 * t)]), delimiter=",", header="t,angle", comments="")
+    >>> record = rh.load(table, signals={"time": {"column": "t"}, "output": {"column": "angle", "unit": "rad"}})
+    >>> len(record.output), record.output.unit, round(record.duration, 2)
+    (200, 'rad', 1.99)
+    """
+    if isinstance(signals, Mapping):
+        signals = Signals.from_text(plain_yaml(signals, "signals"))
+    record = read_record(source, signals)
+    return record if use is None else record.cut(*use)

@@ -1,0 +1,175 @@
+"""What the command promises on a terminal: help, completion, silence, JSON on standard output, and tables of any width."""
+
+import io
+import json
+import os
+import re
+import resource
+import shlex
+import subprocess
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+import typer
+from rich.console import Console
+
+import rhythmid as rh
+from rhythmid.cli import app
+from rhythmid.commands.begin import BEGIN
+from rhythmid.output import STANDARD_OUTPUT, require_new, write_json
+from rhythmid.report.terminal_table import estimate_cells, print_estimates, print_table
+
+COMMANDS = (
+    "check",
+    "convert",
+    "design",
+    "diagnose",
+    "identify",
+    "init",
+    "proof",
+    "simulate",
+    "table1",
+    "run",
+)
+NARROW = 40
+START_UP = 0.35  # s of processor time
+
+
+def python_m(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    """`python -m rhythmid` with environment variables."""
+    return subprocess.run(
+        [sys.executable, "-m", "rhythmid", *arguments],
+        capture_output=True, text=True, timeout=60.0, check=False, env={**os.environ, **variables},
+    )  # fmt: skip
+
+
+@pytest.fixture
+def bag(tmp_path):
+    run = {"excitation": {"type": "chirp", "amplitude": 0.02, "sweep": 2.0}}
+    return rh.simulate(rh.paper_hopper(), run).save(tmp_path / "bag")
+
+
+def test_the_command_alone_says_where_to_begin_and_fits_a_narrow_terminal():
+    done = python_m()
+    assert (done.returncode, done.stdout, done.stderr) == (0, BEGIN, "")
+    assert max(map(len, BEGIN.splitlines())) <= NARROW
+    named = set(re.findall(r"^  rhythmid (\w+)", BEGIN, re.MULTILINE))
+    assert {"init", "check", "diagnose"} <= named <= set(COMMANDS)
+
+
+def test_python_m_and_the_short_option_give_the_same_help():
+    assert python_m("-h").stdout == python_m("--help").stdout != ""
+    assert "Usage: rhythmid check" in python_m("check", "-h").stdout
+
+
+def test_help_is_there_in_a_third_of_a_second():
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert python_m("--help").returncode == 0
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < START_UP
+
+
+def test_help_on_a_narrow_terminal_cuts_nothing_off():
+    text = python_m("identify", "--help", COLUMNS="40").stdout
+    assert "--clock-offset-std" in text and "…" not in text
+
+
+def examples() -> Sequence[tuple[str, str]]:
+    import importlib
+
+    modules = {name: f"rhythmid.commands.{name}" for name in COMMANDS} | {"run": "rhythmid_bringup.command"}
+    return [
+        (name, line) for name, where in modules.items() for line in importlib.import_module(where).EXAMPLES
+    ]
+
+
+def test_every_command_has_examples():
+    assert {name for name, _ in examples()} == set(COMMANDS)
+
+
+@pytest.mark.parametrize(("name", "line"), examples())
+def test_an_example_is_in_the_help_of_its_command_and_can_be_parsed(name, line):
+    program, command, *arguments = shlex.split(line)
+    assert (program, command) == ("rhythmid", name)
+    if name == "run":
+        return
+    group = typer.main.get_command(app)
+    one = group.commands[command]
+    assert line in one.epilog
+    one.make_context(command, arguments)  # refuses what it does not know, without running anything
+
+
+def test_tab_completes_commands_and_options():
+    commands = python_m(COMP_WORDS="rhythmid id", COMP_CWORD="1", _RHYTHMID_COMPLETE="complete_bash")
+    assert commands.stdout.split() == ["identify"]
+    options = python_m(
+        COMP_WORDS="rhythmid identify --js", COMP_CWORD="2", _RHYTHMID_COMPLETE="complete_bash"
+    )
+    assert options.stdout.split() == ["--json"]
+
+
+def test_json_on_standard_output_is_nothing_but_json(bag, rhythmid):
+    done = rhythmid("check", bag, "--json", "-")
+    assert json.loads(done.stdout)["usable"] is True
+    assert "joint_states" in done.stderr  # the report for people goes where it does not disturb
+
+
+def test_quiet_prints_errors_only(bag, rhythmid):
+    done = rhythmid("check", bag, "-q", "--json", "-")
+    assert done.returncode == 0 and json.loads(done.stdout)["topics"] and done.stderr == ""
+    refused = rhythmid("check", "nothing", "-q")
+    assert refused.returncode == 2 and refused.stderr.startswith("error: ")
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name != "run"])
+def test_every_command_can_be_silenced(name):
+    one = typer.main.get_command(app).commands[name]
+    assert any("--quiet" in parameter.opts for parameter in one.params)
+
+
+def test_standard_output_is_never_in_the_way(capsys):
+    require_new(STANDARD_OUTPUT, STANDARD_OUTPUT)
+    write_json(STANDARD_OUTPUT, {"value": np.float64(np.nan)})
+    assert json.loads(capsys.readouterr().out) == {"value": None}
+
+
+def printed(width: int, *arguments, **options) -> list[str]:
+    console = Console(file=io.StringIO(), width=width)
+    print_table(console, *arguments, **options)
+    assert isinstance(console.file, io.StringIO)
+    return console.file.getvalue().splitlines()
+
+
+ROWS = [
+    ("switched_damper.stance", "2.000", "0.012", "N*s/m"),
+    ("a [very] long name of a parameter", "200.00", "0.12", "N/m"),
+]
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 160])
+def test_a_table_fits_its_terminal_and_loses_nothing(width):
+    lines = printed(width, "estimates", ("name", "value", "± std", "unit"), ROWS)
+    assert max(map(len, lines)) <= width
+    text = "\n".join(lines)
+    assert "…" not in text
+    for name, *cells in ROWS:
+        assert all(cell in text for cell in cells)
+        assert name in text or width < 80  # folded there
+    assert ("━" in text) == (width > NARROW)
+
+
+def test_digits_follow_the_standard_deviation():
+    assert estimate_cells(199.99612345, 0.00123) == ("199.9961", "0.0012")
+    assert estimate_cells(1234.5, 210.0) == ("1230", "210")
+    assert estimate_cells(0.1234567, None) == ("0.1235", "—")
+    assert estimate_cells(None, None) == ("not identifiable", "—")
+
+
+@pytest.mark.parametrize("width", [40, 100])
+def test_estimates_print_to_their_digits_at_any_width(width):
+    console = Console(file=io.StringIO(), width=width)
+    print_estimates(console, "t", {"k": {"value": 200.00069, "std": 0.00047, "unit": "N/m"}}, "name")
+    assert isinstance(console.file, io.StringIO)
+    assert "200.00069" in console.file.getvalue() and "0.00047" in console.file.getvalue()
