@@ -98,6 +98,9 @@ def _searched(
 def stated_at(one: JointResult) -> tuple[str, ...]:
     """Labels by which the answer at a joint stands: elements, or a value of the body that is wrong, or a delay."""
     decision, chosen = one.result.decision, one.result.selection.chosen
+    own = [label for label in chosen.elements if one.result.chosen.fit.model.term(label) is None]
+    if not all(_differs(one, label) for label in own):
+        return ()
     if decision.verdict == "missing_physics":
         return decision.named
     alike = _held_by_alike(one) >= STATED
@@ -105,10 +108,8 @@ def stated_at(one: JointResult) -> tuple[str, ...]:
         return chosen.elements
     if chosen.kind not in ("freed_value", "delay") or not (alike or decision.joint >= STATED):
         return ()
-    own = [label for label in chosen.elements if one.result.chosen.fit.model.term(label) is None]
-    if not all(label == INERTIA or name_of(one.joint, label)[0] != label for label in own):
-        return ()  # another value of the path: that is its author's to check
-    return decision.named if all(_differs(one, label) for label in own) else ()
+    known = all(label == INERTIA or name_of(one.joint, label)[0] != label for label in own)
+    return decision.named if known else ()  # another value of the path is its author's to check
 
 
 def _held_by_alike(one: JointResult) -> float:
