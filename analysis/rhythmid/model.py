@@ -208,7 +208,7 @@ class Model:
                 "position": self.units.position,
                 "mass": self.units.mass,
             }
-        content["inertia"] = {"mass": _entry(self.mass, MASS)}
+        content["inertia"] = {"mass": entry_of(self.mass, MASS)}
         for slot in SLOTS:
             terms = [term for term in self.terms if term.element.slot == slot]
             if terms or slot != "timing":
@@ -234,12 +234,13 @@ def _fed(units: Units, behind: Iterable[Element]) -> Units:
 
 def _body(term: Term) -> dict[str, Any]:
     body: dict[str, Any] = {
-        name: _entry(value, term.element.parameter(name)) for name, value in term.values.items()
+        name: entry_of(value, term.element.parameter(name)) for name, value in term.values.items()
     }
     return body | ({"against": "room"} if term.against == "room" else {})
 
 
-def _entry(value: Value, usual: Parameter) -> dict[str, Any]:
+def entry_of(value: Value, usual: Parameter) -> dict[str, Any]:
+    """A parameter as a file holds it, without what is usual."""
     entry: dict[str, Any] = {"value": float(value.value), "unit": value.unit}
     if value.fixed or usual.fixed:
         entry["fixed"] = value.fixed
@@ -275,7 +276,7 @@ _ENTRY: TypeAdapter[_Entry] = TypeAdapter(_Entry)
 _UNIT_NAMES: TypeAdapter[_UnitNames] = TypeAdapter(_UnitNames)
 
 
-def _value(node: Node, parameter: Parameter, units: Units) -> Value:
+def value_of(node: Node, parameter: Parameter, units: Units) -> Value:
     """Parameter from `{value: …, unit: …}` or from a bare number in the machine's own units."""
     whole = isinstance(node.value, dict)
     given = validated(node, _ENTRY) if whole else _Entry(validated(node, NUMBER))
@@ -322,7 +323,7 @@ def _term(item: Node, slot: str, catalogue: Catalogue, units: Units, taken: set[
     values: dict[str, Value] = {}
     for parameter in element.parameters:
         if parameter.name in given:
-            values[parameter.name] = _value(given[parameter.name], parameter, units)
+            values[parameter.name] = value_of(given[parameter.name], parameter, units)
         elif parameter.default is None:
             body.fail(
                 f"parameter {parameter.name!r} is missing ({parameter.description}, {units.of(parameter.unit)})"
@@ -354,7 +355,7 @@ def _model(document: Node, catalogue: Catalogue) -> Model:
     if "mass" not in inertia:
         sections["inertia"].fail("'mass' is missing")
     units = _units(sections, inertia["mass"])
-    mass = _value(inertia["mass"], MASS, units)
+    mass = value_of(inertia["mass"], MASS, units)
     if mass.value <= 0.0:
         inertia["mass"].fail("must be greater than 0")
     taken: set[str] = set()

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rhythmid.commands import machines
 from rhythmid.commands.options import Bags, Elements, JsonFile, Quiet, ReportFile, SignalsFile, command_line
 from rhythmid.commands.terminal import Terminal
 from rhythmid.errors import InputError
@@ -79,6 +80,20 @@ def diagnose(
         raise InputError(
             "--holdout, --budget and --save-model belong to a model: give --model NOMINAL.yaml too"
         )
+    if model is not None and machines.is_machine(model):
+        machines.refuse(sim=sim, report=report)
+        machines.diagnose_files(
+            bags,
+            model,
+            signals,
+            holdout or (),
+            elements or (),
+            json,
+            save_model,
+            budget,
+            Terminal(quiet, json),
+        )
+        return
     catalogue = load_catalogue(elements or ())
     nominal = None if model is None else Model.load(model, catalogue)
     terminal = Terminal(quiet, json)

@@ -5,6 +5,7 @@ from typing import Annotated, cast, get_args
 
 import typer
 
+from rhythmid.commands import machines
 from rhythmid.commands.options import Bags, Elements, JsonFile, Quiet, ReportFile, SignalsFile, command_line
 from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new, write_json
@@ -74,6 +75,10 @@ def identify(
     from rhythmid.record.read import load_records
 
     require_new(json, report, save_model, save)
+    if model is not None and machines.is_machine(model):
+        machines.refuse(report=report, save=save, forcing=forcing, clock_offset=clock_offset)
+        machines.identify_files(bags, model, signals, elements or (), json, save_model, Terminal(quiet, json))
+        return
     if method not in get_args(Method):
         raise InputError(f"--method {method}: one of {', '.join(get_args(Method))} is expected")
     if htf not in get_args(HtfMethod):

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from rhythmid.commands import machines
 from rhythmid.commands.options import Elements, Quiet
 from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new
@@ -30,6 +31,10 @@ def simulate(
     from rhythmid.progress_bar import progress
 
     require_new(out)
+    if machines.is_machine(model):
+        machines.refuse(all_topics=all_topics)
+        machines.simulate_files(model, experiment, out, elements or (), Terminal(quiet))
+        return
     terminal = Terminal(quiet)
     with progress(terminal.progress, log=False) as tell:
         tell("simulating")

@@ -166,6 +166,11 @@ class Signals:
         return _signals(parse(text, str(path)), Path(path))
 
     @classmethod
+    def from_node(cls, document: Node, path: str | Path) -> "Signals":
+        """The signals in a document that was read from the file `path`."""
+        return _signals(document, Path(path))
+
+    @classmethod
     def default(cls, namespace: str = "/hopper", joint: str = "leg") -> "Signals":
         """The topics that rhythmid's own nodes publish; the forcing may be absent."""
         topics = {"input": "excitation", "output": "joint_states", "forcing": "forcing"}

@@ -4,8 +4,10 @@ The trajectory stays as it is; that is exact to first order in the size of the e
 elements deserves to be simulated in earnest. Compiled once an element, whatever the model.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,6 +121,33 @@ def _module(element: Element) -> Module:
     return Module(text, (kernel,))
 
 
+@dataclass(frozen=True, eq=False)
+class _Any:
+    """An element that takes no part in the cache's key: those that differ in names and bounds share one compiled function."""
+
+    element: Element
+
+    def __hash__(self) -> int:
+        return 0
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Any)
+
+
+@lru_cache(maxsize=256)
+def _run(key: Hashable, one: _Any) -> Callable[..., Any]:
+    return load_run(_module(one.element))
+
+
+def _run_of(element: Element) -> Callable[..., Any]:
+    """The compiled function of an element; a kernel's code compares by content, and what it borrows by name."""
+    key = (
+        element.name, element.slot, element.acts, element.states, element.memories, tuple(element.borrows.items()),
+        tuple(parameter.name for parameter in element.parameters), getattr(element.kernel, "__code__", None),
+    )  # fmt: skip
+    return _run(key, _Any(element))
+
+
 def effect_along(
     element: Element, values: Mapping[str, float], model: Model, path: Path, max_step: float = MAX_STEP
 ) -> Array:
@@ -156,7 +185,7 @@ def effect_along(
         known.append(_load(model, path) if path.load is None else path.load)
     rows = np.ascontiguousarray(np.vstack(known), dtype=float)
     out = np.empty(len(path.time))
-    load_run(_module(element))(
+    _run_of(element)(
         np.ascontiguousarray(path.time), rows, np.array([*parameters, *borrowed.values()], dtype=float), states,
         max_step, out,
     )  # fmt: skip

@@ -24,6 +24,7 @@ from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.verdict import Decision, decide
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.applicability import Applicability
+from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import size_of
 from rhythmid.identify.student import autocorrelation_time
 
@@ -72,8 +73,8 @@ class _Rows:
         return held if held.any() else ~held
 
 
-def _rows(case: Case, found: EffortSearch) -> _Rows:
-    heldout = None
+def _rows(case: Case, found: EffortSearch, unseen: Balance | None) -> _Rows:
+    heldout = None if unseen is None else HeldOut(unseen)
     if case.holdout:
         try:
             heldout = HeldOut.of(case.holdout, found.nominal.fit.model, found.balance)
@@ -88,13 +89,23 @@ def _rows(case: Case, found: EffortSearch) -> _Rows:
     return _Rows(whole, Blocks.of(whole, GAP, np.unique(others)), heldout)
 
 
-def effort_run(case: Case, applicability: Applicability, most: int = MOST_EFFECTS) -> EffortResult:
-    """Search for up to `most` effects, weigh and decide. Raises InputError where the records hold too little."""
+def effort_run(
+    case: Case,
+    applicability: Applicability,
+    most: int = MOST_EFFECTS,
+    unseen: Balance | None = None,
+    promising: float | None = None,
+    places: int = 1,
+) -> EffortResult:
+    """Search for up to `most` effects, weigh and decide; `unseen` is the balance of held-out efforts where the case has no records
+    of them, `promising` as for `search_effort`; the same search is made at so many `places`, and chance has as many
+    candidates. Raises InputError where the records hold too little."""
     found = search_effort(
-        case.records, case.nominal, case.catalogue, applicability.balance, most, case.tell, case.budget
-    )
+        case.records, case.nominal, case.catalogue, applicability.balance, most, case.tell, case.budget,
+        promising,
+    )  # fmt: skip
     case.tell("weighing the hypotheses on data that no fit has seen")
-    rows = _rows(case, found)
+    rows = _rows(case, found, unseen)
     size = size_of(found.balance)
     predicted = {one.elements: rows.predicted(one) for one in found.hypotheses}
     mapped = {
@@ -126,7 +137,7 @@ def effort_run(case: Case, applicability: Applicability, most: int = MOST_EFFECT
     ]
     left = remainder_of(found.balance, found.chosen)
     maps = {left.goes_with: made(mapped["the motion and the load"])}
-    contest = Contest(tuple(hypotheses), maps, found.candidates, size, PRACTICAL_EFFORT)
+    contest = Contest(tuple(hypotheses), maps, places * found.candidates, size, PRACTICAL_EFFORT)
     selection = select(contest)
     chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)
     noise = predicted[chosen.elements].error

@@ -102,17 +102,19 @@ def search_effort(
     most: int = MOST_EFFECTS,
     tell: Tell = lambda _: None,
     budget: Budget | None = None,
+    promising: float | None = None,
 ) -> EffortSearch:
     """Search for what the model lacks to predict the recorded effort.
 
-    Raises InputError where no effort was recorded or too little of motion.
+    With `promising`, additions whose score test promises a smaller gain of log likelihood are not fitted; where there are many
+    joints most of them lack nothing. Raises InputError where no effort was recorded or too little of motion.
     """
     balance = balance or Balance.of(records, model)
     names = balance.estimated(model)
     _, jacobian = linearise(balance, model, names, 0.0)
     priors = priors_of(balance, model, names, jacobian[:, 1:])
     nominal = Fitted.of((), "nominal", fit_effort(balance, model, names, priors), priors)
-    search = _Search(balance, catalogue, Blocks.of(balance.record, GAP), nominal, [nominal])
+    search = _Search(balance, catalogue, Blocks.of(balance.record, GAP), nominal, [nominal], promising)
     reference = reference_of(balance, nominal, search.blocks)
     chosen = nominal
     budget = budget or Budget()
@@ -146,6 +148,7 @@ class _Search:
     blocks: Blocks
     nominal: Fitted
     found: list[Fitted]
+    promising: float | None = None
     tried: set[str] = field(default_factory=set)
 
     def further(self, parent: Fitted, reference: Linearised) -> Fitted | None:
@@ -156,7 +159,7 @@ class _Search:
         self.tried.update(one.start.name for one in screened)
         tried = len(screened)
         new: list[Fitted] = []
-        for one in _shortlist(screened):
+        for one in self._promising(_shortlist(screened), parent):
             for base in self._bases(parent, one.start):
                 fitted = self.fitted(base, one)
                 if fitted is not None and not self._known(fitted):
@@ -179,6 +182,14 @@ class _Search:
             if gain < EQUIVALENT * error or removed < max(REST * rest, practical):
                 best = index
         return new[best] if self._worth(others[best], before, free, tried) else None
+
+    def _promising(self, shortlist: Sequence[Screened], parent: Fitted) -> list[Screened]:
+        """The additions that are worth a fit; a longer delay is where the alignment has gone further than stamps are rounded."""
+        if self.promising is None:
+            return list(shortlist)
+        least = self.promising * parent.fit.correlation
+        late = abs(parent.fit.alignment) > Alignment.of(self.balance).std
+        return [one for one in shortlist if (late if one.start.kind == "delay" else one.gain > least)]
 
     def _worth(self, new: Prediction, old: Prediction, free: Prediction, tried: int) -> bool:
         """Whether a further effect is more than chance and of practical size."""

@@ -46,7 +46,7 @@ class Change:
     key: int
     element: Element
     values: Mapping[str, float]
-    outputs: tuple[Array, ...]
+    outputs: tuple[NDArray[np.floating], ...]
 
 
 @dataclass(frozen=True)
@@ -286,7 +286,7 @@ def changes_of(
     return [change for change in (pool.map(one, cases) if pool else map(one, cases)) if change is not None]
 
 
-def _kept(outputs: Sequence[Array]) -> tuple[Array, ...]:
+def _kept(outputs: Sequence[Array]) -> tuple[NDArray[np.floating], ...]:
     """Changes as they are kept for the whole catalogue: in half the memory over records that are very long."""
     if sum(map(len, outputs)) <= FULL_PRECISION_ROWS:
         return tuple(outputs)

@@ -70,6 +70,14 @@ class Balance:
         raw = stretches(records, model)
         chosen = bandwidth or bandwidth_of(raw, model)
         motions = [motion_of(one, model, chosen.motion, chosen.low) for one in raw]
+        return cls.of_motions(motions, chosen, max(one.period for one in raw))
+
+    @classmethod
+    def of_motions(
+        cls, motions: Sequence[Motion], chosen: Bandwidth, period: float, clear: float | None = None
+    ) -> "Balance":
+        """The balance of these motions, whose records were sampled every `period` [s]. With `clear`, so many periods of the cut-off are
+        left out at both ends of each motion, however little remains. Raises InputError where too few rows are left."""
         speed = float(np.quantile(np.abs(np.concatenate([one.leg_velocity for one in motions])), FAST))
         length = sum(len(one.time) * one.period for one in motions)
         often = max(DECIMATED * chosen.effort, MANY_ROWS / length)
@@ -77,6 +85,8 @@ class Balance:
         for motion in motions:
             step = max(1, int(1.0 / (often * motion.period)))
             margin = min(math.ceil(1.0 / (chosen.effort * motion.period)), len(motion.time) // 4)
+            if clear is not None:
+                margin = math.ceil(clear / (chosen.effort * motion.period))
             rows = np.arange(margin, len(motion.time) - margin, step)
             all_rows += len(rows)
             sticks = stuck(
@@ -91,7 +101,7 @@ class Balance:
         numbers = np.concatenate([np.full(len(p), m.record) for p, m in zip(places, motions, strict=True)])
         made = cls(
             tuple(motions), chosen, tuple(places), np.unique(numbers, return_inverse=True)[1].astype(np.int64),
-            np.zeros(count), STICK * speed, 1.0 - count / max(all_rows, 1), max(one.period for one in raw),
+            np.zeros(count), STICK * speed, 1.0 - count / max(all_rows, 1), period,
         )  # fmt: skip
         measured = made.rows([one.effort for one in motions])
         made.measured[:] = measured
@@ -137,6 +147,9 @@ class Balance:
         """The free parameters that the effort can tell of: the inertia, forces, and the actuator."""
         found = []
         for name in model.free:
+            if name in self.motions[0].links:
+                found.append(name)
+                continue
             if name == INERTIA:
                 if not self.motions[0].driven_by_base:
                     found.append(name)
@@ -157,8 +170,10 @@ class Balance:
         return bool(np.linalg.norm(self.rows(change)) > INVISIBLE * np.linalg.norm(whole))
 
     def _counts(self, term: Term, model: Model) -> bool:
-        """Whether an element plays a part in the balance."""
+        """Whether an element plays a part in the balance; what stands for a body's parameters does so in the motions' coupling."""
         slot = term.element.slot
+        if any(f"{term.label}.{name}" in self.motions[0].links for name in term.values):
+            return False
         if slot == "force":
             return term.element.acts != "drive" or not self.motions[0].driven_by_base
         if self.motions[0].driven_by_base or term.element.kernel is None:
@@ -182,6 +197,10 @@ class Balance:
             if term.element.acts == "modifier":
                 leg += self._along(motion, term, model, zero, leg, zero)
         inertial = zero if motion.driven_by_base else model.mass.value * motion.acceleration
+        if motion.coupling is not None:
+            inertial = inertial + motion.coupling
+            for name, (taken_at, column) in motion.links.items():
+                inertial = inertial + (model.value(name) - taken_at) * column
         required = inertial - leg - others
         if late:
             load = required if not motion.driven_by_base else zero

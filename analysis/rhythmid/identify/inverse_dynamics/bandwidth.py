@@ -36,8 +36,8 @@ class Bandwidth:
     low: float = 0.0
 
 
-def bandwidth_of(raw: Sequence[Stretch], model: Model) -> Bandwidth:
-    """The bandwidth at which the effort of these stretches is explained."""
+def bandwidth_of_motion(raw: Sequence[Stretch]) -> tuple[float, float]:
+    """Highest frequency [Hz] at which the motion of these stretches is measured, and its strongest one."""
     limits, lines, weights = [], [], []
     for one in raw:
         limit, line = _of_motion(one)
@@ -47,8 +47,18 @@ def bandwidth_of(raw: Sequence[Stretch], model: Model) -> Bandwidth:
     motion = float(np.median(limits))
     dominant = float(np.average(lines, weights=weights))
     motion = max(motion, min(2.0 * LOWEST * dominant, HIGHEST / max(one.period for one in raw)))
+    return motion, dominant
+
+
+def bandwidth_of(raw: Sequence[Stretch], model: Model) -> Bandwidth:
+    """The bandwidth at which the effort of these stretches is explained."""
+    motion, dominant = bandwidth_of_motion(raw)
     low = dominant / SLOW if any(one.measured == "acceleration" for one in raw) else 0.0
-    motions = [motion_of(one, model, motion, low) for one in raw]
+    return bandwidth_below([motion_of(one, model, motion, low) for one in raw], motion, dominant, low)
+
+
+def bandwidth_below(motions: Sequence[Motion], motion: float, dominant: float, low: float = 0.0) -> Bandwidth:
+    """The bandwidth at which the effort of these motions is explained, which are known below `motion` [Hz]."""
     effort = _of_effort(motions, motion / 2.0, dominant, low)
     effort = max(effort, min(LOWEST * dominant, motion / 2.0))
     return Bandwidth(motion, effort, _explained(motions, effort, low), dominant, low)

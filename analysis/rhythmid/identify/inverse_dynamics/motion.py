@@ -7,8 +7,8 @@ M. Gautier, A. Janot, P. O. Vandanjon, IEEE Trans. Control Syst. Technol. 21 (20
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -36,7 +36,8 @@ class Motion:
 
     `record` numbers the record. `effort` is the total force that was recorded; of a machine that its base drives it is
     d'Alembert's −m a, and `driven_by_base` says so. `leg_position`, `leg_velocity` are relative to the base where that
-    moves. `shift` [s] is by how much later than its stamp the effort acts, as the model's fixed delays say.
+    moves. `coupling` (n,) is, at a joint of several, the force beside its own inertia times its acceleration that the body asks
+    for; `links` are its derivatives with respect to the body's parameters, by name, and the values at which they were taken.
     """
 
     record: int
@@ -50,13 +51,16 @@ class Motion:
     effort: Array
     period: float
     driven_by_base: bool = False
+    coupling: Array | None = None
+    links: Mapping[str, tuple[float, Array]] = field(default_factory=dict)
 
     def path(self, effort: Array, leg: Array, signal: Array, of_leg: bool) -> Path:
         """The trajectory along which an element's force is computed."""
         position, velocity = (
             (self.leg_position, self.leg_velocity) if of_leg else (self.position, self.velocity)
         )
-        return Path(self.time, position, velocity, effort, leg, signal)
+        load = None if self.coupling is None else -self.coupling
+        return Path(self.time, position, velocity, effort, leg, signal, load)
 
 
 @dataclass(frozen=True, eq=False)

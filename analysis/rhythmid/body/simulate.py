@@ -1,0 +1,255 @@
+"""Runs of a machine of several joints."""
+
+import math
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline, PPoly
+
+from rhythmid.body.body import Array
+from rhythmid.body.machine import Machine
+from rhythmid.body.stepping_source import COLUMNS, Layout, generate
+from rhythmid.errors import InputError
+from rhythmid.model import Model
+from rhythmid.simulation.machine_code import load_run
+from rhythmid.simulation.signal import FAR
+from rhythmid.simulation.simulate import delayed_command, physical_times, samplers
+
+Start = Mapping[str, float]
+AT_ONCE = 2e7  # numbers that a run may keep
+
+
+@dataclass(frozen=True)
+class JointTrajectory:
+    """A run of a machine; of each joint in `joints` a column of the arrays (n, joints).
+
+    `time` [s] are the stamps that were asked for. `output` is what the sensors say, `position`, `velocity` and `effort`, the
+    actuators' force, are true at the same stamps less the measurement's delay. `pose` (n, nq) and `rate` (n, nv) are of the
+    whole body at the stamps themselves.
+    """
+
+    time: Array
+    joints: tuple[str, ...]
+    position: Array
+    velocity: Array
+    effort: Array
+    output: Array
+    pose: Array
+    rate: Array
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """The compiled loop of a structure of paths, for all values of their parameters."""
+
+    layout: Layout
+    run: Callable[..., int]
+
+
+@dataclass(frozen=True, eq=False)
+class _Paths:
+    """Paths that take no part in the cache's key: machines that differ in values share one compiled loop."""
+
+    paths: dict[str, Model]
+
+    def __hash__(self) -> int:
+        return 0
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Paths)
+
+
+@lru_cache(maxsize=64)
+def _stepping(key: Hashable, paths: _Paths) -> Stepping:
+    module, layout = generate(paths.paths)
+    return Stepping(layout, load_run(module))
+
+
+def compile_machine(machine: Machine) -> Stepping:
+    """The compiled loop of a machine; parameter values play no part."""
+    key = tuple(
+        (
+            joint,
+            tuple(
+                (t.label, t.element.name, t.element.slot, t.element.acts, t.element.own, t.element.history,
+                 tuple(t.element.borrows.items()), getattr(t.element.kernel, "__code__", None))
+                for t in model.terms
+            ),
+        )
+        for joint, model in machine.paths.items()
+    )  # fmt: skip
+    return _stepping(key, _Paths(dict(machine.paths)))
+
+
+def pose_of(machine: Machine, start: Start) -> Array:
+    """Position vector (nq,) with the named joints at these positions, the others at the reference pose."""
+    pose = machine.body.reference.copy()
+    for name, value in start.items():
+        pose[machine.body.joint(name).position] = value
+    return pose
+
+
+def means(signal: PPoly | None, begin: float, step: float, count: int) -> Array:
+    """Mean (count,) of a signal over each step, which keeps its impulse; before its first knot it is 0."""
+    if signal is None:
+        return np.zeros(count)
+    edges = begin + step * np.arange(count + 1)
+    first = float(signal.x[0])
+    if (
+        signal.x[-1] > FAR / 2
+    ):  # held: its knots' impulse, whose antiderivative has no use for a last piece without an end
+        knots, level = signal.x[:-1], signal.c[-1]
+        impulse = np.concatenate([[0.0], np.cumsum(level[:-1] * np.diff(knots))])
+        piece = np.clip(np.searchsorted(knots, edges, side="right") - 1, 0, len(level) - 1)
+        total = np.where(edges < first, 0.0, impulse[piece] + level[piece] * (edges - knots[piece]))
+        return np.diff(total) / step
+    last = float(signal.x[-1])
+    inside = np.clip(edges, first, last)
+    total = signal.antiderivative()(inside) + (edges - inside) * signal(inside)
+    return np.diff(total) / step
+
+
+def simulate(
+    machine: Machine,
+    times: Array,
+    command: Mapping[str, PPoly] | None = None,
+    forcing: Mapping[str, PPoly] | None = None,
+    start: Start | tuple[Array, Array] | None = None,
+    seed: int | None = None,
+    worker: tuple[Any, Any] | None = None,
+) -> JointTrajectory:
+    """Simulate a machine and sample it.
+
+    Parameters
+    ----------
+    times : (n,) stamps [s] of the measurements, increasing.
+    command : by joint what its command path is given: a force, or where a controller is in the path its reference.
+    forcing : by joint a force that is added behind the controller (feed-forward).
+    start : positions of joints at the first step, or whole vectors (nq,), (nv,); else the reference pose, at rest.
+    seed : of the noise; without one the output is deterministic.
+    worker : model and data to run on, from `MujocoBody.worker`; their parameters are the machine's.
+
+    Raises InputError where the run diverges, the times do not increase, or a joint is not known.
+    """
+    times = np.ascontiguousarray(times, dtype=float)
+    if len(times) < 1 or np.any(np.diff(times) < 0.0) or not np.isfinite(times).all():
+        raise InputError("simulation times must increase")
+    physical = {joint: physical_times(model, times) for joint, model in machine.paths.items()}
+    step = machine.body.step
+    begin = min(float(times[0]), *(float(one[0]) for one in physical.values()))
+    count = math.ceil((float(times[-1]) - begin) / step - 1e-6) + 2
+    grid, rows = run_steps(machine, begin, count, command, forcing, start, worker)
+    names, nq = machine.joints, machine.body.model.nq
+    width = len(COLUMNS)
+    made = {column: np.empty((len(times), len(names))) for column in COLUMNS}
+    for place, joint in enumerate(names):
+        x, v, y, f = (rows[:, width * place + i] for i in range(width))
+        at = physical[joint]
+        made["position"][:, place] = CubicHermiteSpline(grid, x, v)(at)
+        made["velocity"][:, place] = np.interp(at, grid, v)
+        made["effort"][:, place] = np.interp(at, grid, f)
+        sensed = any(t.element.slot == "sensor" and t.element.kernel for t in machine.paths[joint].terms)
+        output = np.interp(at, grid, y) if sensed else made["position"][:, place]
+        if seed is not None:
+            for sample in samplers(machine.paths[joint], seed + place):
+                output = sample(times, output)
+        made["output"][:, place] = output
+    rest = rows[:, width * len(names) :]
+    whole = np.column_stack([np.interp(times, grid, column) for column in rest.T])
+    return JointTrajectory(times, names, **made, pose=whole[:, :nq], rate=whole[:, nq:])
+
+
+def run_steps(
+    machine: Machine,
+    begin: float,
+    count: int,
+    command: Mapping[str, PPoly] | None = None,
+    forcing: Mapping[str, PPoly] | None = None,
+    start: Start | tuple[Array, Array] | None = None,
+    worker: tuple[Any, Any] | None = None,
+) -> tuple[Array, Array]:
+    """Times (count,) of the steps and rows of what `Stepping.run` fills. Arguments as for `simulate`."""
+    stepping = compile_machine(machine)
+    step = machine.body.step
+    names = machine.joints
+    for given in (command or {}, forcing or {}):
+        for joint in given:
+            if joint not in names:
+                raise InputError(f"the joint {joint!r} has no path, so nothing drives it")
+    commands = np.column_stack(
+        [means(delayed_command(machine.paths[j], (command or {}).get(j)), begin, step, count) for j in names]
+    )
+    forcings = np.column_stack([means((forcing or {}).get(j), begin, step, count) for j in names])
+    model, data = machine.body.worker() if worker is None else worker
+    pose, rate = _start(machine, start)
+    data.qpos[:], data.qvel[:], data.time = pose, rate, begin
+    data.qacc_warmstart[:] = 0.0
+    places = [machine.body.joints[name] for name in names]
+    rows = count * (len(COLUMNS) * len(names) + model.nq + model.nv + stepping.layout.pasts)
+    if rows > AT_ONCE * 10:
+        raise InputError(f"{count} steps are too many to simulate at once")
+    out = np.empty((count, len(COLUMNS) * len(names) + model.nq + model.nv))
+    done = stepping.run(
+        model._address, data._address, data.qpos, data.qvel, data.qfrc_applied, model.dof_damping,
+        np.array([one.position for one in places]), np.array([one.velocity for one in places]), begin, step,
+        commands, forcings, vector_of(machine, stepping.layout),
+        start_states(machine, stepping.layout, pose, rate, commands[0], forcings[0]),
+        np.empty((count, stepping.layout.pasts)), out,
+    )  # fmt: skip
+    if done < count:
+        raise InputError(f"the simulation diverges at t = {begin + done * step:.4g} s; check the parameters")
+    return begin + step * np.arange(count, dtype=np.float64), out
+
+
+def vector_of(machine: Machine, layout: Layout) -> Array:
+    """Parameter vector of a machine with this structure."""
+    known = {joint: model.parameters for joint, model in machine.paths.items()}
+    return np.array(
+        [
+            known[joint][name].value if name in known[joint] else default
+            for joint, name, default in layout.parameters
+        ],
+        dtype=float,
+    )
+
+
+def start_states(
+    machine: Machine, layout: Layout, pose: Array, rate: Array, command: NDArray, forcing: NDArray
+) -> Array:
+    """The elements' own states at the start, as they would be there after a while."""
+    found: dict[tuple[str, str], float] = {}
+    for place, (joint, model) in enumerate(machine.paths.items()):
+        own = machine.body.joints[joint]
+        x, v = float(pose[own.position]), float(rate[own.velocity])
+        asked = float(command[place])
+        for term in model.terms:
+            element = term.element
+            if not element.own or element.initial is None:
+                continue
+            borrowed = {n: model.borrowed(s, default) for n, (s, default) in element.borrows.items()}
+            values = {n: value.value for n, value in term.values.items()} | borrowed
+            signal = (
+                asked if element.slot == "command" else _effort(model, x, v, asked) + float(forcing[place])
+            )
+            for state, value in zip(element.own, element.initial(x, v, signal, **values)):
+                found[joint, f"{term.label}.{state}"] = value
+    return np.array([found.get(one, 0.0) for one in layout.states], dtype=float)
+
+
+def _effort(model: Model, position: float, velocity: float, command: float) -> float:
+    """What a controller in the path asks for at this command; the command where there is none."""
+    for term in model.terms:
+        if term.element.acts == "feedback" and not term.element.own and term.element.kernel is not None:
+            values = {name: value.value for name, value in term.values.items()}
+            return float(term.element.kernel(command, position, velocity, 0.0, **values))
+    return command
+
+
+def _start(machine: Machine, start: Start | tuple[Array, Array] | None) -> tuple[Array, Array]:
+    if isinstance(start, tuple):
+        return start
+    return pose_of(machine, start or {}), np.zeros(machine.body.model.nv)

@@ -1,0 +1,67 @@
+"""What a diagnosis of a machine of several joints says: the contract of one axis, with the joint of every missing effect."""
+
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from rhythmid.diagnose.answer.result import Diagnosis, Estimate, FitQuality, Scored
+from rhythmid.diagnose.hypothesis import Verdict
+
+
+@dataclass(frozen=True)
+class JointEffect:
+    """An effect that the nominal model lacks at a joint; of a link's mass, `link` says which, and the joint is the one that moves it.
+
+    `share` is that of the joint's mismatch. `heldout_gain` is by how much the error at the joint falls on data that no fit has seen,
+    as a share of the effort.
+    """
+
+    joint: str
+    element: str
+    slot: str
+    equation: str
+    share: float
+    probability: float
+    parameters: dict[str, Estimate]
+    heldout_gain: float
+    link: str | None = None
+
+
+@dataclass(frozen=True)
+class JointLocation:
+    """Which joint, and which slot of its path, is deficient, in one sentence."""
+
+    joint: str | None
+    slot: str | None
+    where: str
+
+
+@dataclass(frozen=True)
+class MachineDiagnosis:
+    """The answer to: which physics does the model of this machine lack, and at which joint?
+
+    `joints` holds the whole answer at each joint, `unknown` the joints whose mismatch no name of the catalogue explains, `undecided`
+    those at which the evidence does not separate several names, `not_judged` why a joint could not be judged.
+    """
+
+    verdict: Verdict
+    summary: str
+    location: JointLocation
+    missing: tuple[JointEffect, ...]
+    unknown: tuple[str, ...]
+    undecided: tuple[str, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
+    fit: dict[str, dict[str, FitQuality]]
+    parameters: dict[str, Estimate]
+    next_experiment: str
+    scoring: Scored
+    joints: dict[str, Diagnosis]
+    not_judged: dict[str, str] = field(default_factory=dict)
+    assumptions: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The diagnosis as plain JSON data; a number that is not finite is null."""
+        return json.loads(TypeAdapter(MachineDiagnosis).dump_json(self))

@@ -1,0 +1,91 @@
+"""What a diagnosis of several joints is asked, and each joint of it as a case of one axis."""
+
+import math
+from dataclasses import dataclass, replace
+
+from threadpoolctl import threadpool_limits
+
+from rhythmid.diagnose.case import Budget, Case
+from rhythmid.diagnose.effort.run import EffortResult, effort_run
+from rhythmid.diagnose.effort.search import MOST_EFFECTS
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.errors import InputError
+from rhythmid.identify.inverse_dynamics.applicability import Applicability
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.joints.joint_motion import JointBalances
+from rhythmid.model import INERTIA, Model
+from rhythmid.progress import Tell
+from rhythmid.simulation.transport import INPUT_DELAY
+
+# gain of log likelihood that a score test has to promise for an addition to be fitted: 1 in 70 reaches it by chance (chi-square), and
+# what is named has to gain more than twice as much
+PROMISING = 3.0
+STIFFNESS = 0.1  # of the effort for the motion's size, that a spring is tried at
+GAINS = (0.9, 1.1)  # at which it is tried whether an actuator gives less or more than is asked of it
+
+
+@dataclass(frozen=True, eq=False)
+class JointResult:
+    """What was found at one joint; `late` [s] by how much later a reference acts where the effort was made from it."""
+
+    joint: str
+    case: Case
+    late: float
+    result: EffortResult
+
+
+def joint_catalogue(catalogue: Catalogue) -> Catalogue:
+    """The catalogue for a joint, whose inertia and weight are known from the body: there an actuator's gain is no mere calibration,
+    and a spring may be at rest anywhere."""
+    found = dict(catalogue.elements)
+    if (gain := found.get("actuator_gain")) is not None:
+        found[gain.name] = replace(gain, candidate=True, starts=lambda _: [{"gain": one} for one in GAINS])
+    if (spring := found.get("linear_spring")) is not None:
+        found[spring.name] = replace(
+            spring,
+            starts=lambda s: [
+                {"stiffness": STIFFNESS * s.effort / s.position, "rest_length": rest}
+                for rest in (s.low, s.centre, s.high)
+            ],
+        )
+    if (constant := found.get("constant_force")) is not None:  # a spring that is at rest far from the motion
+        found[constant.name] = replace(constant, special_case_of=(*constant.special_case_of, "linear_spring"))
+    return Catalogue(found)
+
+
+@threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
+def diagnose_joint(
+    balances: JointBalances, unseen: JointBalances | None, joint: str, catalogue: Catalogue, tell: Tell,
+    budget: Budget, late: float = 0.0, most: int = MOST_EFFECTS,
+) -> JointResult:  # fmt: skip
+    """Search for what one joint's path lacks; a reference acts there `late` [s] after its stamp. Raises InputError where the records hold too little of its motion."""
+    model = balances.models[joint]
+    balance = balances.balance(joint, late)
+    other: Balance | None = None
+    if unseen is not None:
+        try:
+            other = unseen.balance(joint, late)
+        except InputError:
+            other = None  # too little motion: it judges nothing
+    case = Case(model, (), (), joint_catalogue(catalogue), None, tell, budget)
+    found = effort_run(case, _applicable(balance, model), most, other, PROMISING, len(balances.models))
+    return JointResult(joint, case, late, found)
+
+
+def _applicable(balance: Balance, model: Model) -> Applicability:
+    chosen = balance.bandwidth
+    reason = f"the effort of each joint is predicted, below {chosen.effort:.3g} Hz at this one"
+    return Applicability(
+        True, reason, chosen.effort, math.nan, chosen.explained, math.nan, True, False, balance
+    )
+
+
+def name_of(joint: str, label: str) -> tuple[str, str]:
+    """What was found wrong at a joint, and where, of a label that is no element's: a link's mass, the rotor's inertia, a delay."""
+    if label == INERTIA:
+        return "armature", joint
+    if label.endswith(".mass"):
+        return "link_mass", label.removeprefix("body.").removesuffix(".mass")
+    if label == INPUT_DELAY:
+        return "actuator_delay", joint
+    return label, joint

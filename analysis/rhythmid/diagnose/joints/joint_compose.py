@@ -1,0 +1,186 @@
+"""The answers of all joints put together."""
+
+from collections.abc import Mapping, Sequence
+
+from rhythmid.body.body import BODY
+from rhythmid.body.machine import Machine
+from rhythmid.diagnose.answer.result import Diagnosis, Estimate
+from rhythmid.diagnose.answer.wording import SENTENCES
+from rhythmid.diagnose.hypothesis import Verdict
+from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
+from rhythmid.diagnose.joints.joint_case import JointResult, name_of
+from rhythmid.identify.inverse_dynamics.estimate import size_of
+from rhythmid.model import INERTIA
+from rhythmid.simulation.transport import INPUT_DELAY
+
+EQUATIONS = {  # of what is no element: its slot and what it says
+    "armature": ("body", "M_jj → M_jj + ΔI"),
+    "link_mass": ("body", "m → m′, shape kept"),
+    "actuator_delay": ("actuator", "f(t) → f(t − τ)"),
+}
+IN_CONTACT = (
+    "What was recorded in contact with the ground, or near it, is left out: the contact's force is not known."
+)
+COMPUTED = "The effort of {} was not recorded; it is what the controller's gains make of the reference."
+
+
+def compose_machine(
+    machine: Machine,
+    found: Mapping[str, JointResult],
+    answers: Mapping[str, Diagnosis],
+    stated: Mapping[str, Sequence[str]],
+    links: Mapping[str, Estimate],
+    refused: Mapping[str, str],
+) -> MachineDiagnosis:
+    """The diagnosis; `links` are the masses that were put right, `stated` the labels by which the answer at each joint stands."""
+    missing = [
+        _effect(found[joint], answers[joint], label)
+        for joint, labels in stated.items()
+        for label in labels
+        if label.removeprefix(f"{BODY}.") not in links
+    ]
+    missing += [_link(machine, link, estimate, found) for link, estimate in links.items()]
+    missing.sort(key=lambda one: -one.heldout_gain)
+    named = {one.joint for one in missing}
+    unknown = tuple(j for j, one in answers.items() if one.verdict == "unknown_physics")
+    undecided = tuple(j for j, one in answers.items() if one.verdict == "undecided" and not stated[j])
+    verdict: Verdict = "consistent"
+    if missing:
+        verdict = "missing_physics"
+    elif unknown:
+        verdict = "unknown_physics"
+    elif undecided:
+        verdict = "undecided"
+    return MachineDiagnosis(
+        verdict=verdict,
+        summary=_summary(missing, unknown, undecided, answers),
+        location=_location(missing, unknown),
+        missing=tuple(missing),
+        unknown=unknown,
+        undecided=undecided,
+        indistinguishable=tuple(
+            tuple(f"{joint}: {name_of(joint, name)[0]}" for name in group)
+            for joint, one in answers.items()
+            if joint in named or joint in undecided
+            for group in one.indistinguishable
+        ),
+        fit={joint: {str(k): v for k, v in one.fit.items()} for joint, one in answers.items()},
+        parameters={
+            f"{joint}.{name}": value
+            for joint, one in answers.items()
+            for name, value in one.parameters.items()
+            if not name.startswith(f"{BODY}.") and name != INERTIA
+        },
+        next_experiment=_next(answers, named, unknown, undecided),
+        scoring=next(iter(answers.values())).scoring,
+        joints=dict(answers),
+        not_judged=dict(refused),
+        assumptions=_assumptions(machine, found, answers),
+    )
+
+
+def _effect(one: JointResult, answer: Diagnosis, label: str) -> JointEffect:
+    decision, fitted = one.result.decision, one.result.chosen
+    gain = _gain(one)
+    known = fitted.fit.model.term(label)
+    if known is not None:
+        parameters = {name: answer.parameters[f"{label}.{name}"] for name in known.values}
+        element, slot, equation = known.element.name, known.element.slot, known.element.equation
+    else:
+        element, _ = name_of(one.joint, label)
+        slot, equation = EQUATIONS[element]
+        parameters = {_own(element): _value(one, answer, label)}
+    return JointEffect(
+        one.joint,
+        element,
+        slot,
+        equation,
+        decision.shares[label],
+        decision.probability[label],
+        parameters,
+        gain,
+    )
+
+
+def _own(element: str) -> str:
+    """Name of the one parameter of what is no element."""
+    return {"armature": "inertia_error", "link_mass": "mass", "actuator_delay": "delay"}[element]
+
+
+def _value(one: JointResult, answer: Diagnosis, label: str) -> Estimate:
+    if label == INPUT_DELAY:
+        late = answer.delays["sum"]
+        return Estimate(late["value"], late["std"], "s")
+    said = answer.parameters[label]
+    if label != INERTIA:
+        return said
+    return Estimate(said.value - one.case.nominal.mass.value, said.std, said.unit)
+
+
+def _gain(one: JointResult) -> float:
+    """Fall of the error on data that no fit has seen, as a share of the joint's effort."""
+    size = size_of(one.result.search.balance)
+    before, after = (
+        one.result.errors[tuple(sorted(f.elements))] for f in (one.result.nominal, one.result.chosen)
+    )
+    return (before - after) / size
+
+
+def _link(machine: Machine, link: str, estimate: Estimate, found: Mapping[str, JointResult]) -> JointEffect:
+    name = link.removesuffix(".mass")
+    joint = machine.body.joint_of(name)
+    slot, equation = EQUATIONS["link_mass"]
+    first = found.get(joint) or next(iter(found.values()))
+    return JointEffect(
+        first.joint, "link_mass", slot, equation, 1.0, 1.0, {"mass": estimate}, _gain(first), name
+    )
+
+
+def _summary(
+    missing: Sequence[JointEffect],
+    unknown: Sequence[str],
+    undecided: Sequence[str],
+    answers: Mapping[str, Diagnosis],
+) -> str:
+    said = []
+    for one in missing:
+        what = f"the mass of {one.link}" if one.link else one.element.replace("_", " ")
+        said.append(f"{one.joint}: {what}")
+    words = f"The model is wrong at {'; '.join(said)}." if said else ""
+    if unknown:
+        words += f" At {', '.join(unknown)} something is missing that the catalogue does not know."
+    if undecided:
+        words += f" At {', '.join(undecided)} the evidence decides nothing: {answers[undecided[0]].summary}"
+    return words.strip() or "Nothing of practical size is missing at any joint."
+
+
+def _location(missing: Sequence[JointEffect], unknown: Sequence[str]) -> JointLocation:
+    if missing:
+        first = missing[0]
+        where = SENTENCES.get(first.slot, "in the inertia of the body")
+        return JointLocation(first.joint, first.slot, f"at joint {first.joint}, {where}")
+    if unknown:
+        return JointLocation(unknown[0], "force", f"at joint {unknown[0]}, {SENTENCES['force']}")
+    return JointLocation(None, None, "nowhere: the refitted model explains the effort of every joint")
+
+
+def _next(
+    answers: Mapping[str, Diagnosis], named: set[str], unknown: Sequence[str], undecided: Sequence[str]
+) -> str:
+    """What to record next, for the joint that needs it most."""
+    for joint in (*undecided, *unknown, *(j for j in answers if j in named)):
+        if not answers[joint].next_experiment.startswith("none"):
+            return f"joint {joint}: {answers[joint].next_experiment}"
+    return next(iter(answers.values())).next_experiment
+
+
+def _assumptions(
+    machine: Machine, found: Mapping[str, JointResult], answers: Mapping[str, Diagnosis]
+) -> tuple[str, ...]:
+    said = list(next(iter(answers.values())).assumptions)
+    if machine.body.contacts:
+        said.append(IN_CONTACT)
+    late = [joint for joint, one in found.items() if one.late > 0.0]
+    if late:
+        said.append(COMPUTED.format(", ".join(late)))
+    return tuple(said)

@@ -1,0 +1,183 @@
+"""Diagnose a machine of several joints: at joint J, in slot S, element E.
+
+Every joint is searched as the one of a machine of one axis, beside what the rest of the body asks of it, and chance has the candidates of
+all joints. A link whose mass is wrong shows at every joint that carries it: where one is found, it is put right, and the joints that feel
+it are searched again.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from rhythmid.body.body import BODY
+from rhythmid.body.machine import Machine
+from rhythmid.diagnose.answer.compose_effort import compose_effort
+from rhythmid.diagnose.answer.result import Diagnosis, Estimate
+from rhythmid.diagnose.case import Budget
+from rhythmid.diagnose.constants import STATED
+from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
+from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
+from rhythmid.diagnose.joints.joint_compose import compose_machine
+from rhythmid.elements.catalogue import Catalogue, load_catalogue
+from rhythmid.errors import InputError
+from rhythmid.identify.joints.joint_motion import JointBalances
+from rhythmid.identify.joints.reference_delay import reference_delay
+from rhythmid.model import INERTIA, Model
+from rhythmid.progress import Tell
+from rhythmid.record.joint_record import JointRecord
+from rhythmid.simulation.transport import INPUT_DELAY
+
+MOST_LINKS = 2  # links whose masses are put right, at most
+LIGHTEST = 0.1  # of the mass that the file gives a link, below which another effect has swallowed it
+MATTERS = 0.02  # of a mass or an inertia, below which it is as right as a balance tells
+
+
+@dataclass(frozen=True)
+class MachineAnswer:
+    """A diagnosis, the augmented machine, and what was found at each joint."""
+
+    diagnosis: MachineDiagnosis
+    machine: Machine
+    results: Mapping[str, JointResult]
+
+
+def diagnose_machine(
+    records: Sequence[JointRecord],
+    machine: Machine,
+    holdout: Sequence[JointRecord] = (),
+    catalogue: Catalogue | None = None,
+    tell: Tell = lambda _: None,
+    budget: float | None = None,
+) -> MachineAnswer:
+    """Find the physics that the model of a machine lacks to explain records; arguments as for `diagnose`.
+
+    Raises InputError for records that cannot be judged: a joint or a floating base that was not recorded, too little of motion.
+    """
+    if not records:
+        raise InputError("no record is given; name at least one bag or table")
+    known, spent = catalogue or load_catalogue(), Budget(budget)
+    nominal, links = machine, {}
+    balances = JointBalances.of(machine, records)
+    unseen = JointBalances.of(machine, holdout, balances) if holdout else None
+    found, refused = _searched(balances, unseen, machine.joints, known, tell, spent)
+    for _ in range(MOST_LINKS):
+        best = _heaviest(found, set(links))
+        if best is None or spent.spent:
+            break
+        link, result = best
+        links[link] = _estimate(result, f"{BODY}.{link}")
+        machine = machine.with_inertial({link: links[link].value})
+        balances = JointBalances.of(machine, records, balances)
+        unseen = JointBalances.of(machine, holdout, balances) if holdout else None
+        again = [joint for joint in machine.joints if link in balances.links(joint)]
+        better, refused = _searched(balances, unseen, again, known, tell, spent)
+        found = {**found, **better}
+    if not found:
+        raise InputError(f"no joint can be judged: {next(iter(refused.values()))}")
+    answers = {joint: _answer(one) for joint, one in found.items()}
+    stated = {joint: stated_at(one) for joint, one in found.items()}
+    diagnosis = compose_machine(nominal, found, answers, stated, links, refused)
+    return MachineAnswer(diagnosis, _augmented(machine, found, stated), found)
+
+
+def _searched(
+    balances: JointBalances, unseen: JointBalances | None, joints: Sequence[str], catalogue: Catalogue,
+    tell: Tell, budget: Budget,
+) -> tuple[dict[str, JointResult], dict[str, str]]:  # fmt: skip
+    found: dict[str, JointResult] = {}
+    refused: dict[str, str] = {}
+    late = reference_delay(balances, balances.computed) if balances.computed else 0.0
+    for joint in joints:
+        tell(f"joint {joint}")
+        try:
+            found[joint] = diagnose_joint(balances, unseen, joint, catalogue, tell, budget, late)
+        except InputError as error:
+            refused[joint] = str(error)
+    return found, refused
+
+
+def stated_at(one: JointResult) -> tuple[str, ...]:
+    """Labels by which the answer at a joint stands: elements, or a value of the body that is wrong, or a delay."""
+    decision, chosen = one.result.decision, one.result.selection.chosen
+    own = [label for label in chosen.elements if one.result.chosen.fit.model.term(label) is None]
+    if not all(_differs(one, label) for label in own):
+        return ()
+    if decision.verdict == "missing_physics":
+        return decision.named
+    alike = _held_by_alike(one) >= STATED
+    if alike and chosen.kind == "effects" and decision.verdict == "undecided":
+        return chosen.elements
+    if chosen.kind not in ("freed_value", "delay") or not (alike or decision.joint >= STATED):
+        return ()
+    known = all(label == INERTIA or name_of(one.joint, label)[0] != label for label in own)
+    return decision.named if known else ()  # another value of the path is its author's to check
+
+
+def _held_by_alike(one: JointResult) -> float:
+    """Share of the evidence for one effect alone that is the chosen one or predicts as well as it does: where it is large the joint is
+    certain although the name is not, and the answer lists the others as indistinguishable."""
+    decision, chosen = one.result.decision, one.result.selection.chosen
+    if len(chosen.elements) != 1:
+        return 0.0
+    names = {chosen.names[0], *(name for group in decision.equivalent for name in group)}
+    rivals = [h for h in one.result.contest.hypotheses if len(h.elements) == 1 and h.names[0] in names]
+    return sum(decision.weights.get(rival.key, 0.0) for rival in rivals)
+
+
+def _differs(one: JointResult, label: str) -> bool:
+    """Whether a value of the body has come out other than it was."""
+    if label == INPUT_DELAY or label not in one.case.nominal.parameters:
+        return True
+    before = one.case.nominal.value(label)
+    if one.result.chosen.model.value(label) < LIGHTEST * before:
+        return False  # what takes a link's mass away is something else
+    return abs(one.result.chosen.model.value(label) - before) > MATTERS * abs(before)
+
+
+def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, JointResult] | None:
+    """The link whose mass is wrong by the strongest evidence, and the joint that says so."""
+    best: tuple[float, str, JointResult] | None = None
+    for one in found.values():
+        for label in stated_at(one):
+            link = label.removeprefix(f"{BODY}.")
+            if not label.startswith(f"{BODY}.") or link in known:
+                continue
+            contest = one.result.contest
+            gain = one.result.selection.chosen.prediction.score - contest.nominal.prediction.score
+            if best is None or gain > best[0]:
+                best = gain, link, one
+    return None if best is None else best[1:]
+
+
+def _estimate(one: JointResult, name: str) -> Estimate:
+    fitted = one.result.chosen
+    value = fitted.model.parameters[name]
+    return Estimate(value.value, fitted.std().get(name, 0.0), value.unit)
+
+
+def _answer(one: JointResult) -> Diagnosis:
+    return compose_effort(one.case, one.result, ())
+
+
+def _augmented(
+    machine: Machine, found: Mapping[str, JointResult], stated: Mapping[str, Sequence[str]]
+) -> Machine:
+    """The machine with what was fitted, and with what the answer stands by."""
+    inertial: dict[str, float] = {}
+    for joint, one in found.items():
+        fitted = one.result.chosen if stated[joint] else one.result.nominal
+        path = machine.paths[joint]
+        rotor = fitted.model.mass.value - path.mass.value
+        if INERTIA in fitted.fit.names:
+            before = machine.body.parameters[f"{joint}.armature"]
+            inertial[f"{joint}.armature"] = max(before + rotor, 0.0)
+        machine = machine.with_path(joint, _without_body(fitted.model, path))
+    return machine.with_inertial(inertial) if inertial else machine
+
+
+def _without_body(model: Model, path: Model) -> Model:
+    """A joint's fitted path with the inertia that it borrows, without the term for the body."""
+    kept = tuple(term for term in model.terms if term.label != BODY)
+    behind = tuple(
+        t for t in path.terms if t.label not in {term.label for term in kept}
+    )  # behind the measured effort
+    return replace(model, mass=path.mass, terms=(*kept, *behind))

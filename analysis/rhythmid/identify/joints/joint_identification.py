@@ -1,0 +1,227 @@
+"""Identify a machine of several joints: each joint's path, the links' inertias, and what the records cannot tell apart.
+
+Where a joint's effort was recorded, or follows from its controller's known gains and the reference, its path is fitted by inverse dynamics
+beside what the body asks of the joint; the links' inertial parameters follow from the efforts of all joints. Where a reference is known
+the machine also runs free over the stretches of the records, and the paths' parameters are refined until it moves as was measured, the
+inverse dynamics being what is known before.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from rhythmid.body.body import BODY
+from rhythmid.body.machine import Machine
+from rhythmid.errors import InputError
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.estimate import EffortFit, fit_effort, size_of
+from rhythmid.identify.joints.base_parameters import InertialEstimate, estimate_inertia
+from rhythmid.identify.joints.joint_motion import JointBalances
+from rhythmid.identify.joints.output_error import Knowledge, free_runs, refine
+from rhythmid.identify.joints.reference_delay import reference_delay
+from rhythmid.model import INERTIA, Model
+from rhythmid.progress import Tell
+from rhythmid.record.joint_record import JointRecord
+
+CLOSE = 0.9  # correlation of two estimates, from which the records tell only a combination of them
+LOOSE = 5.0  # times its standard deviation by inverse dynamics that a parameter may move in free runs: errors of the filter are in it
+RELATIVE = 0.3  # of its value, the same at least
+EXPECTED = (
+    0.02  # of the motion, that a right model's free run errs by (measured: machines in the air 1 to 3 %)
+)
+DELAY_STD = 1.0  # samples: of a reference's delay that inverse dynamics found
+
+
+@dataclass(frozen=True)
+class JointEstimate:
+    """A value with its standard deviation and unit."""
+
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class MachineIdentification:
+    """What was found.
+
+    `parameters` by "joint.element.parameter" and "body.joint.armature"; `effort_nrmse` of each joint's predicted effort, `free_run`
+    of its motion as given and as identified, on records or ends of records that no fit has seen where `unseen`; `not_separable` in
+    words.
+    """
+
+    machine: Machine
+    parameters: dict[str, JointEstimate]
+    correlations: dict[str, float]
+    not_separable: tuple[str, ...]
+    inertia: InertialEstimate | None
+    effort_nrmse: dict[str, float]
+    free_run: dict[str, dict[str, float]]
+    unseen: bool
+    notes: tuple[str, ...] = field(default=())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The identification as plain data."""
+        from dataclasses import asdict
+
+        return {
+            "parameters": {name: asdict(one) for name, one in self.parameters.items()},
+            "correlations": self.correlations,
+            "not_separable": list(self.not_separable),
+            "inertia": None if self.inertia is None else asdict(self.inertia),
+            "quality": {"effort_nrmse": self.effort_nrmse, "free_run": self.free_run, "unseen": self.unseen},
+            "notes": list(self.notes),
+        }
+
+
+@threadpool_limits.wrap(limits=1)
+def identify_machine(
+    records: Sequence[JointRecord],
+    machine: Machine,
+    holdout: Sequence[JointRecord] = (),
+    tell: Tell = lambda _: None,
+    free: bool = True,
+) -> MachineIdentification:
+    """Identify the free parameters of a machine, the armature of every joint, and its links' inertias.
+
+    With `free`, and where references are known, free runs refine the paths. Without `holdout` the last fifth of each record is held
+    out of them. Raises InputError for records that hold too little, or lack a joint.
+    """
+    if not records:
+        raise InputError("no record is given; name at least one bag or table")
+    seen, unseen = (records, holdout) if holdout else _split(records)
+    balances = JointBalances.of(machine, seen)
+    fits: dict[str, tuple[Balance, EffortFit]] = {}
+    found: dict[str, JointEstimate] = {}
+    correlations: dict[str, float] = {}
+    errors: dict[str, float] = {}
+    identified = machine
+    rotors = {
+        joint: rotor_freed(model, machine.body.parameters[f"{joint}.armature"])
+        for joint, model in balances.models.items()
+    }
+    balances = replace(balances, models=rotors)
+    common = reference_delay(balances, balances.computed) if balances.computed else None
+    for joint in machine.joints:
+        tell(f"joint {joint}")
+        late = common if joint in balances.computed else None
+        balance = balances.balance(joint, late or 0.0)
+        fit = fit_effort(balance, balances.models[joint])
+        fits[joint] = balance, fit
+        errors[joint] = fit.error / size_of(balance)
+        identified = _with_fit(identified, machine, joint, fit, late, balances.period, found)
+        correlations |= _correlations(joint, fit)
+    inertia = None
+    if not balances.computed:
+        tell("inertias of the links")
+        inertia = estimate_inertia(balances, fits)
+    tell("free runs")
+    runs, notes = {}, []
+    others = JointBalances.of(machine, unseen, balances)
+    try:
+        runs["given"] = free_runs(machine, others, unseen).nrmse
+        if free and balances.computed:
+            known = _known(identified, found)
+            identified, spread = refine(identified, balances, seen, known, EXPECTED)
+            for name, std in spread.items():
+                found[name] = replace(found[name], value=identified.value(name), std=std)
+        runs["identified"] = free_runs(identified, others, unseen).nrmse
+    except InputError as error:
+        notes.append(f"no free run: {error}")
+    return MachineIdentification(
+        identified, found, correlations, _not_separable(machine, correlations, balances.computed), inertia, errors,
+        runs, True, tuple(notes),
+    )  # fmt: skip
+
+
+def _split(records: Sequence[JointRecord]) -> tuple[list[JointRecord], list[JointRecord]]:
+    """The first four fifths of every record, and its end."""
+    cuts = [(record, record.span[0] + 0.8 * (record.span[1] - record.span[0])) for record in records]
+    return (
+        [record.cut(record.span[0], at) for record, at in cuts],
+        [record.cut(at, record.span[1]) for record, at in cuts],
+    )
+
+
+def rotor_freed(model: Model, armature: float) -> Model:
+    """The path with the rotor's inertia free, but not negative: what the body says of it is a guess."""
+    least = max(model.mass.value - armature, 0.0)
+    return replace(model, mass=replace(model.mass, fixed=False, bounds=(least, math.inf)))
+
+
+def _with_fit(
+    machine: Machine, given: Machine, joint: str, fit: EffortFit, late: float | None, period: float,
+    found: dict[str, JointEstimate],
+) -> Machine:  # fmt: skip
+    """The machine with one joint's fit in it, which is added to what was found."""
+    parameters = fit.model.parameters
+    for place, name in enumerate(fit.names, start=1):
+        std, value = float(fit.std[place]), parameters[name]
+        if name == INERTIA:
+            armature = f"{joint}.armature"
+            rotor = given.body.parameters[armature] + value.value - given.paths[joint].mass.value
+            machine = machine.with_inertial({armature: max(rotor, 0.0)})
+            found[f"{BODY}.{armature}"] = JointEstimate(max(rotor, 0.0), std, value.unit)
+        elif name.startswith(f"{BODY}."):
+            machine = machine.with_inertial({name.removeprefix(f"{BODY}."): value.value})
+            found[name] = JointEstimate(value.value, std, value.unit)
+        else:
+            machine = machine.with_values({f"{joint}.{name}": value.value})
+            found[f"{joint}.{name}"] = JointEstimate(value.value, std, value.unit)
+    delay = f"{joint}.input_delay.delay"
+    if late is not None and delay in machine.parameters and not machine.parameters[delay].fixed:
+        machine = machine.with_values({delay: late})
+        found[delay] = JointEstimate(late, DELAY_STD * period, "s")
+    return machine
+
+
+def _correlations(joint: str, fit: EffortFit) -> dict[str, float]:
+    """Correlations of a joint's estimates that are close, by "first ~ second"."""
+    weight = fit.jacobian / fit.scale
+    normal = weight.T @ weight + np.diag(fit.precision)
+    scaling = 1.0 / np.sqrt(np.diag(normal))
+    covariance = np.linalg.pinv(normal * np.outer(scaling, scaling))
+    spread = np.sqrt(np.diag(covariance))
+    both = covariance / np.outer(spread, spread)
+    names = ["alignment", *fit.names]
+    return {
+        f"{joint}.{names[i]} ~ {joint}.{names[j]}": float(both[i, j])
+        for i in range(len(names))
+        for j in range(i)
+        if abs(both[i, j]) > CLOSE
+    }
+
+
+def _known(machine: Machine, found: dict[str, JointEstimate]) -> dict[str, Knowledge]:
+    """What inverse dynamics says of the parameters that free runs refine: all but the rotors' inertias, which it tells better."""
+    known = {}
+    for name, one in found.items():
+        if name.startswith(f"{BODY}."):
+            continue
+        low, high = machine.parameters[name].bounds
+        spread = max(LOOSE * one.std, RELATIVE * abs(one.value), 1e-6)
+        known[name] = Knowledge(one.value, spread, low, high)
+    return known
+
+
+def _not_separable(
+    machine: Machine, correlations: dict[str, float], computed: Sequence[str]
+) -> tuple[str, ...]:
+    """In words, what the records do not tell apart."""
+    said = []
+    for pair, value in correlations.items():
+        first, second = (one.replace("_", " ") for one in pair.split(" ~ "))
+        said.append(f"{first} and {second}: only a combination of the two is told (correlation {value:.2f})")
+    if computed:
+        said.append(
+            "armature and delay of the reference: without a recorded torque a later command looks like a heavier rotor"
+        )
+        said.append(
+            "a constant torque and the controller's proportional gain: both move the rest position, so the gain is taken as given"
+        )
+        said.append("damping and the controller's derivative gain: the gain is taken as given")
+    return tuple(said)

@@ -1,0 +1,252 @@
+"""The motion of several joints as inverse dynamics needs it: for each joint its own, and what the rest of the body asks of it.
+
+Along joint j the body asks for m_j a_j + c_j, with m_j the inertia that the joint's path has and the coupling c_j the rest of the
+inverse dynamics of the whole body (M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362 for its linearity in the inertial
+parameters). So each joint is balanced as the one of a machine of one axis, with the same elements.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from rhythmid.body.body import BODY
+from rhythmid.body.machine import Machine
+from rhythmid.elements.element import Element, Parameter
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.bandwidth import (
+    Bandwidth,
+    bandwidth_below,
+    bandwidth_of_motion,
+)
+from rhythmid.identify.inverse_dynamics.motion import FINER, Motion, Stretch, low_pass
+from rhythmid.identify.joints.joint_stretch import JointStretch, joint_stretches
+from rhythmid.model import Model, Term, Value
+from rhythmid.record.joint_record import JointRecord, Taken
+
+Array = NDArray[np.float64]
+# periods of the cut-off at both ends of a stretch, in which a filter that begins there errs by several times the noise (measured on
+# flights between contacts)
+CLEAR = 1.5
+SHORT = 400  # samples of a stretch, up to which its filter is a matrix
+SAME_CLOCK = 1e-3  # of a sample: by how much motion and an effort that was made from it may be out
+FAINT = 1e-3  # of a joint's effort, below which what a link does to it is not looked at
+
+
+class JointBalance(Balance):
+    """A balance of many short stretches: the filter of each length is a matrix that is made once."""
+
+    def filtered(self, signal: Array, period: float) -> Array:
+        if len(signal) > SHORT:
+            return super().filtered(signal, period)
+        return _filter(len(signal), period, self.bandwidth.effort) @ signal
+
+
+@lru_cache(maxsize=512)
+def _filter(length: int, period: float, frequency: float) -> Array:
+    """The zero-phase low-pass as a matrix (length, length)."""
+    return np.ascontiguousarray(low_pass(np.eye(length), period, frequency))
+
+
+def nothing(t):
+    """The force of the term that stands for the body's parameters: none, it is in the coupling."""
+    return 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMotion:
+    """Motions of one stretch: pose, rate and acceleration (n, nv) of the whole body below `cut` [Hz], and the forces (n, nv) that
+    it asks for."""
+
+    stretch: JointStretch
+    time: Array
+    pose: Array
+    rate: Array
+    acceleration: Array
+    force: Array
+    period: float
+    every: int
+
+
+@dataclass(frozen=True, eq=False)
+class JointBalances:
+    """The balances of effort of all joints: of each its path as a model of one axis, and its motions.
+
+    `computed` are the joints whose effort is what their controller's known gains make of the reference.
+    """
+
+    machine: Machine
+    models: dict[str, Model]
+    motions: dict[str, list[Motion]]
+    bandwidths: dict[str, Bandwidth]
+    bodies: list[BodyMotion]
+    period: float
+    computed: tuple[str, ...]
+
+    @classmethod
+    def of(
+        cls,
+        machine: Machine,
+        records: Sequence[JointRecord],
+        alike: "JointBalances | None" = None,
+    ) -> "JointBalances":
+        """The balances of these records, filtered as those `alike`. Raises InputError where the records hold too little."""
+        stretches = joint_stretches(machine, records)
+        cut, dominant = (alike.cut, alike.dominant) if alike else _cut(machine, stretches)
+        bodies = [_body_motion(machine, one, cut) for one in stretches]
+        names = [f"{name}.mass" for name in machine.body.links]
+        columns = [machine.body.columns(names, one.pose, one.rate, one.acceleration) for one in bodies]
+        models: dict[str, Model] = {}
+        motions: dict[str, list[Motion]] = {}
+        for joint in machine.joints:
+            seen = alike.links(joint) if alike else _links(machine, joint, names, columns, bodies)
+            models[joint] = joint_model(machine, joint, records[0].taken, seen)
+            made = []
+            for body, column in zip(bodies, columns, strict=True):
+                own = {link: column[:, :, names.index(link)] for link in seen}
+                motion = _motion(machine, models[joint], joint, body, own)
+                if joint in body.stretch.reference:
+                    asked = controller_effort(models[joint], joint, motion, body, 0.0)
+                    motion = replace(motion, effort=asked)
+                made.append(motion)
+            motions[joint] = made
+        period = max(one.period for one in stretches)
+        bandwidths = (
+            alike.bandwidths
+            if alike
+            else {joint: _bandwidth(motions[joint], cut, dominant) for joint in machine.joints}
+        )
+        computed = tuple(joint for joint in machine.joints if joint in stretches[0].reference)
+        return cls(machine, models, motions, bandwidths, bodies, period, computed)
+
+    def links(self, joint: str) -> tuple[str, ...]:
+        """The links whose masses a joint feels, as "link.mass"."""
+        return tuple(name.removeprefix(f"{BODY}.") for name in self.motions[joint][0].links)
+
+    @property
+    def cut(self) -> float:
+        """Highest frequency [Hz] of the motion."""
+        return next(iter(self.bandwidths.values())).motion
+
+    @property
+    def dominant(self) -> float:
+        """Strongest frequency [Hz] of the motion."""
+        return next(iter(self.bandwidths.values())).dominant
+
+    def balance(self, joint: str, late: float = 0.0) -> Balance:
+        """The balance of one joint; a reference acts there `late` [s] after its stamp. Raises InputError where too few samples are
+        left."""
+        motions, period = self.motions[joint], self.period
+        if joint in self.computed:
+            period *= SAME_CLOCK
+            model = self.models[joint]
+            motions = [
+                replace(motion, effort=controller_effort(model, joint, motion, body, late))
+                for motion, body in zip(motions, self.bodies, strict=True)
+            ]
+        return JointBalance.of_motions(motions, self.bandwidths[joint], period, CLEAR)
+
+
+def controller_effort(model: Model, joint: str, motion: Motion, body: BodyMotion, late: float) -> Array:
+    """Force (n,) that a controller with known gains has asked for."""
+    stretch = body.stretch
+    held = 0.5 * stretch.period  # what is held from sample to sample is on average so much older
+    asked = np.interp(stretch.time - late - held, stretch.time, stretch.reference[joint])
+    asked = low_pass(asked, stretch.period, 1.0 / (FINER * stretch.period * body.every))[:: body.every]
+    total = np.zeros(len(motion.time))
+    for term in model.terms:
+        if term.element.acts == "feedback" and term.element.kernel is not None:
+            values = {name: value.value for name, value in term.values.items()}
+            total = term.element.kernel(asked, motion.position, motion.velocity, motion.time, **values)
+    if joint in stretch.forward:
+        total = total + stretch.forward[joint][:: body.every]
+    return total
+
+
+def joint_model(machine: Machine, joint: str, taken: Taken, links: Sequence[str]) -> Model:
+    """The path of a joint as a model of one axis, with the masses of links as parameters of a term `body`; without its actuator
+    where the effort was recorded behind that."""
+    path = machine.paths[joint]
+    terms = [t for t in path.terms if not (taken == "after_actuator" and t.element.slot == "actuator")]
+    known, values = machine.body.parameters, {}
+    for link in links:
+        said = machine.inertial.get(link)
+        values[link] = said or Value(known[link], "kg", True, (0.0, np.inf))
+    parameters = tuple(Parameter(link, "kg", f"mass of {link}", (0.0, np.inf), None) for link in links)
+    element = Element(
+        name=BODY, slot="force", title="Body", equation="coupling", parameters=parameters, reference="", kernel=nothing,
+        acts="drive", candidate=False,
+    )  # fmt: skip
+    armature = machine.inertial.get(f"{joint}.armature")
+    mass = path.mass
+    if armature is not None and not armature.fixed:
+        least = max(mass.value - armature.value, 0.0)  # no rotor has a negative inertia
+        mass = replace(mass, fixed=False, bounds=(least, np.inf))
+    return replace(path, mass=mass, terms=(*terms, Term(element, BODY, values)))
+
+
+def _cut(machine: Machine, stretches: Sequence[JointStretch]) -> tuple[float, float]:
+    """The highest frequency of the fastest joint's motion, and the strongest of all."""
+    found = []
+    for joint in machine.joints:
+        place = machine.body.joints[joint].position
+        raw = [
+            Stretch(
+                one.record, one.name, one.time, one.pose[:, place], one.time, one.period, "force", "position"
+            )
+            for one in stretches
+        ]
+        found.append(bandwidth_of_motion(raw))
+    return max(cut for cut, _ in found), float(np.median([line for _, line in found]))
+
+
+def _body_motion(machine: Machine, stretch: JointStretch, cut: float) -> BodyMotion:
+    every = max(1, int(1.0 / (FINER * cut * stretch.period)))
+    time = stretch.time[::every]
+    pose = low_pass(stretch.pose, stretch.period, cut)[::every]
+    rate = CubicSpline(time, pose).derivative()(time)
+    acceleration = CubicSpline(time, rate).derivative()(time)
+    force = machine.body.inverse(pose, rate, acceleration)
+    return BodyMotion(stretch, time, pose, rate, acceleration, force, stretch.period * every, every)
+
+
+def _links(
+    machine: Machine, joint: str, names: Sequence[str], columns: Sequence[Array], bodies: Sequence[BodyMotion]
+) -> tuple[str, ...]:
+    """The links whose masses a joint feels."""
+    own = machine.body.joints[joint].velocity
+    known = machine.body.parameters
+    whole = np.concatenate([one.force[:, own] for one in bodies])
+    made = np.concatenate([one[:, own] for one in columns]) * [known[name] for name in names]
+    felt = np.sqrt(np.mean(made**2, axis=0)) > FAINT * np.sqrt(np.mean(whole**2))
+    return tuple(name for name, one in zip(names, felt, strict=True) if one)
+
+
+def _motion(
+    machine: Machine, model: Model, joint: str, body: BodyMotion, columns: Mapping[str, Array]
+) -> Motion:
+    own = machine.body.joints[joint]
+    x, v, a = body.pose[:, own.position], body.rate[:, own.velocity], body.acceleration[:, own.velocity]
+    stretch, known = body.stretch, machine.body.parameters
+    effort = np.zeros(len(x))
+    if joint in stretch.effort:
+        effort = low_pass(stretch.effort[joint], stretch.period, 1.0 / (FINER * body.period))[:: body.every]
+    found = {
+        f"{BODY}.{link}": (known[link], np.ascontiguousarray(column[:, own.velocity]))
+        for link, column in columns.items()
+    }
+    return Motion(
+        stretch.record, stretch.name, body.time, x, v, a, x, v, effort, body.period,
+        coupling=body.force[:, own.velocity] - model.mass.value * a, links=found,
+    )  # fmt: skip
+
+
+def _bandwidth(motions: Sequence[Motion], cut: float, dominant: float) -> Bandwidth:
+    """The bandwidth of a joint's effort beside what the rest of the body asks for."""
+    own = [
+        replace(one, effort=one.effort - (0.0 if one.coupling is None else one.coupling)) for one in motions
+    ]
+    return bandwidth_below(own, cut, dominant)

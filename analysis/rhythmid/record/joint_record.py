@@ -1,0 +1,162 @@
+"""Records of machines with several joints: a record for each joint, from one recording.
+
+A signals.yaml with `joints:` says of all joints at once which channel is what:
+
+    joints: [hip, knee]                               # or {hip: left_hip, …}: the recording's own names
+    input:  {topic: /cmd, field: "position[*]", feedforward: "effort[*]"}
+    output: {topic: /joint_states, field: "position[*]"}
+    effort: {field: "effort[*]", taken: before_actuator}          # or after_actuator
+    base:   {field: "position[rail]"}                 # where the body's base moves along a joint
+
+`[*]` stands for each joint's name in a bag and for its place in the list in a table's array (`column: "q[*]"`); elsewhere in a column's
+name `*` stands for the joint's name (`column: "q_*"`). What has no topic or file takes the output's. A command that is a position is a
+reference for the controllers, see `kind` of the one axis' signals.yaml; `feedforward` is a force that the controllers add.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+from pydantic import TypeAdapter
+
+from rhythmid.document import Node, read
+from rhythmid.record.read import read_record, read_tables
+from rhythmid.record.record import Record
+from rhythmid.record.signals import Signals
+from rhythmid.validation import validated
+
+Taken = Literal["before_actuator", "after_actuator"]
+_TAKEN: TypeAdapter[Taken] = TypeAdapter(Taken)
+_TEXT: TypeAdapter[str] = TypeAdapter(str)
+SHARED = ("topic", "file", "time")  # what a channel takes from the output's where it says nothing
+
+
+@dataclass(frozen=True)
+class JointSignals:
+    """Contents of a signals.yaml with `joints:`, as the signals of each joint by itself; `base` of the base's joint."""
+
+    joints: Mapping[str, Signals]
+    base: Signals | None
+    taken: Taken
+    path: Path
+
+    @classmethod
+    def load(cls, path: str | Path) -> "JointSignals":
+        """The signals.yaml at `path`. Raises InputError naming line and key of what is wrong."""
+        return _joint_signals(read(path), Path(path))
+
+
+@dataclass(frozen=True, eq=False)
+class JointRecord:
+    """One recording of a machine: a record for each joint, one of the base's joint where it moves along one; the times of all
+    count from the same zero."""
+
+    name: str
+    joints: Mapping[str, Record]
+    base: Record | None = None
+    taken: Taken = "before_actuator"
+
+    def cut(self, start: float, end: float) -> "JointRecord":
+        """What lies within [start, end) seconds."""
+        joints = {name: record.cut(start, end) for name, record in self.joints.items()}
+        return replace(self, joints=joints, base=None if self.base is None else self.base.cut(start, end))
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time [s] at which every joint's position was recorded."""
+        times = [record.output.time for record in self.joints.values()]
+        return max(float(one[0]) for one in times), min(float(one[-1]) for one in times)
+
+
+def load_joint_records(paths: Iterable[str | Path], signals: JointSignals | str | Path) -> list[JointRecord]:
+    """Read several recordings. Raises InputError as `read_record` does."""
+    known = signals if isinstance(signals, JointSignals) else JointSignals.load(signals)
+    return [read_joint_record(path, known) for path in paths]
+
+
+def read_joint_record(source: str | Path, signals: JointSignals) -> JointRecord:
+    """Read one recording: a bag, or a table whose columns the signals name. A signals.yaml that names its tables stands for itself."""
+    found = {joint: _read(source, one, signals.path) for joint, one in signals.joints.items()}
+    base = None if signals.base is None else _read(source, signals.base, signals.path)
+    return JointRecord(next(iter(found.values())).name, found, base, signals.taken)
+
+
+def _read(source: str | Path, signals: Signals, path: Path) -> Record:
+    same = Path(source).resolve() == path.resolve()
+    return read_tables(signals) if same else read_record(source, signals)
+
+
+def _joint_signals(document: Node, path: Path) -> JointSignals:
+    keys = dict(document.mapping())
+    if "joints" not in keys:
+        document.fail("'joints:' is missing; a machine of several joints needs  joints: [hip, knee]")
+    names = _names(keys.pop("joints"))
+    base = keys.pop("base", None)
+    output = keys.get("output")
+    if output is None:
+        document.fail("'output:' is missing: which channel is the measured motion?")
+    taken: Taken = "before_actuator"
+    if "effort" in keys:
+        options = dict(keys["effort"].mapping())
+        if "taken" in options:
+            taken = validated(options.pop("taken"), _TAKEN)
+        keys["effort"] = replace(keys["effort"], value=options)
+    if "input" in keys and isinstance(keys["input"].value, dict):
+        options = dict(keys["input"].value)
+        if "feedforward" in options:
+            field = options.pop("feedforward")
+            others = {name: one for name, one in options.items() if name in SHARED}
+            keys["forcing"] = replace(field, value={"field": field, **others})
+        if "kind" not in options and str(getattr(options.get("field"), "value", "")).startswith("position"):
+            options["kind"] = replace(keys["input"], value="reference")
+        keys["input"] = replace(keys["input"], value=options)
+    for role, node in keys.items():
+        if role not in ("output", "time", "use", "tables", "parameters") and isinstance(node.value, dict):
+            keys[role] = _with_shared(node, output)
+    whole = replace(document, value=keys)
+    found = {
+        joint: Signals.from_node(_for_joint(whole, own, place), path)
+        for place, (joint, own) in enumerate(names.items())
+    }
+    of_base = None
+    if base is not None:
+        kept = {name: one for name, one in keys.items() if name in ("time", "use", "tables")}
+        measured = replace(document, value={**kept, "output": _with_shared(base, output)})
+        of_base = Signals.from_node(measured, path)
+    return JointSignals(found, of_base, taken, path)
+
+
+def _names(node: Node) -> dict[str, str]:
+    """By the joint's name in the model, the one in the recording."""
+    if isinstance(node.value, dict):
+        found = {name: validated(one, _TEXT) for name, one in node.mapping().items()}
+    else:
+        listed = [validated(one, _TEXT) for one in node.items()]
+        if len(set(listed)) < len(listed):
+            node.fail("names a joint twice")
+        found = {name: name for name in listed}
+    if not found:
+        node.fail("names no joint; write  joints: [hip, knee]")
+    return found
+
+
+def _with_shared(node: Node, output: Node) -> Node:
+    """A channel that takes topic, file and time from the output where it has neither."""
+    options, usual = node.mapping(), output.mapping()
+    if "topic" in options or "file" in options:
+        return node
+    return replace(node, value={**{name: usual[name] for name in SHARED if name in usual}, **options})
+
+
+def _for_joint(node: Node, joint: str, place: int) -> Node:
+    """The document with the joint in the place of every star."""
+    if isinstance(node.value, dict):
+        return replace(node, value={key: _for_joint(one, joint, place) for key, one in node.value.items()})
+    if isinstance(node.value, list):
+        return replace(node, value=[_for_joint(one, joint, place) for one in node.value])
+    if not isinstance(node.value, str) or "*" not in node.value:
+        return node
+    column = node.path.endswith("column")
+    text = node.value.replace("[*]", f"[{place}]" if column else f"[{joint}]")
+    return replace(node, value=text.replace("*", joint))

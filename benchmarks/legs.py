@@ -1,0 +1,196 @@
+"""Effects concealed at one joint of machines of several joints, and found again from messy logs.
+
+    python benchmarks/legs.py [--cases N] [--seed S] [--bodies leg,arm,quadruped] [--json FILE]
+
+Every case draws a body, and a joint and an effect or none; the plant has the effect, the diagnosis has not. Logs have stamps that jitter by
+0.3 ms, an encoder's steps, noise of 1 % on the torque and lost messages. Counted with Wilson's 95 % intervals: joint right, effect right
+(or one that the answer lists as indistinguishable from it, or of its family) where the effect's share of the joint's effort is above the
+10 % of the mismatch, and joints without an effect at which something was named.
+"""
+
+import argparse
+import json
+import math
+import sys
+import time as clock
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+from legged import MODELS, hop, recorded, references
+
+from rhythmid.body.machine import Machine
+from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.errors import InputError
+
+BODIES = ("leg", "arm", "quadruped")
+NULLS = 0.15  # share of cases without any effect
+LASTS = {"leg": 18.0, "arm": 20.0, "quadruped": 16.0}  # [s]
+# sizes as shares of the rms of the joint's effort (N m), or of what they multiply
+EFFECTS = ("coulomb_friction", "actuator_lag", "actuator_gain", "actuator_delay", "constant_force", "linear_spring",
+           "link_mass", "armature", "actuator_deadband", "stribeck_friction")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case and what was said of it."""
+
+    number: int
+    body: str
+    joint: str
+    effect: str
+    size: float
+    verdict: str
+    named: tuple[tuple[str, str], ...]
+    joints: int
+    right_joint: bool
+    right_effect: bool
+    false: int
+    unknown: int
+    seconds: float
+
+
+def concealed(machine: Machine, joint: str, effect: str, effort: float, rng: np.random.Generator):
+    """The plant with the effect at the joint, its size drawn, and that size."""
+    catalogue = load_catalogue()
+    share = float(rng.uniform(0.08, 0.25))
+    if effect == "link_mass":
+        links = [name for name in machine.body.links if machine.body.joint_of(name) == joint]
+        name = f"{links[-1]}.mass"
+        factor = 1.0 + float(rng.choice([-1.0, 1.0]) * rng.uniform(0.25, 0.5))
+        return machine.with_inertial({name: factor * machine.body.parameters[name]}), factor
+    if effect == "armature":
+        own = f"{joint}.armature"
+        factor = float(rng.uniform(1.5, 2.5))
+        return machine.with_inertial({own: factor * machine.body.parameters[own]}), factor
+    values = {
+        "coulomb_friction": {"force": share * effort, "transition": 0.03},
+        "stribeck_friction": {
+            "force": share * effort, "static_ratio": 2.0, "stribeck_speed": 0.3, "transition": 0.03
+        },
+        "actuator_lag": {"time_constant": float(rng.uniform(0.006, 0.012))},
+        "actuator_gain": {"gain": 1.0 - share},
+        "actuator_delay": {"delay": float(rng.uniform(0.006, 0.01))},
+        "constant_force": {"force": share * effort},
+        "linear_spring": {"stiffness": 4.0 * share * effort, "rest_length": float(rng.uniform(-0.5, 0.5))},
+        "actuator_deadband": {"threshold": share * effort},
+    }[effect]  # fmt: skip
+    element = catalogue[effect]
+    return machine.with_element(joint, element, values), next(iter(values.values()))
+
+
+def asked(body: str, machine: Machine, time, rng: np.random.Generator):
+    """References of a body."""
+    if body == "leg":
+        return hop(time, rng)
+    if body == "arm":
+        middles = {joint: (float(rng.uniform(-0.4, 0.4)), 0.35) for joint in machine.joints}
+        return references(middles, time, rng, (0.15, 1.6))
+    middles = {j: ((-1.5 if "calf" in j else 0.8 if "thigh" in j else 0.0), 0.25) for j in machine.joints}
+    return references(middles, time, rng, (0.3, 4.0))
+
+
+def family(name: str) -> str:
+    """The family of an element; its own name where it is none."""
+    catalogue = load_catalogue()
+    return (catalogue[name].family if name in catalogue else "") or name
+
+
+def run(number: int, seed: int, bodies: Sequence[str]) -> Case:
+    """One case."""
+    rng = np.random.default_rng([seed, number])
+    body = bodies[number % len(bodies)]
+    machine = Machine.load(MODELS / f"{body}.yaml")
+    time = np.arange(0.0, LASTS[body], 0.002)
+    given = asked(body, machine, time, rng)
+    joint = str(rng.choice(machine.joints))
+    there = {family(term.element.name) for term in machine.paths[joint].terms}
+    lacking = [name for name in EFFECTS if family(name) not in there]  # what a path has, a fit takes in
+    effect = "none" if rng.uniform() < NULLS else str(rng.choice(lacking))
+    plain = recorded(machine, given, time, np.random.default_rng(0))
+    channel = plain.joints[joint].effort
+    assert channel is not None
+    plant, size = machine, 0.0
+    if effect != "none":
+        plant, size = concealed(machine, joint, effect, float(np.std(channel.value)), rng)
+    record = recorded(plant, given, time, rng)
+    began = clock.process_time()
+    answer = diagnose_machine([record], machine).diagnosis
+    named = tuple((one.joint, one.element) for one in answer.missing)
+    here = [one for one in answer.missing if one.joint == joint]
+    alike = {family(effect), effect}
+    groups = [
+        {name.split(": ")[1] for name in group}
+        for group in answer.indistinguishable
+        if group[0].startswith(joint)
+    ]
+    right = any(
+        family(one.element) in alike or any({one.element, effect} <= group for group in groups)
+        for one in here
+    )
+    false = sum(
+        1
+        for other in machine.joints
+        if other != joint or effect == "none"
+        if any(j == other for j, _ in named)
+    )
+    return Case(
+        number, body, joint, effect, size, answer.verdict, named, len(machine.joints), bool(here) if effect != "none" else not named,
+        right if effect != "none" else not named, false, len(answer.unknown), clock.process_time() - began,
+    )  # fmt: skip
+
+
+def wilson(hits: int, count: int) -> str:
+    """A share with its 95 % interval (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927) 209)."""
+    if not count:
+        return "none"
+    z, p = 1.96, hits / count
+    middle = (p + z * z / (2 * count)) / (1 + z * z / count)
+    half = z * math.sqrt(p * (1 - p) / count + z * z / (4 * count * count)) / (1 + z * z / count)
+    return f"{hits} of {count} = {100 * p:.1f} % [{100 * max(middle - half, 0):.1f}, {100 * min(middle + half, 1):.1f}]"
+
+
+def told(cases: Sequence[Case]) -> None:
+    """Print the counts."""
+    for body in (*dict.fromkeys(one.body for one in cases), "all"):
+        some = [one for one in cases if body in (one.body, "all")]
+        real = [one for one in some if one.effect != "none"]
+        nulls = sum(one.joints - (one.effect != "none") for one in some)
+        print(f"{body}: joint right {wilson(sum(o.right_joint for o in real), len(real))}")
+        print(f"{body}: effect right {wilson(sum(o.right_effect for o in real), len(real))}")
+        print(f"{body}: null joints falsely named {wilson(sum(o.false for o in some), nulls)}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=30)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--bodies", default=",".join(BODIES))
+    parser.add_argument("--json", type=Path)
+    given = parser.parse_args()
+    cases: list[Case] = []
+    for number in range(given.first, given.first + given.cases):
+        try:
+            cases.append(run(number, given.seed, given.bodies.split(",")))
+        except InputError as error:
+            print(f"{number}: {error}", flush=True)
+            continue
+        one = cases[-1]
+        found = "; ".join(f"{joint}: {name}" for joint, name in one.named) or one.verdict
+        mark = "" if one.right_effect and not one.false else " *"
+        print(
+            f"{number} {one.body} {one.joint}: {one.effect} {one.size:.3g} -> {found}  ({one.seconds:.0f} s){mark}",
+            flush=True,
+        )
+        if given.json is not None:
+            given.json.write_text(json.dumps([asdict(c) for c in cases], indent=1))
+    told(cases)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,111 @@
+"""The commands for machines of several joints, from simulation to diagnosis."""
+
+import json
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+from legged import fixed_leg
+from typer.testing import CliRunner
+
+from rhythmid.cli import app
+from rhythmid.errors import InputError
+
+LEGS = Path(str(files("rhythmid"))) / "models" / "legs"
+SIGNALS = str(LEGS / "leg_signals.yaml")
+
+
+def called(*arguments: str) -> str:
+    """What a command prints."""
+    found = CliRunner().invoke(app, list(arguments), catch_exceptions=False)
+    assert found.exit_code == 0, found.output
+    return found.output
+
+
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A leg in the air, and a bag of one whose knee has dry friction."""
+    folder = tmp_path_factory.mktemp("legs")
+    text = fixed_leg(folder).read_text()
+    knee = text.index("knee:")
+    rough = text[knee:].replace("force: [", "force: [{coulomb_friction: {force: 0.3, transition: 0.02}}, ")
+    (folder / "rough.yaml").write_text(text[:knee] + rough)
+    whole = (LEGS / "leg_experiment.yaml").read_text()
+    (folder / "experiment.yaml").write_text(
+        whole.replace("start: {rail: 0.45}", "").replace("12.0 ", "8.0 ").replace("rate: 500", "rate: 1000")
+    )
+    signals = (LEGS / "leg_signals.yaml").read_text()
+    (folder / "signals.yaml").write_text(signals[: signals.index("base:")])
+    experiment = str(folder / "experiment.yaml")
+    called("simulate", str(folder / "rough.yaml"), "--experiment", experiment, "--out", str(folder / "rough"))
+    return folder
+
+
+def test_friction_that_was_concealed_in_a_knee_is_named_there(bags: Path):
+    answer = bags / "answer.json"
+    model, better = str(bags / "leg.yaml"), bags / "better.yaml"
+    printed = called(
+        "diagnose", str(bags / "rough"), "--model", model, "--signals", str(bags / "signals.yaml"), "--json", str(answer),
+        "--save-model", str(better),
+    )  # fmt: skip
+    found = json.loads(answer.read_text())
+    assert found["verdict"] == "missing_physics"
+    assert [(one["joint"], one["element"], one["slot"]) for one in found["missing"]] == [
+        ("knee", "coulomb_friction", "force")
+    ]
+    (friction,) = found["missing"]
+    assert friction["parameters"]["force"]["value"] == pytest.approx(0.3, abs=0.02)
+    assert friction["probability"] > 0.8 and friction["heldout_gain"] > 0.02
+    assert found["joints"]["hip"]["verdict"] == "consistent"
+    assert "knee" in printed and "coulomb_friction" in better.read_text()
+
+
+def test_a_leg_is_identified_from_its_bag(bags: Path):
+    answer = bags / "identified.json"
+    called(
+        "identify", str(bags / "rough"), "--model", str(bags / "rough.yaml"), "--signals", str(bags / "signals.yaml"),
+        "--json", str(answer),
+    )  # fmt: skip
+    found = json.loads(answer.read_text())
+    assert found["parameters"]["knee.coulomb_friction.force"]["value"] == pytest.approx(0.3, abs=0.02)
+    assert found["parameters"]["body.knee.armature"]["value"] == pytest.approx(0.006, abs=0.0005)
+    inertia = found["inertia"]
+    assert 0 < inertia["rank"] < inertia["count"] == 20
+    assert inertia["links"]["shank"]["m"] == pytest.approx(0.22, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["diagnose", "{bag}", "--model", "{leg}"], "needs --signals"),
+        (
+            ["diagnose", "{bag}", "--model", "{leg}", "--signals", SIGNALS, "--report", "x.html"],
+            "--report is not made",
+        ),
+        (
+            ["diagnose", "{bag}", "--model", "{floating}", "--signals", "{signals}"],
+            "the base of quadruped.xml floats",
+        ),
+        (
+            ["identify", "{bag}", "--model", "{other}", "--signals", "{signals}"],
+            "the joint 'leg' is not recorded",
+        ),
+        (["simulate", "{leg}", "--experiment", "{wrong}", "--out", "{new}"], "the joint 'ankle' has no path"),
+    ],
+)
+def test_what_cannot_be_done_is_told_in_one_line(bags: Path, arguments: list[str], said: str):
+    quadruped = (
+        (LEGS / "quadruped.yaml")
+        .read_text()
+        .replace("quadruped.xml", str(LEGS / "quadruped.xml, base: free"))
+    )
+    (bags / "floating.yaml").write_text(quadruped)
+    (bags / "wrong.yaml").write_text("duration: 1\nexcitation: {ankle: {offset: 1}}\n")
+    places = {
+        "bag": bags / "rough", "leg": LEGS / "leg.yaml", "floating": bags / "floating.yaml",
+        "other": LEGS / "hopper.yaml", "signals": bags / "signals.yaml", "wrong": bags / "wrong.yaml", "new": bags / "new",
+    }  # fmt: skip
+    with pytest.raises(InputError, match=said) as caught:
+        CliRunner().invoke(app, [one.format(**places) for one in arguments], catch_exceptions=False)
+    assert "\n" not in str(caught.value)
+    assert not (bags / "new").exists()
