@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,7 @@ class Change:
     key: int
     element: Element
     values: Mapping[str, float]
-    outputs: tuple[NDArray[np.floating], ...]
+    outputs: tuple[Array, ...]
 
 
 @dataclass(frozen=True)
@@ -286,11 +287,11 @@ def changes_of(
     return [change for change in (pool.map(one, cases) if pool else map(one, cases)) if change is not None]
 
 
-def _kept(outputs: Sequence[Array]) -> tuple[NDArray[np.floating], ...]:
+def _kept(outputs: Sequence[Array]) -> tuple[Array, ...]:
     """Changes as they are kept for the whole catalogue: in half the memory over records that are very long."""
     if sum(map(len, outputs)) <= FULL_PRECISION_ROWS:
         return tuple(outputs)
-    return tuple(one.astype(np.float32) for one in outputs)
+    return tuple(cast(Array, one.astype(np.float32)) for one in outputs)
 
 
 def _impossible(element: Element, values: Mapping[str, float], factor: float) -> bool:
