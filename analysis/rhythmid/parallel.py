@@ -53,7 +53,8 @@ def fork_map(
     where the same item takes that one, too.
     """
     count = min(workers or cores(), len(items))
-    if count <= 1 or "fork" not in multiprocessing.get_all_start_methods():
+    within = multiprocessing.current_process().daemon  # a worker, which may have none of its own
+    if count <= 1 or within or "fork" not in multiprocessing.get_all_start_methods():
         for index, item in enumerate(items):
             try:
                 yield index, function(item)

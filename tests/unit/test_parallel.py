@@ -47,3 +47,10 @@ def test_work_that_kills_every_worker_is_raised():
 
     with pytest.raises(RuntimeError, match="two workers died at the same work, exit code -9"):
         list(fork_map(work, [0, 1, 2], 2))
+
+
+def test_a_worker_does_its_own_parts_one_after_another():
+    def within(start: int) -> list[int]:
+        return [result for _, result in fork_map(lambda n: start + n, [1, 2])]
+
+    assert dict(fork_map(within, [10, 20], 2)) == {0: [11, 12], 1: [21, 22]}
