@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 BRINGUP = ROOT / "ros_ws" / "src" / "rhythmid_bringup"
 # keys of rosdep's own list, and packages of ROS and of this workspace
 KNOWN = {
-    "ament_index_python", "diagnostic_msgs", "launch", "launch_ros", "rcl_interfaces", "rclpy", "rhythmid", "rhythmid_nodes",
+    "ament_index_python", "diagnostic_msgs", "launch", "launch_ros", "lifecycle_msgs", "rcl_interfaces", "rclpy", "rhythmid", "rhythmid_nodes",
     "sensor_msgs", "std_msgs", "std_srvs", "python3-matplotlib", "python3-numpy", "python3-pytest", "python3-scipy", "python3-yaml",
 }  # fmt: skip
 NAMED_OTHERWISE = {"pyyaml": "yaml"}
