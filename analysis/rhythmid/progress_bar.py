@@ -52,9 +52,12 @@ def spent_words(elapsed: float, seconds: float) -> str:
 
 
 @contextmanager
-def progress(console: Console, budget: float | None = None, log: bool = True) -> Iterator[Tell]:
+def progress(
+    console: Console, budget: float | None = None, log: bool = True, patience: float = 0.0
+) -> Iterator[Tell]:
     """While this is open, what is told stands in a line with the time since it was opened, and with a `budget` [s] the share of
-    it that is spent. With `log` each thing that was told is also printed, with the time at which it began."""
+    it that is spent. With `log` each thing that was told is also printed, with the time at which it began, once `patience` [s] are
+    over: short work prints nothing."""
     columns: list[ProgressColumn] = [
         SpinnerColumn(table_column=Column(min_width=1)),
         TimeElapsedColumn(table_column=Column(min_width=len("0:00:00"))),
@@ -67,7 +70,7 @@ def progress(console: Console, budget: float | None = None, log: bool = True) ->
     began = time.monotonic()
 
     def printed(what: str) -> None:
-        if log:
+        if log and time.monotonic() - began >= patience:
             console.print(f"[dim]{time.monotonic() - began:6.1f} s  {escape(what)}[/]")
 
     if not console.is_interactive:  # a bar would leave an empty line there

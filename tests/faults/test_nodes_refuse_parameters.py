@@ -38,7 +38,11 @@ def test_ros_arguments_that_cannot_be_parsed_are_refused_likewise(arguments, sai
     [
         ("delay_injector", "delay:=-0.04", "error: parameter delay = -0.04 must lie in [0, 10] s"),
         ("delay_injector", "delay:=.nan", "error: parameter delay = nan must lie in [0, 10] s"),
-        ("delay_injector", "delai:=0.04", "error: unknown parameter delai; this node has delay, delay_from"),
+        (
+            "delay_injector",
+            "delai:=0.04",
+            "error: unknown parameter delai; this node has autostart, catch_up, delay, delay_from",
+        ),
         (
             "delay_injector",
             "stamp_mode:=late",
