@@ -50,7 +50,7 @@ def test_work_that_kills_every_worker_is_raised():
 
 
 def test_a_worker_does_its_own_parts_one_after_another():
-    def within(start: int) -> list[int]:
+    def within(start: int) -> list:
         return [result for _, result in fork_map(lambda n: start + n, [1, 2])]
 
     assert dict(fork_map(within, [10, 20], 2)) == {0: [11, 12], 1: [21, 22]}
