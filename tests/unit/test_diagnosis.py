@@ -49,6 +49,15 @@ def test_delays_and_nominal_parameters_are_right_once_the_effect_is_modelled(fri
     assert any("linear_spring.stiffness" in line for line in friction.diagnosis.calibration)
 
 
+def test_a_parameter_has_one_standard_deviation_wherever_it_is_told(friction):
+    joint, told = friction.covariance, friction.diagnosis.parameters
+    for name, std in zip(joint.names, joint.std):
+        assert told[name].std == pytest.approx(std), name
+    assert friction.diagnosis.delays["sum"]["std"] <= 1.001 * (
+        told["input_delay.delay"].std + told["measurement_delay.delay"].std
+    )
+
+
 def test_the_result_keeps_to_the_schema(friction):
     conforming(friction.diagnosis)
 

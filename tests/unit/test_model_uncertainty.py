@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
-from rhythmid.diagnose.model_uncertainty import spread_of
+from rhythmid.diagnose.model_uncertainty import covariance_between
 
 
 def hypothesis(score: float, **values: float) -> Hypothesis:
@@ -12,9 +12,12 @@ def hypothesis(score: float, **values: float) -> Hypothesis:
     return Hypothesis(("coulomb_friction",), ("coulomb_friction",), "effects", 1, block, values=values)
 
 
+def spread(chosen: Hypothesis, *others: Hypothesis) -> float:
+    return float(np.sqrt(covariance_between(["force"], chosen, [chosen, *others])[0, 0]))
+
+
 def test_a_model_that_predicts_as_well_counts_as_much():
-    chosen, rival = hypothesis(10.0, force=1.0), hypothesis(10.0, force=3.0)
-    assert spread_of(chosen, [chosen, rival]) == {"force": pytest.approx(np.sqrt(2.0))}
+    assert spread(hypothesis(10.0, force=1.0), hypothesis(10.0, force=3.0)) == pytest.approx(np.sqrt(2.0))
 
 
 def test_a_model_that_predicts_better_counts_wholly_and_a_worse_one_not_at_all():
@@ -23,10 +26,17 @@ def test_a_model_that_predicts_better_counts_wholly_and_a_worse_one_not_at_all()
         hypothesis(60.0, force=1.5),
         hypothesis(-60.0, force=9.0),
     )
-    assert spread_of(chosen, [chosen, worse])["force"] == pytest.approx(0.0, abs=1e-9)
-    assert spread_of(chosen, [chosen, better, worse])["force"] == pytest.approx(0.5)
+    assert spread(chosen, worse) == pytest.approx(0.0, abs=1e-9)
+    assert spread(chosen, better, worse) == pytest.approx(0.5)
 
 
 def test_models_without_the_parameter_say_nothing_of_it():
-    chosen, other = hypothesis(0.0, force=1.0), hypothesis(60.0, mass=2.0)
-    assert spread_of(chosen, [chosen, other]) == {"force": 0.0}
+    assert spread(hypothesis(0.0, force=1.0), hypothesis(60.0, mass=2.0)) == 0.0
+
+
+def test_parameters_that_depart_together_leave_what_they_share_certain():
+    chosen, other = hypothesis(0.0, input=0.02, output=0.03), hypothesis(0.0, input=0.03, output=0.02)
+    between = covariance_between(["input", "output", "mass"], chosen, [chosen, other])
+    assert between[0, 0] > 0.0
+    assert np.array([1.0, 1.0, 0.0]) @ between @ np.array([1.0, 1.0, 0.0]) == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_array_equal(between[2], 0.0)

@@ -75,7 +75,7 @@ class Answer(Result):
 
     @property
     def covariance(self) -> JointCovariance:
-        """Covariance of the chosen model's parameters, given that model; what the choice of the model adds is in `diagnosis` only.
+        """Covariance of the chosen model's parameters, with what the choice of the model adds.
 
         Raises InputError where effort was scored: its standard deviations are those of each parameter alone.
         """

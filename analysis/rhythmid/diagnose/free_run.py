@@ -24,6 +24,7 @@ from rhythmid.diagnose.fine_steps import finely_stepped
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
 from rhythmid.diagnose.intervals import profiled
 from rhythmid.diagnose.location import Dependence, dependences
+from rhythmid.diagnose.model_uncertainty import covariance_between
 from rhythmid.diagnose.scoring import Scoring
 from rhythmid.diagnose.search.forward import Search, search
 from rhythmid.diagnose.search.refit import reach_of, whole_fit
@@ -104,6 +105,8 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     decision = decide(contest, selection, detectable)
     if trial.added and selection.chosen.kind == "effects":
         found = ticks_followed(profiled(finely_stepped(found, case.pool), case.pool), case.pool)
+    between = covariance_between(found.fit.names, selection.chosen, contest.hypotheses)
+    found = replace(found, fit=replace(found.fit, covariance=found.fit.covariance + between))
     before = dependences(trajectories(found.nominal), rows, case.pool) if trial.added else after
     return FreeRunResult(
         scoring,

@@ -1,8 +1,7 @@
 """An answer put together from what a free run, or windows, have shown."""
 
 import math
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Sequence
 
 from rhythmid.diagnose.answer.next_experiment import next_experiment
 from rhythmid.diagnose.answer.result import (
@@ -23,7 +22,6 @@ from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.evidence import difference
 from rhythmid.diagnose.free_run import FreeRunResult
 from rhythmid.diagnose.location import Dependence
-from rhythmid.diagnose.model_uncertainty import spread_of
 from rhythmid.diagnose.selection import Contest
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.errors import InputError
@@ -65,9 +63,8 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     series = found.fit.run.series
     repeats = noise_from_repeats(list(series))
     best = found.best
-    spread = spread_of(result.selection.chosen, contest.hypotheses)
     missing = tuple(
-        _missing(found.fit, label, decision, spread) for label in decision.named if best.model.term(label)
+        _missing(found.fit, label, decision) for label in decision.named if best.model.term(label)
     )
     plain = FitQuality(found.nominal.nrmse(), contest.nominal.heldout_nrmse)
     augmented = FitQuality(found.fit.nrmse(), result.selection.chosen.heldout_nrmse)
@@ -106,7 +103,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         rejections=result.selection.rejections,
         remainder=_remainder(decision, result.after),
         fit={"refitted_nominal": plain, "augmented": augmented},
-        parameters={name: estimated(fit, name, spread) for name in fit.model.parameters},
+        parameters={name: estimated(fit, name) for name in fit.model.parameters},
         delays=delays_of(fit),
         next_experiment=next_experiment(found, rivals, series, decision.verdict),
         scoring=Scored(result.scoring.kind, None, result.scoring.reason),
@@ -145,7 +142,7 @@ def _freed(nominal: Model, result: FreeRunResult) -> str | None:
     return freed_value(nominal, result.search.fit.model, chosen.elements)
 
 
-def _missing(fit: Fit, label: str, decision: Decision, spread: Mapping[str, float]) -> MissingEffect:
+def _missing(fit: Fit, label: str, decision: Decision) -> MissingEffect:
     term = fit.model.term(label)
     assert term is not None
     return MissingEffect(
@@ -154,17 +151,14 @@ def _missing(fit: Fit, label: str, decision: Decision, spread: Mapping[str, floa
         term.element.equation,
         decision.shares[label],
         decision.probability[label],
-        {name: estimated(fit, f"{label}.{name}", spread) for name in term.values},
+        {name: estimated(fit, f"{label}.{name}") for name in term.values},
     )
 
 
-def estimated(fit: Fit, name: str, spread: Mapping[str, float] = MappingProxyType({})) -> Estimate:
-    """A parameter of a fit; standard deviation 0 where it is fixed, None where the records do not determine it. `spread` is what the
-    choice of the model adds to it."""
+def estimated(fit: Fit, name: str) -> Estimate:
+    """A parameter of a fit; standard deviation 0 where it is fixed, None where the records do not determine it."""
     value = fit.model.parameters[name]
     std = fit.std.get(name)
-    if std is not None:
-        std = math.hypot(std, spread.get(name, 0.0))
     if std is not None and (not math.isfinite(std) or std > max(1e6 * abs(value.value), 1e-3)):
         std = None
     return Estimate(value.value, 0.0 if name not in fit.names else std, value.unit)

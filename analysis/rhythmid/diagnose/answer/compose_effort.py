@@ -1,8 +1,7 @@
 """An answer put together from what the recorded effort has shown."""
 
 import math
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Sequence
 
 from rhythmid.diagnose.answer.compose import explanations
 from rhythmid.diagnose.answer.result import (
@@ -20,7 +19,6 @@ from rhythmid.diagnose.answer.wording import SENTENCES, freed_value, summary_of
 from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.run import EffortResult
-from rhythmid.diagnose.model_uncertainty import spread_of
 from rhythmid.identify.inverse_dynamics.estimate import size_of
 
 NO_SENSOR = "The measurement is taken for the motion: effects in the sensor and in the measurement's time are not among the candidates."
@@ -31,9 +29,8 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     """The diagnosis."""
     decision, chosen, nominal = result.decision, result.chosen, result.nominal
     size = size_of(result.search.balance)
-    spread = spread_of(result.selection.chosen, result.contest.hypotheses)
     missing = tuple(
-        _missing(chosen, label, result, spread) for label in decision.named if chosen.fit.model.term(label)
+        _missing(chosen, label, result) for label in decision.named if chosen.fit.model.term(label)
     )
     before, after = (
         FitQuality(one.fit.error / size, _error(result, one) / size) for one in (nominal, chosen)
@@ -63,7 +60,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         rejections=result.selection.rejections,
         remainder=remainder,
         fit={"refitted_nominal": before, "augmented": after},
-        parameters=effort_parameters(chosen, spread),
+        parameters=effort_parameters(chosen),
         delays=effort_delays(chosen),
         next_experiment=_next_experiment(result),
         scoring=Scored("effort", result.applicability.bandwidth, result.applicability.reason),
@@ -79,24 +76,19 @@ def _error(result: EffortResult, fitted: Fitted) -> float:
     return result.errors[tuple(sorted(fitted.elements))]
 
 
-def _estimate(fitted: Fitted, name: str, spread: Mapping[str, float]) -> Estimate:
-    """A parameter; standard deviation 0 where it is fixed, None where the effort does not show it. `spread` is what the choice of the model
-    adds to it."""
+def _estimate(fitted: Fitted, name: str) -> Estimate:
+    """A parameter; standard deviation 0 where it is fixed, None where the effort does not show it."""
     value = fitted.model.parameters[name]
     std = 0.0 if value.fixed else fitted.std().get(name)
-    if std:
-        std = math.hypot(std, spread.get(name, 0.0))
     return Estimate(value.value, std if std is None or math.isfinite(std) else None, value.unit)
 
 
-def effort_parameters(
-    fitted: Fitted, spread: Mapping[str, float] = MappingProxyType({})
-) -> dict[str, Estimate]:
-    """All parameters of a fit, by name; `spread` is what the choice of the model adds to their standard deviations."""
-    return {name: _estimate(fitted, name, spread) for name in fitted.model.parameters}
+def effort_parameters(fitted: Fitted) -> dict[str, Estimate]:
+    """All parameters of a fit, by name."""
+    return {name: _estimate(fitted, name) for name in fitted.model.parameters}
 
 
-def _missing(fitted: Fitted, label: str, result: EffortResult, spread: Mapping[str, float]) -> MissingEffect:
+def _missing(fitted: Fitted, label: str, result: EffortResult) -> MissingEffect:
     term = fitted.fit.model.term(label)
     assert term is not None
     return MissingEffect(
@@ -105,7 +97,7 @@ def _missing(fitted: Fitted, label: str, result: EffortResult, spread: Mapping[s
         term.element.equation,
         result.decision.shares[label],
         result.decision.probability[label],
-        {name: _estimate(fitted, f"{label}.{name}", spread) for name in term.values},
+        {name: _estimate(fitted, f"{label}.{name}") for name in term.values},
     )
 
 

@@ -1,7 +1,7 @@
 """Diagnosis by the recorded effort: the search, its hypotheses on data that no fit has seen, and the decision."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from rhythmid.diagnose.evidence import (
     prediction,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, names_of, richer_of
+from rhythmid.diagnose.model_uncertainty import covariance_between
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.verdict import Decision, decide
 from rhythmid.errors import InputError
@@ -150,8 +151,16 @@ def effort_run(
         selection,
         decide(contest, selection, detectable),
         detectable,
-        chosen,
+        _among_models(chosen, contest, selection),
         found.nominal,
         left if chosen is found.chosen else remainder_of(found.balance, chosen),
         errors,
     )
+
+
+def _among_models(chosen: Fitted, contest: Contest, selection: Selection) -> Fitted:
+    """The chosen fit with standard deviations that hold what the choice of the model adds."""
+    between = covariance_between(chosen.fit.names, selection.chosen, contest.hypotheses)
+    std = chosen.fit.std.copy()  # of the alignment first, which belongs to no model
+    std[1:] = np.hypot(std[1:], np.sqrt(np.diag(between)))
+    return replace(chosen, fit=replace(chosen.fit, std=std))
