@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +81,7 @@ def drawn(name: str, rng: np.random.Generator) -> Machine:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Signals of a while: times [s], command, forcing, and the measurement with its stamps; the state at the end."""
+    """Signals of a while: times [s], command and forcing [N], the measurement [m] with its stamps [s]; the state at the end."""
 
     time: Array
     command: Array
@@ -88,6 +89,20 @@ class Stretch:
     stamp: Array
     measured: Array
     end: Array
+
+    @property
+    def channels(self) -> list[tuple[Any, Array, Array]]:
+        """Role, times and values of each signal."""
+        return [
+            ("input", self.time, self.command),
+            ("forcing", self.time, self.forcing),
+            ("output", self.stamp, self.measured),
+        ]
+
+    def then(self, other: Stretch) -> Stretch:
+        """These and what follows, whose first sample is the last of these."""
+        arrays = [np.concatenate([a[:-1], b]) for a, b in zip(vars(self).values(), vars(other).values())]
+        return Stretch(*arrays[:-1], other.end)
 
 
 class Operation:

@@ -1,10 +1,9 @@
 """A lift at work for the live twin: simulated stretches that go on where the last one ended, and changes of its physics."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from machines_at_work import DESIGNS, RATE, Stretch
 from numpy.typing import NDArray
 
 from rhythmid.excitation.multisine import Multisine
@@ -14,17 +13,7 @@ from rhythmid.simulation.signal import spline, zero_order_hold
 from rhythmid.simulation.simulate import simulate, start_states
 
 Array = NDArray[np.float64]
-RATE = 250.0  # Hz
-LIFT = """
-inertia: {mass: {value: 2.0, unit: kg, fixed: true}}
-command: [{input_delay: {delay: {value: 0.01, unit: s}}}]
-force:
-  - gravity: {acceleration: {value: 9.81, unit: m/s^2, fixed: true}}
-  - linear_spring: {stiffness: {value: 800.0, unit: N/m}, rest_length: {value: 0.0, unit: m}}
-  - viscous_damper: {damping: {value: 8.0, unit: N*s/m}}
-  - coulomb_friction: {force: {value: 1.0, unit: N}, transition: {value: 0.005, unit: m/s, fixed: true}}
-sensor: [{measurement_delay: {delay: {value: 0.005, unit: s}}}]
-"""
+LIFT = DESIGNS["lift"]
 EXCITATION = Multisine(rms=5.0, period=20.0, periods=1, band=(0.3, 8.0), seed=3)
 
 
@@ -40,35 +29,9 @@ CHANGED = {
 }
 
 
-@dataclass(frozen=True)
-class Signals:
-    """Times [s], command and forcing [N], the measurement [m] with its stamps [s], and the machine's state at the end."""
-
-    time: Array
-    command: Array
-    forcing: Array
-    stamp: Array
-    measured: Array
-    end: Array
-
-    @property
-    def channels(self) -> list[tuple[Any, Array, Array]]:
-        """Role, times and values of each signal."""
-        return [
-            ("input", self.time, self.command),
-            ("forcing", self.time, self.forcing),
-            ("output", self.stamp, self.measured),
-        ]
-
-    def then(self, other: "Signals") -> "Signals":
-        """These and what follows, whose first sample is the last of these."""
-        arrays = [np.concatenate([a[:-1], b]) for a, b in zip(vars(self).values(), vars(other).values())]
-        return Signals(*arrays[:-1], other.end)
-
-
 def at_work(
     model: Model, start: float, end: float, state: Array | None = None, seed: int = 0, noise: float = 1e-4
-) -> Signals:
+) -> Stretch:
     """The lift from `start` to `end` [s], from a state or from rest, its position measured with white noise [m]."""
     delay = model.value("measurement_delay.delay")
     free = model.without("measurement_delay")
@@ -80,4 +43,4 @@ def at_work(
     forcing = 6.0 * np.cos(2.0 * np.pi * 1.4 * known)
     run = simulate(free, time, zero_order_hold(known, command), spline(known, forcing), state)
     measured = run.output + noise * np.random.default_rng(seed).standard_normal(len(time))
-    return Signals(time, command[50:], forcing[50:], time + delay, measured, run.states[-1])
+    return Stretch(time, command[50:], forcing[50:], time + delay, measured, run.states[-1])

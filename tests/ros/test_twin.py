@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
-from live_machine import CHANGED, EXCITATION, LIFT, Signals, at_work
+from live_machine import CHANGED, EXCITATION, LIFT, at_work
+from machines_at_work import Stretch
 from robots.mujoco_lift import EFFECTS, Machine
 from sensor_msgs.msg import JointState
 
@@ -36,7 +37,7 @@ forcing: {topic: /lift/pump, field: wrench.force.z}
 pytestmark = pytest.mark.timeout(200)
 
 
-def known(folder: Path) -> Signals:
+def known(folder: Path) -> Stretch:
     """Leave a model and a calibration of the healthy lift in a folder; what it was learnt from."""
     (folder / "lift.yaml").write_text(LIFT)
     signals = at_work(Model.from_text(LIFT, catalogue=load_catalogue()), 0.0, HEALTHY + 1.5)

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from live_machine import CHANGED, LIFT, RATE, Signals, at_work
+from live_machine import CHANGED, LIFT, at_work
+from machines_at_work import RATE, Stretch
 
 from rhythmid.commands.watch import watch
 from rhythmid.elements.catalogue import load_catalogue
@@ -28,7 +29,7 @@ SETTINGS = Settings(healthy=HEALTHY)
 model = lru_cache(lambda: Model.from_text(LIFT, catalogue=load_catalogue()))
 
 
-def feed(twin: Twin, signals: Signals, step: int = 250) -> list[Status]:
+def feed(twin: Twin, signals: Stretch, step: int = 250) -> list[Status]:
     """What a twin says of signals that come in `step` samples at a time."""
     said = []
     for first in range(0, len(signals.time), step):
@@ -40,7 +41,7 @@ def feed(twin: Twin, signals: Signals, step: int = 250) -> list[Status]:
 
 
 @lru_cache
-def learnt() -> tuple[Calibration, Signals]:
+def learnt() -> tuple[Calibration, Stretch]:
     """A calibration of the healthy machine, and what it was learnt from."""
     signals = at_work(model(), 0.0, HEALTHY + 1.5)
     twin = Twin(model(), SETTINGS)
@@ -132,7 +133,7 @@ def test_a_machine_that_the_model_does_not_describe_or_that_rests_is_refused():
     alien = model().with_values({"linear_spring.stiffness": 100.0})
     with pytest.raises(InputError, match="none of this machine|diverges"):
         feed(Twin(alien, SETTINGS), signals)
-    quiet = Signals(
+    quiet = Stretch(
         signals.time,
         0 * signals.command,
         0 * signals.forcing,
