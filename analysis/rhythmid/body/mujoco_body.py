@@ -217,7 +217,7 @@ class MujocoBody(Body):
         return np.concatenate([[mass], mass * centre, np.diag(about), sides])
 
     def _along(self, model: Any, data: Any, position: Array, velocity: Array, acceleration: Array) -> Array:
-        from rhythmid.body.library import inverse_along
+        from rhythmid.body.libmujoco import inverse_along
 
         mj = mujoco()
         model.opt.disableflags |= int(mj.mjtDisableBit.mjDSBL_CONSTRAINT)  # contacts, limits

@@ -168,7 +168,7 @@ def generate(paths: dict[str, Model]) -> tuple[Module, Layout]:
             "import math",
             "",
             "from numba import njit",
-            "from rhythmid.body.library import mj_step",
+            "from rhythmid.body.libmujoco import mj_step",
             "from rhythmid.body.past import earlier",
             *(f"from {module.name} import {name}" for name, module in kernels.items()),
             "",

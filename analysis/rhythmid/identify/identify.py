@@ -1,10 +1,10 @@
 """Identify a model and its delays from records: by joint maximum likelihood, with the paper's method beside it."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,9 @@ from rhythmid.identify.inner_delays import dead_times
 from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit
 from rhythmid.identify.large_shifts import large_shifts
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
-from rhythmid.identify.paper_conditions import LEAKAGE, lacks_paper_method, lacks_transfer_functions
+from rhythmid.identify.paper_conditions import lacks_paper_method, lacks_transfer_functions
 from rhythmid.identify.paper_delays import combined, paper_delays
+from rhythmid.identify.paper_quality import MISFIT, notes_of, quality_of
 from rhythmid.identify.plausibility import SHIFTED, check_plausible, shift
 from rhythmid.identify.timing import compensated, measurement_jitter
 from rhythmid.ltp.harmonic_estimate import HarmonicEstimates
@@ -46,7 +47,6 @@ SOURCES = {
     "stated formula": "the forcing stated by its formula",
     "model": "the model's periodic_forcing, which was not recorded,",
 }
-MISFIT = 0.1  # of the magnitudes above which the fit is called into question
 
 
 def paper_hopper() -> Model:
@@ -270,9 +270,9 @@ def _by_paper(seen: _Seen, htf: HtfMethod, method: Method) -> Identification:
         fitted = with_delays(fitted, delays.sum.value or 0.0, 0.0)
     nrmse = _nrmse(fitted, records, results)
     cautions = seen.judged(fitted, parameters, delays, None, nrmse)
-    notes = tuple(note for result, one in zip(results, records) for note in _notes(one, result))
+    notes = tuple(note for result, one in zip(results, records) for note in notes_of(one, result))
     return Identification(
-        fitted, records, parameters, delays, seen.shown("paper", htf), results, _quality(nrmse, records, results),
+        fitted, records, parameters, delays, seen.shown("paper", htf), results, quality_of(nrmse, records, results),
         notes, cautions=cautions,
     )  # fmt: skip
 
@@ -309,7 +309,7 @@ def _by_likelihood(
         for name in own
     }
     jitter = measurement_jitter(fit)
-    quality = _quality(fit.nrmse(), records, paper) | {
+    quality = quality_of(fit.nrmse(), records, paper) | {
         "unexplained_response": joint.search.response,
         "noise_std": math.sqrt(fit.noise.variance * fit.run.series[0].block),
         "measurement_jitter": jitter.to_dict(),
@@ -331,7 +331,7 @@ def _by_likelihood(
         )
     shown = seen.shown("joint", htf)
     results = paper if shown.paper else (None,) * len(records)
-    notes += tuple(note for result, one in zip(results, records) for note in _notes(one, result))
+    notes += tuple(note for result, one in zip(results, records) for note in notes_of(one, result))
     return Identification(
         fit.model, records, parameters, delays, shown, paper, quality, notes, joint, cautions,
     )  # fmt: skip
@@ -353,27 +353,6 @@ def _harmonics(result: PaperResult, method: HtfMethod) -> HarmonicEstimates:
     return harmonic_transfer_functions(result.spectra, result.fit.linearised.cycle.ring_down, method)
 
 
-def _notes(record: Record, result: PaperResult | None) -> Iterator[str]:
-    """What should make a user doubt the record, or the paper's method where its `result` is shown."""
-    yield from (f"{record.name}: {note}" for note in record.quality.notes)
-    if result is None:
-        return
-    window, operator = result.spectra.window, result.estimate.operator
-    if window.leakage > LEAKAGE:
-        yield (
-            f"{record.name}: the command does not repeat over whole pumping periods, so its response leaks "
-            f"({window.leakage:.0%}): begin with a warm-up repetition, or leave silence at both ends"
-        )
-    apart = operator.spacing * operator.spectra.resolution
-    if apart * np.pi * result.fit.linearised.cycle.ring_down > 1.0:
-        yield (
-            f"{record.name}: the excited frequencies are {apart:.3g} Hz apart, wider than the machine's resonance: HTFs "
-            "between them are interpolated; excite denser lines"
-        )
-    if result.fit.misfit > MISFIT:
-        yield f"{record.name}: the model leaves {result.fit.misfit:.0%} of the HTFs' magnitudes unexplained"
-
-
 def _nrmse(model: Model, records: Sequence[Record], results: Sequence[PaperResult]) -> float:
     """Largest free-run NRMSE of a model that starts on its limit cycle."""
     nrmse = 0.0
@@ -382,22 +361,3 @@ def _nrmse(model: Model, records: Sequence[Record], results: Sequence[PaperResul
         begin = (record.output.time[0] - delay - result.pumping.origin) % result.pumping.period
         nrmse = max(nrmse, free_run_nrmse(own_model(model, record), record, cycle.path(begin)))
     return nrmse
-
-
-def _quality(nrmse: float, records: Sequence[Record], results: Sequence[PaperResult]) -> dict[str, Any]:
-    channels = [record.quality for record in records]
-    quality = {
-        "rate": 1.0 / records[0].output.period,
-        "gaps": sum(q.gaps for q in channels if q.channels),
-        "jitter_std": max((q.jitter_std for q in channels if q.channels), default=0.0),
-        "nrmse": nrmse,
-    }
-    if not results:
-        return quality
-    first = results[0]
-    return quality | {
-        "periods": first.spectra.window.periods,
-        "leakage": first.spectra.window.leakage,
-        "smoothing_window": first.estimate.operator.window,
-        "smoothing_loss": {f"{m:+d}": float(v) for m, v in zip(first.estimate.htf.harmonics, first.loss)},
-    }

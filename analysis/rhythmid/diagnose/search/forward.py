@@ -189,27 +189,11 @@ def search(
         count = REFITTED if not best.added else REFITTED - 1
         proposals, enough = _proposals(here.model, replace(now, added=here.added), count, here.chi2)
         tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
-        found, failed = run_trials(
-            proposals,
-            series,
-            here.starts,
-            current.run.compiled.layout.states,
-            here.noise,
-            step,
-            enough,
-            tell=tell,
-        )
+        begun = series, here.starts, current.run.compiled.layout.states, here.noise, step
+        found, failed = run_trials(proposals, *begun, enough, tell=tell)
         if not best.added and nominal.nrmse() > FOLLOWS:
             proposals = _from_given(nominal, given, catalogue, here.chi2, pool)
-            others, failed_too = run_trials(
-                proposals,
-                series,
-                here.starts,
-                current.run.compiled.layout.states,
-                here.noise,
-                step,
-                tell=tell,
-            )
+            others, failed_too = run_trials(proposals, *begun, tell=tell)
             found, failed = _better_of([*found, *others]), failed + failed_too
         excluded += failed
         found = [t for t in found if t.chi2 < here.chi2]  # a richer model that does worse got lost
