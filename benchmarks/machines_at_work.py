@@ -101,8 +101,18 @@ class Stretch:
 
     def then(self, other: Stretch) -> Stretch:
         """These and what follows, whose first sample is the last of these."""
-        arrays = [np.concatenate([a[:-1], b]) for a, b in zip(vars(self).values(), vars(other).values())]
-        return Stretch(*arrays[:-1], other.end)
+
+        def joined(name: str) -> Array:
+            return np.concatenate([getattr(self, name)[:-1], getattr(other, name)])
+
+        return Stretch(
+            joined("time"),
+            joined("command"),
+            joined("forcing"),
+            joined("stamp"),
+            joined("measured"),
+            other.end,
+        )
 
 
 class Operation:

@@ -52,12 +52,9 @@ def spent_words(elapsed: float, seconds: float) -> str:
 
 
 @contextmanager
-def progress(
-    console: Console, budget: float | None = None, log: bool = True, patience: float = 0.0
-) -> Iterator[Tell]:
+def progress(console: Console, budget: float | None = None, log: bool = True) -> Iterator[Tell]:
     """While this is open, what is told stands in a line with the time since it was opened, and with a `budget` [s] the share of
-    it that is spent. With `log` each thing that was told is also printed, with the time at which it began, once `patience` [s] are
-    over: short work prints nothing."""
+    it that is spent. With `log` each thing that was told is also printed, with the time at which it began."""
     columns: list[ProgressColumn] = [
         SpinnerColumn(table_column=Column(min_width=1)),
         TimeElapsedColumn(table_column=Column(min_width=len("0:00:00"))),
@@ -70,7 +67,7 @@ def progress(
     began = time.monotonic()
 
     def printed(what: str) -> None:
-        if log and time.monotonic() - began >= patience:
+        if log:
             console.print(f"[dim]{time.monotonic() - began:6.1f} s  {escape(what)}[/]")
 
     if not console.is_interactive:  # a bar would leave an empty line there

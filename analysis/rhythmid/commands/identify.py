@@ -16,8 +16,6 @@ EXAMPLES = (
     "rhythmid identify bag --quiet --json -",
 )
 
-LONG = 2.0  # s, from which on an identification says what it is at
-
 
 def identify(
     bags: Bags,
@@ -94,7 +92,7 @@ def identify(
         )
     known = None if model is None else Model.load(model, load_catalogue(elements or ()))
     terminal = Terminal(quiet, json)
-    with progress(terminal.progress, patience=LONG) as tell:
+    with progress(terminal.progress) as tell:
         records = load_records(bags, signals, tell)
         path = "clock_unknown" if offset is not None else cast(Forcing | None, forcing)
         found = find(

@@ -178,8 +178,7 @@ def _identified(
     nominal = with_declared(model or paper_hopper(), given)
     pumpings: list[Pumping] = []
     results: list[PaperResult | str] = []
-    tell("transfer functions, record by record")
-    for record in counted(given, len(given), "records", tell):
+    for record in counted(given, len(given), "transfer functions, record by record", tell):
         own, pumping = forced_by(own_model(nominal, record), record)
         pumpings.append(pumping)
         try:

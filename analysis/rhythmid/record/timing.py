@@ -11,9 +11,10 @@ GAP = 1.5  # periods between two samples, beyond which at least one is missing
 LATE = 10.0  # periods by which a message may arrive late and still be put back in order
 SAME = 1e-9  # seconds; times that differ by less are one
 OFTEN = 0.1  # share of steps longer than 1.5 periods, beyond which a channel is not periodic
-NEIGHBOURS = (
-    25  # samples on either side, beyond twice as many as may be missing, whose stamps tell whether any is
-)
+# samples on either side, beyond twice as many as may be missing, whose stamps tell whether any is
+NEIGHBOURS = 25
+# steps over which the period is read off in turn, up to about NEIGHBOURS, over which it must not drift
+SPANS = (1, 2, 4, 8, 16, 32)
 FULL = 0.5  # of the periods missing, by which the earliest sample after a gap is late,
 AT_AN_END = 0.95  # and where so few samples are left that all of them may have come late by jitter
 
@@ -106,18 +107,25 @@ def gaps_between(time: Times) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 def nominal_period(step: Times) -> float:
     """Nominal period from the positive times between samples [s].
 
-    The median, refined by the mean of all steps within half of it (times that were rounded to, say, a millisecond
-    have a median that is off by up to half of one), and rounded to whole nanoseconds, the resolution of stamps;
-    not rounded where the steps are even and the rounding would lead away from them.
+    The median, refined over 1, 2, 4, ... steps by the mean of those spans that lie within half a period of so many periods: what
+    jitter and rounding do to a period falls with the length of the span, and spans in which a sample is missing are left out.
+    Rounded to whole nanoseconds, the resolution of stamps; not where the steps are even and the rounding would lead away from them.
     """
-    median = float(
+    period = float(
         np.percentile(step, 50.0, method="lower")
     )  # a step that occurs, where steps are of two kinds
-    near = step[np.abs(step - median) < 0.5 * median]
-    mean = float(np.mean(near))
-    whole = round(mean * 1e9) * 1e-9
-    even = float(np.abs(near - mean).max()) < 2.0 * SAME
-    return mean if whole == 0.0 or (even and abs(whole - mean) * len(step) > 0.5 * SAME) else whole
+    time = np.concatenate([[0.0], np.cumsum(step)])
+    even = False
+    for steps in (count for count in SPANS if count <= len(step)):
+        span = time[steps:] - time[:-steps]
+        near = span[np.abs(span - steps * period) < 0.5 * period]
+        if len(near) == 0:
+            break
+        period = float(np.mean(near)) / steps
+        if steps == 1:
+            even = float(np.abs(near - period).max()) < 2.0 * SAME
+    whole = round(period * 1e9) * 1e-9
+    return period if whole == 0.0 or (even and abs(whole - period) * len(step) > 0.5 * SAME) else whole
 
 
 def put_in_order(time: Times, label: str, mend: str) -> NDArray[np.int64]:
