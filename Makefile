@@ -5,9 +5,11 @@ BIN    := $(VENV)/bin
 
 PACKAGES := analysis $(patsubst %/setup.py,%,$(wildcard ros_ws/src/*/setup.py))
 METADATA := $(wildcard $(foreach package,$(PACKAGES),$(addprefix $(package)/,*.py *.cfg *.toml *.xml launch/* config/* layouts/*)))
+UPLOT    := analysis/rhythmid/report/vendor/uplot
+UPLOT_VERSION := 1.6.32
 
 .DEFAULT_GOAL := help
-.PHONY: help install test lint format demo picture benchmark naming docker dist lock clean
+.PHONY: help install test lint format demo picture benchmark naming docker dist vendor lock clean
 
 help: ## Show this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -72,6 +74,13 @@ dist: install ## Build the package's wheel and sdist into dist/ and check them
 	$(BIN)/python -m pip install --quiet build twine
 	$(BIN)/python -m build --outdir dist analysis
 	$(BIN)/python -m twine check --strict dist/*
+
+vendor: ## Fetch the library that draws the figures of reports (needs npm)
+	cd $(UPLOT) && npm pack --silent uplot@$(UPLOT_VERSION) && \
+		tar --extract --gzip --file uplot-$(UPLOT_VERSION).tgz --no-same-owner --strip-components 1 package/LICENSE && \
+		tar --extract --gzip --file uplot-$(UPLOT_VERSION).tgz --no-same-owner --strip-components 2 \
+			package/dist/uPlot.iife.min.js package/dist/uPlot.min.css && \
+		rm uplot-$(UPLOT_VERSION).tgz
 
 lock: install ## Resolve the requirements anew into requirements.lock
 	$(BIN)/python -m pip install --quiet uv

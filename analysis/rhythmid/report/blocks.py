@@ -7,6 +7,7 @@ from html import escape
 from typing import Union
 
 from rhythmid.report.chart import Chart, draw
+from rhythmid.report.live import FEWEST, chart_data
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ class Drawing:
     """An SVG drawing made by this package, with what to see in it.
 
     `legend` are (style, label) pairs; a style that begins with "square " or "circle " is shown as a mark, others as a line.
+    The page's script draws the `chart`, where there is one, in place of the drawing.
     """
 
     title: str
@@ -68,6 +70,7 @@ class Drawing:
     caption: str
     legend: tuple[tuple[str, str], ...] = ()
     wide: bool = False
+    chart: Chart | None = None
 
 
 @dataclass(frozen=True)
@@ -110,13 +113,25 @@ class Section:
     blocks: tuple[Block, ...] = field(default=())
 
 
-def drawing(title: str, chart: Chart, caption: str) -> Drawing:
+def drawing(title: str, chart: Chart, caption: str, wide: bool = False) -> Drawing:
     """A chart as a block."""
-    return Drawing(title, draw(chart), caption, chart.legend)
+    return Drawing(title, draw(chart), caption, chart.legend, wide, chart)
 
 
-def markup(block: Block) -> str:
-    """HTML of one block."""
+def charts_of(blocks: Sequence[Block]) -> list[Chart]:
+    """All charts among the blocks, in order."""
+    found: list[Chart] = []
+    for block in blocks:
+        match block:
+            case Drawing(chart=Chart() as chart):
+                found.append(chart)
+            case Columns(inner) | Fold(_, inner):
+                found += charts_of(inner)
+    return found
+
+
+def markup(block: Block, most: int = FEWEST) -> str:
+    """HTML of one block; curves of its charts have `most` points at most."""
     match block:
         case Paragraph(text, kind):
             return f'<p class="{kind}">{words(text)}</p>' if kind else f"<p>{words(text)}</p>"
@@ -129,14 +144,14 @@ def markup(block: Block) -> str:
         case Table():
             return _table(block)
         case Drawing():
-            return _figure(block)
+            return _figure(block, most)
         case Code(label, text):
             return f'<p class="code-label">{escape(label)}</p><pre tabindex="0"><code>{escape(text)}</code></pre>'
         case Columns(blocks):
-            return f'<div class="columns">{joined(blocks)}</div>'
+            return f'<div class="columns">{joined(blocks, most)}</div>'
         case Fold(summary, blocks, opened):
             state = " open" if opened else ""
-            return f"<details{state}><summary>{escape(summary)}</summary>{joined(blocks)}</details>"
+            return f"<details{state}><summary>{escape(summary)}</summary>{joined(blocks, most)}</details>"
         case Heading(text):
             return f"<h3>{escape(text)}</h3>"
 
@@ -152,9 +167,9 @@ def formula(text: str) -> str:
     return re.sub(r"\^\{([^{}]*)\}", r"<sup>\1</sup>", safe)
 
 
-def joined(blocks: Sequence[Block]) -> str:
+def joined(blocks: Sequence[Block], most: int = FEWEST) -> str:
     """HTML of blocks, one after another."""
-    return "\n".join(map(markup, blocks))
+    return "\n".join(markup(block, most) for block in blocks)
 
 
 def _tile(tile: Tile) -> str:
@@ -189,14 +204,17 @@ def _swatch(style: str) -> str:
     return f'<path class="line {style}" d="M1 5H21"/>'
 
 
-def _figure(figure: Drawing) -> str:
+def _figure(figure: Drawing, most: int) -> str:
     legend = "".join(
         f'<li><svg viewBox="0 0 22 10" aria-hidden="true">{_swatch(style)}</svg>{escape(label)}</li>'
         for style, label in figure.legend
     )
     listed = f'<ul class="legend">{legend}</ul>' if legend else ""
     wide = ' class="wide"' if figure.wide else ""
+    data = ""
+    if figure.chart is not None and figure.chart.curves:
+        data = f'<script type="application/json">{chart_data(figure.chart, most)}</script>'
     return (
         f'<figure{wide}><p class="figure-title">{escape(figure.title)}</p>{listed}{figure.svg}'
-        f"<figcaption>{escape(figure.caption)}</figcaption></figure>"
+        f"<figcaption>{words(figure.caption)}</figcaption>{data}</figure>"
     )

@@ -13,6 +13,7 @@ from rhythmid.report.quantity import number
 Array = NDArray[np.float64]
 WIDTH, HEIGHT = 400.0, 250.0  # small enough that text stays readable when a phone shrinks the drawing
 LEFT, RIGHT, TOP, BOTTOM = 54.0, 12.0, 26.0, 42.0
+MOST_OF_PATH = 1500  # points of a path that are drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +33,9 @@ class Curve:
 class Chart:
     """Curves over one pair of axes.
 
-    `x_range` is what the data span unless given. `shaded` are stretches (from, to) of x, `levels` horizontal lines (y, label), `alt` what the chart shows in words for
-    who cannot see it.
+    `x_range` is what the data span unless given. `shaded` are stretches (from, to) of x, `levels` horizontal lines (y, label),
+    `uprights` vertical ones (x, label), `alt` what the chart shows in words for who cannot see it. Charts with the same `link`
+    show the same range of x. A `path` is a curve whose x need not grow, such as an orbit.
     """
 
     alt: str
@@ -46,6 +48,9 @@ class Chart:
     levels: tuple[tuple[float, str], ...] = ()
     from_zero: bool = False
     x_range: tuple[float, float] | None = None
+    uprights: tuple[tuple[float, str], ...] = ()
+    link: str = ""
+    path: bool = False
 
     @property
     def legend(self) -> tuple[tuple[str, str], ...]:
@@ -123,19 +128,32 @@ def extent(values: Sequence[Array], log: bool = False, from_zero: bool = False) 
     )
 
 
+def x_extent(chart: Chart) -> tuple[float, float]:
+    """Range of x that shows the whole chart."""
+    shown = [c for c in chart.curves if len(c.x)]
+    if chart.x_range is not None:
+        return chart.x_range
+    given = [*(c.x for c in shown), *(np.array([x]) for x, _ in chart.uprights)]
+    if chart.x_log or chart.path or not shown:
+        return extent(given, chart.x_log)
+    low, high = float(min(map(np.min, given))), float(max(map(np.max, given)))  # fill the width
+    low = 0.0 if 0.0 < low < 0.1 * high else low
+    return (low, high) if high > low else (low, low + 1.0)
+
+
+def y_extent(chart: Chart) -> tuple[float, float]:
+    """Range of y that shows the whole chart."""
+    heights = [part for c in chart.curves for part in (c.y, c.low, c.high) if part is not None]
+    return extent(
+        [*heights, *(np.array([level]) for level, _ in chart.levels)], chart.y_log, chart.from_zero
+    )
+
+
 def draw(chart: Chart) -> str:
     """The chart as an SVG element."""
     shown = [c for c in chart.curves if len(c.x)]
-    x_low, x_high = extent([c.x for c in shown], chart.x_log)
-    if shown and not chart.x_log:  # time and frequency fill the width
-        x_low, x_high = float(min(np.min(c.x) for c in shown)), float(max(np.max(c.x) for c in shown))
-        x_low = 0.0 if 0.0 < x_low < 0.1 * x_high else x_low
-        if x_high <= x_low:
-            x_high = x_low + 1.0
-    x_low, x_high = chart.x_range or (x_low, x_high)
-    heights = [part for c in shown for part in (c.y, c.low, c.high) if part is not None]
-    heights += [np.array([level]) for level, _ in chart.levels]
-    y_low, y_high = extent(heights, chart.y_log, chart.from_zero)
+    x_low, x_high = x_extent(chart)
+    y_low, y_high = y_extent(chart)
     x = Axis(x_low, x_high, LEFT, WIDTH - RIGHT, chart.x_log)
     y = Axis(y_low, y_high, HEIGHT - BOTTOM, TOP, chart.y_log)
     parts = [opening(WIDTH, HEIGHT, chart.alt), *frame(x, y, chart.x_label, chart.y_label)]
@@ -146,7 +164,15 @@ def draw(chart: Chart) -> str:
             f'height="{HEIGHT - BOTTOM - TOP:.1f}"/>'
         )
     for curve in shown:
-        parts.append(_curve(curve, x, y))
+        parts.append(_path(curve, x, y) if chart.path else _curve(curve, x, y))
+    for place, label in chart.uprights:
+        at = float(x(place))
+        parts.append(f'<line class="level" x1="{at:.1f}" x2="{at:.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>')
+        end = at > WIDTH / 2
+        parts.append(
+            f'<text class="note" x="{at + (-4 if end else 4):.1f}" y="{TOP + 11}" text-anchor="{"end" if end else "start"}">'
+            f"{escape(label)}</text>"
+        )
     for level, label in chart.levels:
         at = float(y(level))
         parts.append(f'<line class="level" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{at:.1f}" y2="{at:.1f}"/>')
@@ -226,6 +252,15 @@ def _curve(curve: Curve, x: Axis, y: Axis) -> str:
         else:
             parts.append(f'<path class="line {curve.style}{dash}" d="M{_points(across, up)}"/>')
     return "".join(parts)
+
+
+def _path(curve: Curve, x: Axis, y: Axis) -> str:
+    """An orbit, thinned to what can be told apart on paper."""
+    dash = " dashed" if curve.dashed else ""
+    kept = np.isfinite(curve.x) & np.isfinite(curve.y)
+    stride = max(1, int(kept.sum()) // MOST_OF_PATH)
+    points = _points(x(curve.x[kept][::stride]), y(curve.y[kept][::stride]))
+    return f'<path class="line {curve.style}{dash}" d="M{points}"/>' if points else ""
 
 
 def _unbroken(known: NDArray[np.bool_]) -> list[slice]:

@@ -1,5 +1,10 @@
-"""A report as one self-contained HTML page: no script, nothing fetched, readable on a phone, in print, light and dark."""
+"""A report as one self-contained HTML page: nothing fetched, readable on a phone, in print, light and dark, and without scripts.
 
+Its figures are drawings; a script of the page, which the page names by its hash, puts plots in their places that can be zoomed.
+"""
+
+import base64
+import hashlib
 import re
 from dataclasses import dataclass
 from html import escape
@@ -9,10 +14,18 @@ from typing import Literal
 
 from rhythmid import __version__
 from rhythmid.output import write_text
-from rhythmid.report.blocks import Section, Tiles, joined, markup
+from rhythmid.report.blocks import Section, Tiles, charts_of, joined, markup
+from rhythmid.report.live import most_points
 
 Tone = Literal["good", "found", "open", "plain"]
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+STYLES = ("vendor/uplot/uPlot.min.css", "style.css")
+DRAWN_BY = " Figures by uPlot, © Leon Sorokin, MIT licence."
+HINT = (
+    '<p class="hint screen">Figures: drag to zoom, double-click to show all, press a name in a legend to hide its curve. '
+    '<button type="button" class="drawings" aria-pressed="false" hidden>Drawings instead of plots</button></p>'
+)
+SCRIPTS = ("vendor/uplot/uPlot.iife.min.js", "live.js")  # in the order in which they run
 
 
 @dataclass(frozen=True)
@@ -34,7 +47,10 @@ class Page:
 
 def render(page: Page) -> str:
     """The page as HTML text."""
-    style = files("rhythmid.report").joinpath("style.css").read_text(encoding="utf-8")
+    style = "\n".join(map(_file, STYLES))
+    charts = charts_of([block for section in page.sections for block in section.blocks])
+    most = most_points(charts)
+    scripts = [_file(name) for name in SCRIPTS] if charts else []
     names = _anchors([section.title for section in page.sections])
     contents = "".join(
         f'<li><a href="#{name}">{escape(section.title)}</a></li>'
@@ -42,7 +58,7 @@ def render(page: Page) -> str:
     )
     body = "\n".join(
         f'<section id="{name}" aria-labelledby="{name}-title"><h2 id="{name}-title">{escape(section.title)}</h2>\n'
-        f"{joined(section.blocks)}\n</section>"
+        f"{joined(section.blocks, most)}\n</section>"
         for name, section in zip(names, page.sections)
     )
     return f"""<!DOCTYPE html>
@@ -50,7 +66,7 @@ def render(page: Page) -> str:
 <head>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="{POLICY}">
+<meta http-equiv="Content-Security-Policy" content="{_policy(scripts)}">
 <meta name="color-scheme" content="light dark">
 <meta name="generator" content="rhythmid {escape(__version__)}">
 <title>{escape(page.title)}</title>
@@ -68,13 +84,29 @@ def render(page: Page) -> str:
 {markup(page.tiles) if page.tiles.items else ""}
 </header>
 <nav aria-label="Contents"><ol>{contents}</ol></nav>
+{HINT if charts else ""}
 <main id="report">
 {body}
 </main>
-<footer><p>rhythmid {escape(__version__)}. Intervals are 95 % unless said otherwise.</p></footer>
+<footer><p>rhythmid {escape(__version__)}. Intervals are 95 % unless said otherwise.{DRAWN_BY if charts else ""}</p></footer>
+{"".join(f"<script>{script}</script>" for script in scripts)}
 </body>
 </html>
 """
+
+
+def _file(name: str) -> str:
+    return files("rhythmid.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _policy(scripts: list[str]) -> str:
+    """What the page may do: run these scripts and no other, fetch nothing."""
+    hashes = [
+        base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+        for script in scripts
+    ]
+    allowed = " ".join(f"'sha256-{value}'" for value in hashes)
+    return f"{POLICY}; script-src {allowed}" if allowed else POLICY
 
 
 def write_page(path: Path, page: Page) -> None:

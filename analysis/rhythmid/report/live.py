@@ -1,0 +1,156 @@
+"""A chart's data as the page's script reads them: compact, and no more of them than a page should weigh."""
+
+import base64
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.report.chart import Chart, Curve, x_extent, y_extent
+
+Array = NDArray[np.float64]
+BUDGET = 700_000  # bytes that the curves of all charts of a page take at most, or so
+VALUE = 2.7  # bytes of one value: two, in base 64
+FEWEST = 400  # points of a curve that are always kept: about one for each pixel of a phone
+MISSING = 65535  # stands for a value that is not known
+LEVELS = 65534.0  # steps in which a curve's range is stored, far finer than a screen shows
+UNEVEN = 1e-6  # of a step, by which samples may be off an even grid
+
+
+def most_points(charts: Sequence[Chart], budget: float = BUDGET) -> int:
+    """Points that a curve may have for all charts to keep within the budget [bytes]; longer curves are thinned."""
+    sizes = [len(curve.x) for chart in charts for curve in chart.curves for _ in _parts(curve)]
+    if VALUE * sum(sizes) <= budget:
+        return max(sizes, default=FEWEST)
+    low, high = FEWEST, max(sizes)
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (
+            (middle, high) if VALUE * sum(min(n, middle) for n in sizes) <= budget else (low, middle)
+        )
+    return low
+
+
+def chart_data(chart: Chart, most: int) -> str:
+    """The chart as JSON that is safe within a script element; `most` is the number of points that a curve may have."""
+    curves = _as_paths(chart, most) if chart.path else _over_common_x(chart, most)
+    told = {
+        "alt": chart.alt,
+        "path": chart.path,
+        "link": chart.link,
+        "x": {"label": chart.x_label, "log": chart.x_log, "range": x_extent(chart)},
+        "y": {
+            "label": chart.y_label,
+            "log": chart.y_log,
+            "range": y_extent(chart),
+            "zero": chart.from_zero,
+        },
+        "shaded": chart.shaded,
+        "levels": chart.levels,
+        "uprights": chart.uprights,
+        **curves,
+    }
+    text = json.dumps(told, separators=(",", ":"), allow_nan=False)
+    # what a name from a recording holds can neither end the element nor begin a comment
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _parts(curve: Curve) -> list[Array]:
+    """What is stored of a curve besides x."""
+    return [part for part in (curve.y, curve.low, curve.high) if part is not None]
+
+
+def _over_common_x(chart: Chart, most: int) -> dict[str, Any]:
+    shown = [curve for curve in chart.curves if len(curve.x)]
+    if not shown:
+        return {"xs": _grid(np.empty(0)), "curves": []}
+    same = all(np.array_equal(curve.x, shown[0].x) for curve in shown)
+    x = shown[0].x if same else np.unique(np.concatenate([curve.x for curve in shown]))
+
+    def stored(curve: Curve, part: Array | None) -> dict[str, Any] | None:
+        if part is None:
+            return None
+        values = part if same else np.interp(x, curve.x, part, left=np.nan, right=np.nan)
+        return _values(_extremes(values, most), chart.y_log)
+
+    return {
+        "xs": _grid(_thinned(x, most)),
+        "curves": [
+            _name(curve)
+            | {
+                "y": stored(curve, curve.y),
+                "low": stored(curve, curve.low),
+                "high": stored(curve, curve.high),
+            }
+            for curve in shown
+        ],
+    }
+
+
+def _as_paths(chart: Chart, most: int) -> dict[str, Any]:
+    made = []
+    for curve in chart.curves:
+        stride = max(1, -(-len(curve.x) // most))
+        made.append(_name(curve) | {"x": _values(curve.x[::stride]), "y": _values(curve.y[::stride])})
+    return {"curves": made}
+
+
+def _name(curve: Curve) -> dict[str, Any]:
+    return {"label": curve.label, "style": curve.style, "dashed": curve.dashed}
+
+
+def _edges(count: int, most: int) -> NDArray[np.int64]:
+    """Where the stretches begin of which two points are kept each; the last is `count`."""
+    return np.linspace(0, count, max(most // 2, 1) + 1).astype(np.int64)
+
+
+def _thinned(x: Array, most: int) -> Array:
+    """The points at which thinned curves are stored, two in every stretch."""
+    if len(x) <= most:
+        return x
+    edges = _edges(len(x), most)
+    width = np.diff(edges)
+    return np.ravel(np.stack([x[edges[:-1] + width // 4], x[edges[:-1] + (3 * width) // 4]], axis=1))
+
+
+def _extremes(y: Array, most: int) -> Array:
+    """The smallest and the largest value of every stretch, in the order in which they came."""
+    if len(y) <= most:
+        return y
+    edges = _edges(len(y), most)
+    kept = []
+    for begin, end in zip(edges[:-1], edges[1:]):
+        piece = y[begin:end]
+        if np.isnan(piece).all():
+            kept += [np.nan, np.nan]
+            continue
+        low, high = sorted((int(np.nanargmin(piece)), int(np.nanargmax(piece))))
+        kept += [piece[low], piece[high]]
+    return np.array(kept)
+
+
+def _grid(x: Array) -> dict[str, Any]:
+    """Points that grow: first and step where they are even, single precision where they are not."""
+    step = (x[-1] - x[0]) / (len(x) - 1) if len(x) > 1 else 0.0
+    if len(x) > 1 and np.max(np.abs(x - x[0] - step * np.arange(len(x)))) < UNEVEN * step:
+        return {"count": len(x), "first": float(x[0]), "step": float(step)}
+    first = float(x[0]) if len(x) else 0.0
+    return {"first": first, "float32": _base64((x - first).astype("<f4"))}
+
+
+def _values(y: Array, log: bool = False) -> dict[str, Any]:
+    """Values in 65534 steps between the smallest and the largest, of their logarithms where `log`."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        y = np.log10(y) if log else y
+    known = np.isfinite(y)
+    low, high = (float(y[known].min()), float(y[known].max())) if known.any() else (0.0, 0.0)
+    step = (high - low) / LEVELS or 1.0
+    steps = np.full(len(y), MISSING, dtype="<u2")
+    steps[known] = np.rint((y[known] - low) / step).astype("<u2")
+    return {"low": low, "step": step, "log": log, "uint16": _base64(steps)}
+
+
+def _base64(values: NDArray[Any]) -> str:
+    return base64.b64encode(values.tobytes()).decode("ascii")
