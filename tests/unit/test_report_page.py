@@ -1,7 +1,11 @@
 """Pages: self-contained, safe, complete, whatever the diagnosis found."""
 
+import base64
+import hashlib
+import json
 import re
 from html.parser import HTMLParser
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -73,13 +77,38 @@ def test_tags_are_balanced_and_headings_in_order(html: str) -> None:
     assert all(after - before <= 1 for before, after in zip(levels, levels[1:]))
 
 
-def test_nothing_is_fetched_and_nothing_runs(html: str) -> None:
-    outline = Outline(html)
-    assert not outline.all("script") and not outline.all("link") and not outline.all("iframe")
-    assert not re.search(r"https?://", html.replace("http://www.w3.org/2000/svg", ""))
+SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
+
+
+def test_nothing_is_fetched_and_only_the_packages_own_scripts_run(html: str) -> None:
+    outline, plain = Outline(html), SCRIPT.sub("", html)
+    assert not outline.all("link") and not outline.all("iframe")
+    assert not re.search(r"https?://", plain.replace("http://www.w3.org/2000/svg", ""))
     assert "url(" not in html and "@import" not in html
-    policy = next(m for m in outline.all("meta") if m.get("http-equiv") == "Content-Security-Policy")
-    assert "default-src 'none'" in str(policy["content"])
+    assert {one.get("type") for one in outline.all("script")} <= {None, "application/json"}
+    assert not [name for _, given in outline.tags for name in given if name.startswith("on")]
+    policy = str(
+        next(m for m in outline.all("meta") if m.get("http-equiv") == "Content-Security-Policy")["content"]
+    )
+    assert "default-src 'none'" in policy and "unsafe-eval" not in policy
+    allowed = re.search("script-src (.*)", policy)[1].split()
+    own = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in SCRIPT.findall(html)]
+    assert allowed == [f"'sha256-{value}'" for value in own] and len(own) == 2
+
+
+def test_every_figure_over_an_axis_brings_its_data_along(html: str) -> None:
+    charts = [json.loads(text) for text in re.findall('<script type="application/json">(.*?)</script>', html)]
+    assert charts and all(chart["curves"] and chart["alt"] for chart in charts)
+    assert all(chart["x"]["range"][0] < chart["x"]["range"][1] for chart in charts)
+    assert 'aria-hidden="true"' in html and "<noscript" not in html  # the drawings are there without scripts
+
+
+def test_the_page_names_the_library_that_draws_its_figures(html: str) -> None:
+    folder = files("rhythmid.report") / "vendor" / "uplot"
+    assert "uPlot, © Leon Sorokin, MIT" in html
+    assert "The MIT License" in (folder / "LICENSE").read_text(encoding="utf-8")
+    version = re.search(r"uPlot \((v[\d.]+)\)", (folder / "uPlot.iife.min.js").read_text(encoding="utf-8"))[1]
+    assert f"uPlot {version[1:]}" in (folder / "README.md").read_text(encoding="utf-8")
 
 
 def test_every_figure_says_what_to_see_in_it(html: str) -> None:
@@ -101,9 +130,9 @@ def test_links_lead_to_sections_with_distinct_names(html: str) -> None:
 def test_names_from_recordings_stay_text() -> None:
     told = result()
     told["next_experiment"] = told["excluded"][0] = EVIL
-    html = render(diagnosis_page(findings(told, name=EVIL)))
+    html = SCRIPT.sub("", render(diagnosis_page(findings(told, name=EVIL))))
     assert "<img" not in html
-    assert "&lt;img" in html
+    assert "&lt;img" in html and "\\u003cimg" in html  # as text, and as data
 
 
 @pytest.mark.parametrize(

@@ -5,13 +5,14 @@ from typing import Annotated
 
 import typer
 
-from rhythmid.commands.options import JsonFile, Quiet, SignalsFile
+from rhythmid.commands.options import JsonFile, Quiet, ReportFile, SignalsFile, command_line
 from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new, write_json
 
 EXAMPLES = (
     "rhythmid check bag",
     "rhythmid check run.csv --signals signals.yaml --json -",
+    "rhythmid check bag --report page.html",
 )
 
 
@@ -21,6 +22,7 @@ def check(
     ],
     signals: SignalsFile = None,
     json: JsonFile = None,
+    report: ReportFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Report data quality: topics, rates, gaps, duplicates, jitter, clock. Exit code 2 if it cannot be used."""
@@ -28,14 +30,20 @@ def check(
     from rhythmid.progress_bar import progress
     from rhythmid.record.bag_report import quality_report
 
-    require_new(json)
+    require_new(json, report)
     terminal = Terminal(quiet, json)
     with progress(terminal.progress, log=False) as tell:
         tell(f"reading {bag}")
-        report = quality_report(bag, signals)
-    for line in report.lines():
+        found = quality_report(bag, signals)
+    for line in found.lines():
         terminal.say(line)
     if json is not None:
-        write_json(json, report.to_dict())
-    if not report.usable:
-        raise InputError("; ".join(report.problems))
+        write_json(json, found.to_dict())
+    if report is not None:
+        from rhythmid.report.page import write_page
+        from rhythmid.report.recording import recording_page
+
+        write_page(report, recording_page(found.to_dict(), found.record, found.remarks, command_line()))
+        terminal.say(f"report: {report}")
+    if not found.usable:
+        raise InputError("; ".join(found.problems))

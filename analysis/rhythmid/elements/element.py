@@ -148,6 +148,8 @@ class Element:
     it on a grid as fine as the ticks of the last second of a record ask for. `history` names signals that a kernel is given, and
     wants as they were earlier, too, by the time that the parameter `dead_time` says; before a simulation's start they are what
     command and forcing were, with the machine's states led back along their first rates.
+    `switches` says where its force changes form: at the value of a parameter, its own or one that it borrows, of position "x" or
+    velocity "v"; at zero where that is "".
     """
 
     name: str
@@ -188,6 +190,7 @@ class Element:
     against: Against | None = None
     takes: str = ""
     clock: str = ""
+    switches: tuple[Literal["x", "v"], str] | None = None
     source: str = ""  # file that defines it
 
     def __post_init__(self) -> None:

@@ -5,10 +5,13 @@ import numpy as np
 from rhythmid.errors import InputError
 from rhythmid.identify.identification import Identification
 from rhythmid.identify.joint import without_forcing
+from rhythmid.identify.shown_runs import free_runs
 from rhythmid.ltp.htf import delay_phase, linearised
+from rhythmid.ltp.pumping import active_pumping
 from rhythmid.report.identification import identification_page
 from rhythmid.report.page import Page
 from rhythmid.report.record_quality import quality_of
+from rhythmid.report.run import Run
 from rhythmid.report.transfer_figures import TransferFunction
 
 
@@ -24,7 +27,18 @@ def present(found: Identification, command: str = "", name: str = "a model") -> 
         models={"Identified model": found.model.to_yaml()},
         transfer=_transfer(found),
         unit=f"{units.position}/{units.force}",
+        runs=_runs(found),
+        position=units.position,
     )
+
+
+def _runs(found: Identification) -> list[Run]:
+    """Every record beside the identified model's free run; none by the paper's method, which simulates nothing."""
+    if found.joint is None:
+        return []
+    fit = found.joint.fit
+    pumpings = {record.name: active_pumping(record) for record in found.records}
+    return free_runs(fit, fit, pumpings, False, ("identified model", ""))
 
 
 def _transfer(found: Identification) -> list[TransferFunction]:

@@ -15,6 +15,7 @@ from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.message_types import stamp_path
 from rhythmid.record.quality import ChannelQuality
 from rhythmid.record.read import read_record
+from rhythmid.record.record import Record
 from rhythmid.record.signals import Signals
 from rhythmid.record.timing import Timing
 
@@ -64,6 +65,7 @@ class BagReport:
     problems : why the recording cannot be used as mapped, one line each; empty if it can.
     notes : what a user should know of the recording, one line each.
     damage : those of the notes that tell damage of the files; empty for a whole recording.
+    record : what could be read; None if it cannot be used as mapped.
     """
 
     path: Path
@@ -75,6 +77,15 @@ class BagReport:
     problems: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     damage: tuple[str, ...] = ()
+    record: Record | None = None
+
+    @property
+    def remarks(self) -> list[str]:
+        """What deserves mention of a recording that can be used, one line each."""
+        complaints = [
+            f"{role}: {one}" for role, channel in self.channels.items() for one in channel.complaints()
+        ]
+        return [*self.notes, *complaints]
 
     @property
     def usable(self) -> bool:
@@ -132,7 +143,7 @@ def quality_report(source: str | Path, signals: Signals | str | Path | None = No
     channels: dict[str, ChannelQuality] = {}
     problems: list[str] = []
     notes: list[str] = []
-    duration = 0.0
+    duration, record = 0.0, None
     try:
         record = read_record(source, signals)
         channels, duration = dict(record.quality.channels), record.duration
@@ -142,7 +153,9 @@ def quality_report(source: str | Path, signals: Signals | str | Path | None = No
             raise
         problems.append(str(error))
     if not is_bag(source):
-        return BagReport(source, source.stat().st_size, duration, (), channels, notes=tuple(notes))
+        return BagReport(
+            source, source.stat().st_size, duration, (), channels, notes=tuple(notes), record=record
+        )
     bag = Bag(source, verify=True)
     received, stamped = _times(bag)
     lost = bag.lost({name: len(log_ns) for name, log_ns in received.items()})
@@ -159,7 +172,7 @@ def quality_report(source: str | Path, signals: Signals | str | Path | None = No
     )
     size = sum(file.stat().st_size for file in bag.files)
     return BagReport(
-        source, size, duration, topics, channels, bag.truncated, tuple(problems), tuple(notes), damage
+        source, size, duration, topics, channels, bag.truncated, tuple(problems), tuple(notes), damage, record
     )
 
 

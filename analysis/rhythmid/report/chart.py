@@ -144,9 +144,7 @@ def x_extent(chart: Chart) -> tuple[float, float]:
 def y_extent(chart: Chart) -> tuple[float, float]:
     """Range of y that shows the whole chart."""
     heights = [part for c in chart.curves for part in (c.y, c.low, c.high) if part is not None]
-    return extent(
-        [*heights, *(np.array([level]) for level, _ in chart.levels)], chart.y_log, chart.from_zero
-    )
+    return extent([*heights, *(np.array([level]) for level, _ in chart.levels)], chart.y_log, chart.from_zero)
 
 
 def draw(chart: Chart) -> str:

@@ -7,7 +7,7 @@ from rhythmid.report.blocks import Block, Bullets, Drawing, Paragraph, Section, 
 from rhythmid.report.page import Page, Tone
 from rhythmid.report.quantity import NONE, number, percent, pretty_name, scaled, sentence, with_unit
 from rhythmid.report.record_quality import RecordQuality, quality_section
-from rhythmid.report.residual_figures import residual_grid
+from rhythmid.report.residual_figures import residual_figures
 from rhythmid.report.run import Compared, Run
 from rhythmid.report.sections import reproduce_section
 from rhythmid.report.signal_path import SlotContent, draw_signal_path
@@ -90,7 +90,7 @@ def comparison_section(result: Mapping[str, Any], run: Run, unit: str, path: boo
     if result["explanations"]:
         blocks.append(_explanations(result))
     blocks.append(_alignment(result))
-    blocks.append(residual_grid(run, Compared("motion", unit), unit))
+    blocks.extend(residual_figures(run, Compared("motion", unit), unit))
     if result["harmonics"]:
         blocks.append(_harmonics(result))
     if result["notes"]:

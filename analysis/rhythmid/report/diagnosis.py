@@ -13,6 +13,7 @@ from rhythmid.report.blocks import (
     Tile,
     Tiles,
 )
+from rhythmid.report.correlation import correlation_figure
 from rhythmid.report.findings import Findings
 from rhythmid.report.hypotheses import hypotheses_section, rejections_section
 from rhythmid.report.location import location_section, unknown_section
@@ -268,7 +269,8 @@ def _parameters(found: Findings) -> Section:
     table = compared_parameters(
         found.nominal, found.refitted, found.result["parameters"] if found.repaired else None, found.at_bound
     )
-    return Section("Parameters", (table,))
+    figure = [] if found.correlation is None else [correlation_figure(found.correlation)]
+    return Section("Parameters", (table, *figure))
 
 
 def _calibration(found: Findings) -> Section:

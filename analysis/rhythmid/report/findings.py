@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.report.correlation import Correlation
 from rhythmid.report.quantity import pretty_name
 from rhythmid.report.record_quality import RecordQuality
 from rhythmid.report.run import Compared, Run
@@ -88,6 +89,7 @@ class Findings:
     at_bound : parameters of the final model that ended at a bound; `unconverged` models whose refit did not settle.
     words : what the catalogue says of the elements that are mentioned, by name.
     hints : (element, other element, what tells them apart).
+    correlation : of the final model's parameters, where they were fitted together.
     """
 
     result: Mapping[str, Any]
@@ -115,6 +117,7 @@ class Findings:
     at_bound: tuple[str, ...] = ()
     unconverged: tuple[tuple[str, ...], ...] = ()
     hints: tuple[tuple[str, str, str], ...] = ()
+    correlation: Correlation | None = None
 
     @property
     def repaired(self) -> bool:

@@ -1,14 +1,17 @@
 """What else might be missing: all hypotheses by their evidence, and what speaks against those that are not believed."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rhythmid.report.blocks import Block, Bullets, Drawing, Fold, Heading, Paragraph, Section, Table
+from rhythmid.report.evidence_chart import Evidence, draw_evidence
 from rhythmid.report.findings import Findings
 from rhythmid.report.quantity import NONE, number, percent, plain, plus_minus, pretty_name, probability
 from rhythmid.report.row_chart import Bar, draw_bars
 
 HYPOTHESES_SHOWN, REJECTIONS_SHOWN, SCORES_SHOWN = 12, 12, 12
+LEAST_ODDS = math.log(40.0)  # difference of log density from which a simpler model is given up
 KINDS = {
     "nominal": "nothing is missing",
     "effects": "effects are missing",
@@ -40,6 +43,7 @@ def hypotheses_section(found: Findings) -> Section:
         "Predicts worse by: difference of the logarithm of the predictive density to the best hypothesis, ± one standard error over "
         f"stretches of the records. The {'probabilities' if stands else 'weights'} divide the evidence among hypotheses with no more effects than the chosen one."
     )
+    blocks.append(_evidence(found, rows[:HYPOTHESES_SHOWN], chosen, weighed, stands))
     first = tuple(index for index in marked if index < HYPOTHESES_SHOWN)
     blocks.append(Table(caption, columns, tuple(table[:HYPOTHESES_SHOWN]), first))
     if len(table) > HYPOTHESES_SHOWN:
@@ -51,6 +55,49 @@ def hypotheses_section(found: Findings) -> Section:
             Bullets(tuple(map(plain, grouped(found.result["excluded"])))),
         ]
     return Section("The hypotheses", (*blocks, *_scores(found)))
+
+
+def _evidence(
+    found: Findings, rows: Sequence[Mapping[str, Any]], chosen: Sequence[str], weighed: int, stands: bool
+) -> Drawing:
+    """The hypotheses as a chart; the reasons why some are rejected show under the pointer, and in the table below."""
+    reasons = {tuple(sorted(row["hypothesis"])): str(row["reason"]) for row in found.result["rejections"]}
+    made = []
+    for row in rows:
+        elements = tuple(row["elements"])
+        reason, taken = reasons.get(tuple(sorted(elements))), sorted(elements) == chosen
+        weight = "rejected" if reason and not taken else _weight(row, weighed, stands)
+        behind = plus_minus(row["score_difference"], row["standard_error"] or 0.0)
+        made.append(
+            Evidence(
+                _named(found, elements), float(row["score_difference"]), float(row["standard_error"] or 0.0), weight,
+                "after" if taken else "before" if reason else "measured", taken,
+                f"{_named(found, elements)}: predicts worse by {behind}" + (f"; not believed: {plain(reason)}" if reason else ""),
+            )
+        )  # fmt: skip
+    words = "; ".join(f"{one.label} {number(one.worse, 3)}, {one.text}" for one in made)
+    legend = [
+        ("circle after", "chosen"),
+        ("circle before", "not believed, see below"),
+        ("circle measured", "less likely"),
+    ]
+    return Drawing(
+        f"The {len(made)} best hypotheses" if len(made) > 1 else "The only hypothesis",
+        draw_evidence(
+            f"Hypotheses by how much worse than the best they predict: {words}.", made, LEAST_ODDS, "40 to 1",
+            "probability" if stands else "weight",
+        ),
+        "By how much each predicts worse than the best one the stretches that its fit did not see, ± one standard error. Right of the "
+        "dotted line the odds against a hypothesis are more than 40 to 1. A dash: it has more effects than the chosen one.",
+        tuple(pair for pair in legend if any(f"circle {one.style}" == pair[0] for one in made)),
+    )  # fmt: skip
+
+
+def _weight(row: Mapping[str, Any], weighed: int, stands: bool) -> str:
+    """Probability of a hypothesis, or its weight where no name stands; a dash where it does not share in the evidence."""
+    if len(row["elements"]) > weighed:
+        return NONE
+    return probability(row["probability"]) if stands else f"{row['probability']:.2f}"
 
 
 def most_weighed(hypotheses: Sequence[tuple[Sequence[str], float]]) -> int:
@@ -91,9 +138,7 @@ def _row(
     said = "not believed, see below" if tuple(sorted(elements)) in against else NONE
     if sorted(elements) == chosen:
         said = "chosen"
-    stands = found.result["verdict"] in ("missing_physics", "consistent")
-    weight = probability(row["probability"]) if stands else f"{row['probability']:.2f}"
-    chance = weight if len(elements) <= weighed else NONE
+    chance = _weight(row, weighed, found.result["verdict"] in ("missing_physics", "consistent"))
     kind = KINDS.get(row["kind"], pretty_name(row["kind"]))
     return name, kind, behind, chance, percent(row["heldout_nrmse"]), said
 

@@ -6,9 +6,12 @@ from typing import Any
 import numpy as np
 
 from rhythmid.report.blocks import Block, Bullets, Fold, Paragraph, Section, Table, Tile, Tiles
+from rhythmid.report.correlation import Correlation, correlation_figure
 from rhythmid.report.page import Page
 from rhythmid.report.quantity import NONE, number, percent, plain, pretty_name, sentence, with_unit
 from rhythmid.report.record_quality import RecordQuality, quality_section
+from rhythmid.report.residual_figures import error_table, residual_folds
+from rhythmid.report.run import Compared, Run
 from rhythmid.report.sections import (
     DELAYS,
     MILLISECONDS,
@@ -44,12 +47,14 @@ def identification_page(
     models: Mapping[str, str],
     transfer: Sequence[TransferFunction] | None = None,
     unit: str = "m/N",
+    runs: Sequence[Run] = (),
+    position: str = "m",
 ) -> Page:
     """The report of `identify`.
 
     `result` is what `identify --json` writes; `source` names model and records; `models` are YAML texts by title; `unit` that of
     the transfer functions. `transfer` replaces the functions in `result` where more is known of them, such as the fitted
-    model's.
+    model's. `runs` are the records beside the identified model's free run, `position` the unit of the motion.
     """
     functions = list(transfer) if transfer is not None else functions_of(result)
     return Page(
@@ -60,8 +65,9 @@ def identification_page(
         tone="good" if result.get("usable", True) and result["delays"].get("separable") else "open",
         tiles=_tiles(result),
         sections=(
-            Section("Parameters", (parameters_table(result["parameters"]),)),
+            _parameters(result),
             _delays(result),
+            *_residuals(runs, position),
             transfer_section(functions, unit, *_errors(result, unit), *_missing(result)),
             *_paper(result),
             _remarks(result),
@@ -69,6 +75,28 @@ def identification_page(
             reproduce_section(command, models),
         ),
     )
+
+
+def _parameters(result: Mapping[str, Any]) -> Section:
+    """The estimates, and how their errors go together where they were fitted together."""
+    blocks: list[Block] = [parameters_table(result["parameters"])]
+    covariance = result.get("covariance")
+    if covariance is not None and len(covariance["names"]) > 1:
+        matrix = np.array(covariance["correlation"], dtype=float)
+        blocks.append(correlation_figure(Correlation(tuple(covariance["names"]), matrix)))
+    return Section("Parameters", tuple(blocks))
+
+
+def _residuals(runs: Sequence[Run], position: str) -> list[Section]:
+    """What the identified model leaves of the records; nothing where it was not simulated."""
+    if not runs:
+        return []
+    compared = Compared("motion", position)
+    lead = Paragraph(
+        "The identified model runs on its own from the beginning of each record. What it leaves is noise, or physics that it lacks."
+    )
+    blocks = (error_table(runs, compared), *residual_folds(runs, compared, position))
+    return [Section("Measured motion and what is left of it", (lead, *blocks))]
 
 
 def functions_of(result: Mapping[str, Any]) -> list[TransferFunction]:

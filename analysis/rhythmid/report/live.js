@@ -45,6 +45,7 @@ function values(told) {
 const raised = (power) => String(power).replace(/./g, (c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]));
 
 function number(value, digits = 4) {
+  if (value === null || !Number.isFinite(value)) return "";
   if (value === 0) return "0";
   const power = Math.floor(Math.log10(Math.abs(value)));
   if (power > -4 && power < Math.max(digits, 6)) {
@@ -79,7 +80,7 @@ function axis(about, scale, side) {
     values: (plot, splits) => splits.map((value) => number(value, 5)),
     gap: 4,
   };
-  if (about.log) made.splits = (plot, index, low, high) => decades(low, high);
+  if (about.log) Object.assign(made, { splits: (plot, index, low, high) => decades(low, high), filter: (plot, splits) => splits });
   if (side === 2) return { ...made, label: about.label, size: 26, space: 60, grid: { show: false } };
   const widest = (plot, texts) => Math.max(...texts.map((text) => plot.ctx.measureText(text).width)) / devicePixelRatio;
   return { ...made, space: 36, size: (plot, texts) => {

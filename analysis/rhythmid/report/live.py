@@ -27,9 +27,7 @@ def most_points(charts: Sequence[Chart], budget: float = BUDGET) -> int:
     low, high = FEWEST, max(sizes)
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (
-            (middle, high) if VALUE * sum(min(n, middle) for n in sizes) <= budget else (low, middle)
-        )
+        low, high = (middle, high) if VALUE * sum(min(n, middle) for n in sizes) <= budget else (low, middle)
     return low
 
 

@@ -4,8 +4,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from rhythmid.report.blocks import Columns, Drawing, Fold, Paragraph, Table, drawing
+from rhythmid.report.blocks import Block, Columns, Drawing, Fold, Paragraph, Table, drawing
 from rhythmid.report.chart import Chart, Curve
+from rhythmid.report.motion_figures import over_time, portrait, shaded, time_link
 from rhythmid.report.quantity import number, percent, plus_minus, pretty_unit, scaled, with_unit
 from rhythmid.report.row_chart import Change, draw_changes
 from rhythmid.report.run import (
@@ -28,7 +29,8 @@ MOST_SHOWN = 12  # records drawn in full; all are in the table
 
 
 def residual_folds(runs: Sequence[Run], compared: Compared, position: str) -> list[Fold | Paragraph]:
-    """Four figures of every record, the one that gains most opened; of very many records only the most telling.
+    """The figures of every record, opened for the one that gains most among those held out; of very many records only the most
+    telling.
 
     `position` is the unit of the motion.
     """
@@ -39,6 +41,7 @@ def residual_folds(runs: Sequence[Run], compared: Compared, position: str) -> li
 
     drawable = [run for run in runs if run.used.sum() >= FEWEST_SAMPLES]
     ranked = sorted(drawable, key=gain, reverse=True)[:MOST_SHOWN]
+    opened = next((run for run in ranked if run.heldout), ranked[0] if ranked else None)
     blocks: list[Fold | Paragraph] = []
     for run in (r for r in drawable if r in ranked):
         before, after = error_of([run], "before"), error_of([run], "after")
@@ -49,8 +52,8 @@ def residual_folds(runs: Sequence[Run], compared: Compared, position: str) -> li
         blocks.append(
             Fold(
                 f"{run.name} ({role}): error {told} of the {compared.quantity}",
-                (residual_grid(run, compared, position),),
-                run is ranked[0],
+                residual_figures(run, compared, position),
+                run is opened,
             )
         )
     if len(drawable) > len(ranked):
@@ -63,18 +66,20 @@ def residual_folds(runs: Sequence[Run], compared: Compared, position: str) -> li
     return blocks
 
 
-def residual_grid(run: Run, compared: Compared, position: str) -> Columns:
-    """The four figures of one record; `position` is the unit of the motion."""
+def residual_figures(run: Run, compared: Compared, position: str) -> tuple[Block, ...]:
+    """Motion and residual of one record over time, then over cycle, states and frequency; `position` is the unit of the motion."""
     size = float(np.quantile(np.abs(run.residual("before")[run.used]), 0.98))
     factor, shown = scaled(size, compared.unit)
-    cycle = _over_cycle(run, factor, shown)
-    return Columns(
-        (
-            _over_time(run, compared, factor, shown),
-            *([cycle] if cycle is not None else []),
-            _over_states(run, position, factor, shown),
-            _over_frequency(run, compared),
-        )
+    further = (
+        portrait(run, compared),
+        _over_cycle(run, factor, shown),
+        _over_states(run, position, factor, shown),
+        _over_frequency(run, compared),
+    )
+    return (
+        over_time(run, compared),
+        _over_time(run, compared, factor, shown),
+        Columns(tuple(figure for figure in further if figure is not None)),
     )
 
 
@@ -86,24 +91,22 @@ def _curves(run: Run, factor: float) -> tuple[Curve, ...]:
 
 
 def _over_time(run: Run, compared: Compared, factor: float, unit: str) -> Drawing:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], run.hidden.astype(np.int8), [0]])))
-    last = len(run.time) - 1
-    shaded = tuple(
-        (float(run.time[a]), float(run.time[min(b, last)])) for a, b in zip(edges[::2], edges[1::2])
-    )
+    hidden_parts = shaded(run)
     change = (
         " The second is the narrower, the more of the mismatch the effect explains."
         if run.after is not None
         else ""
     )
-    hidden = " Shaded: hidden from the fit." if shaded else ""
+    hidden = " Shaded: hidden from the fit." if hidden_parts else ""
     return drawing(
-        "Over time",
+        "Residual over time",
         Chart(
             f"{run.name}: measured minus {compared.made} {compared.quantity} over time. {_rms_words(run, factor, unit)}",
-            "time [s]", f"measured − {compared.made} [{pretty_unit(unit)}]", _curves(run, factor), shaded=shaded,
+            "time [s]", f"measured − {compared.made} [{pretty_unit(unit)}]", _curves(run, factor), shaded=hidden_parts,
+            link=time_link(run),
         ),
         f"What each model misses of {run.name}, moment by moment.{change}{hidden}",
+        wide=True,
     )  # fmt: skip
 
 
@@ -128,7 +131,7 @@ def _over_cycle(run: Run, factor: float, unit: str) -> Drawing | None:
     if not curves:
         return None
     return drawing(
-        "Over the cycle",
+        "Residual over the cycle",
         Chart(
             f"{run.name}: mean residual over the phase of the forcing.", "phase of the forcing [cycles]",
             f"mean residual [{pretty_unit(unit)}]", tuple(curves), x_range=(0.0, 1.0),
@@ -151,7 +154,7 @@ def _over_states(run: Run, length: str, factor: float, unit: str) -> Drawing:
     rate = f"{length}/s"
     x_unit = scaled(float(np.ptp(position)), length)
     return Drawing(
-        "Over position and velocity",
+        "Residual over position and velocity",
         draw_maps(
             f"{run.name}: mean residual over position x and velocity v{', before and after' if len(maps) > 1 else ''}.",
             maps, (x_unit[0], pretty_unit(x_unit[1])), (1.0, pretty_unit(rate)), (factor, pretty_unit(unit)),
@@ -172,7 +175,7 @@ def _over_frequency(run: Run, compared: Compared) -> Drawing:
             Curve(frequency, factor * density(run, run.residual("after"))[1], run.labels[1], "after")
         )
     return drawing(
-        "Over frequency",
+        "Spectra of motion and residual" if compared.quantity == "motion" else "Spectra of effort and residual",
         Chart(
             f"{run.name}: amplitude spectral density of the {compared.quantity} and of what the models miss of it.",
             "frequency [Hz]", f"density [{pretty_unit(unit)}/√Hz]", tuple(curves), y_log=True, x_log=True,

@@ -35,12 +35,18 @@ class Change:
     floor: float | None = None
 
 
-def _label_width(labels: Sequence[str]) -> float:
+def row_label_width(labels: Sequence[str]) -> float:
+    """Room that the rows' names take."""
     lines = [line for label in labels for line in wrap(label, WRAP)]
     return max((len(line) for line in lines), default=4) * 7.3 + 14.0
 
 
-def _label(text: str, x: float, middle: float, strong: str = "") -> str:
+def row_label_height(text: str) -> float:
+    """Height that a row's name takes, with the air above and below it."""
+    return 5.0 + 13.0 * len(wrap(text, WRAP))
+
+
+def row_label(text: str, x: float, middle: float, strong: str = "") -> str:
     """A row's name, right-aligned at x, on as many lines as it needs."""
     lines = wrap(text, WRAP) or [""]
     first = middle + 4.0 - 6.5 * (len(lines) - 1)
@@ -55,7 +61,7 @@ def draw_bars(
 ) -> str:
     """Horizontal bars from zero, each with its number at the end; `level` is marked by a line through all. `full` is the least
     that the width stands for."""
-    left = _label_width([bar.label for bar in bars])
+    left = row_label_width([bar.label for bar in bars])
     most = max([bar.value for bar in bars] + [level or 0.0, full, 1e-300])
     axis = Axis(0.0, most, left, WIDTH - 62.0)
     top = 18.0 if level is not None else 4.0
@@ -65,7 +71,7 @@ def draw_bars(
         y = top + ROW * index
         end = float(axis(max(bar.value, 0.0)))
         strong = " strong" if bar.marked else ""
-        parts.append(_label(bar.label, left - 8.0, y + 12.5, strong))
+        parts.append(row_label(bar.label, left - 8.0, y + 12.5, strong))
         parts.append(
             f'<rect class="bar {bar.style}" x="{left:.1f}" y="{y + 4:.1f}" width="{max(end - left, 1.0):.1f}" height="{ROW - 9:.1f}" rx="2"/>'
         )
@@ -86,7 +92,7 @@ def draw_bars(
 
 def draw_changes(alt: str, rows: Sequence[Change], label: str) -> str:
     """Before and after of every row on a logarithmic axis; a tick marks the floor."""
-    left = _label_width([row.label for row in rows])
+    left = row_label_width([row.label for row in rows])
     values = [v for row in rows for v in (row.before, row.after, row.floor) if v is not None and v > 0.0]
     axis = Axis(*extent([np.array(values)], log=True), left + 8.0, WIDTH - 14.0, log=True)
     bottom = 6.0 + ROW * len(rows)
@@ -102,7 +108,7 @@ def draw_changes(alt: str, rows: Sequence[Change], label: str) -> str:
     )
     for index, row in enumerate(rows):
         y = 6.0 + ROW * (index + 0.5)
-        parts.append(_label(row.label, left - 4.0, y))
+        parts.append(row_label(row.label, left - 4.0, y))
         start = float(axis(row.before))
         if row.floor is not None and row.floor > 0.0:
             at = float(axis(row.floor))

@@ -38,6 +38,16 @@ class Compared:
     bandwidth: float | None = None
 
 
+@dataclass(frozen=True)
+class Switch:
+    """Where a model switches: at this `value` of `signal`, position "x" or velocity "v" [unit of the motion, or that per
+    second]; `name` of the effect that does."""
+
+    signal: Literal["x", "v"]
+    value: float
+    name: str
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """A record beside what models say of it: a free run's motion, or the effort that its motion needs.
@@ -55,6 +65,7 @@ class Run:
     quiet : whether nothing but the forcing drove the machine.
     size : what an error is a share of, where that is not the standard deviation of `measured` [its unit].
     labels : what `before` and `after` are called in figures.
+    switches : where the better model switches; None where `measured` is no position.
     """
 
     name: str
@@ -71,6 +82,7 @@ class Run:
     quiet: bool = False
     size: float | None = None
     labels: tuple[str, str] = ("refitted nominal model", "with the added effect")
+    switches: tuple[Switch, ...] | None = ()
 
     def residual(self, which: Which) -> Array:
         """Measured minus what the model says, float64[n]."""

@@ -105,10 +105,13 @@ def _cells(one: StateMap, x: Axis, v: Axis, largest: float) -> list[str]:
                 x0, x1 = float(x(one.x[column])), float(x(one.x[end]))
                 paths.setdefault(level, []).append(f"M{x0:.1f} {y1:.1f}H{x1:.1f}V{y0:.1f}H{x0:.1f}Z")
             column = end
-    return [f'<path class="cell {_class(level)}" d="{"".join(d)}"/>' for level, d in sorted(paths.items())]
+    return [
+        f'<path class="cell {shade_class(level)}" d="{"".join(d)}"/>' for level, d in sorted(paths.items())
+    ]
 
 
-def _class(level: int) -> str:
+def shade_class(level: int) -> str:
+    """Class of the style sheet for a colour, `level` from -SHADES to SHADES."""
     return f"minus{-level}" if level < 0 else f"plus{level}"
 
 
@@ -118,7 +121,7 @@ def _scale(largest: float, unit: str, left: float, y: float) -> list[str]:
     parts = []
     for i in range(count):
         parts.append(
-            f'<rect class="cell {_class(i - SHADES)} edge" x="{left + 62 + i * width:.1f}" y="{y:.1f}" width="{width}" height="12"/>'
+            f'<rect class="cell {shade_class(i - SHADES)} edge" x="{left + 62 + i * width:.1f}" y="{y:.1f}" width="{width}" height="12"/>'
         )
     parts.append(f'<text x="{left + 56:.1f}" y="{y + 10:.1f}" text-anchor="end">{number(-largest, 3)}</text>')
     parts.append(

@@ -27,20 +27,22 @@ from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.forward import LEVEL, Search
 from rhythmid.elements.element import Element
 from rhythmid.errors import InputError
+from rhythmid.identify.joint_covariance import JointCovariance
 from rhythmid.identify.output_error import Fit, noise_of
 from rhythmid.identify.repeats import noise_from_repeats
-from rhythmid.identify.series import Series, bandwidth, record_of
+from rhythmid.identify.series import Series, bandwidth
+from rhythmid.identify.shown_runs import free_runs
 from rhythmid.ltp.htf import theoretical_htf
 from rhythmid.ltp.pumping import Pumping, active_pumping
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 from rhythmid.report.comparison import comparison_page, comparison_section
+from rhythmid.report.correlation import Correlation
 from rhythmid.report.diagnosis import diagnosis_page
 from rhythmid.report.findings import ElementScore, Findings, FreeFunction, TransferChange
 from rhythmid.report.page import Page
 from rhythmid.report.record_quality import quality_of
 from rhythmid.report.run import Compared, Run
-from rhythmid.simulation.transport import physical_times
 
 Array = NDArray[np.float64]
 INDICES = (0, -1, 1, -2, 2)  # transfer functions that are compared
@@ -98,14 +100,15 @@ def findings(
     labels = labels_of(chosen.kind)
     elements = _elements(found, nominal)
     seen = {record.name: pumpings[id(record)] for record in records}
-    runs = _runs(found.nominal, found.fit, seen, bool(found.best.added), labels)
+    added = bool(found.best.added)
+    runs = free_runs(found.nominal, found.fit, seen, added, labels)
     if result.unseen_nominal is not None:
         after = result.unseen_augmented or result.unseen_nominal
         repaired = bool(found.best.added) and result.unseen_augmented is not None
         unseen = {record.name: pumpings[id(record)] for record in holdout}
-        runs += _runs(result.unseen_nominal, after, unseen, repaired, labels, heldout=True)
+        runs += free_runs(result.unseen_nominal, after, unseen, repaired, labels, heldout=True)
     models = {"Nominal model": nominal.to_yaml(), "Nominal model, refitted": found.nominal.model.to_yaml()}
-    if found.best.added:
+    if added:
         models["Augmented model"] = causal(found.fit.model).to_yaml()
     count = max(len(found.rounds[0].scores), 1)
     repeats = noise_from_repeats(list(found.fit.run.series))
@@ -137,62 +140,16 @@ def findings(
         at_bound=found.fit.at_bound,
         unconverged=tuple(_names(trial.model, trial.added) for trial in found.trials if not trial.converged),
         hints=hints_of(diagnosis.indistinguishable, elements),
+        correlation=_correlation(found.fit),
     )
 
 
-def _runs(
-    before: Fit,
-    after: Fit,
-    pumpings: Mapping[str, Pumping | None],
-    repaired: bool,
-    labels: tuple[str, str],
-    heldout: bool = False,
-) -> list[Run]:
-    """Every series of the fits beside its simulations; they were fitted to the same series.
-
-    `pumpings` are those of the records, by name, whole or cut into windows.
-    """
-    found: list[Run] = []
-    for index, one in enumerate(before.run.series):
-        pumping = pumpings.get(one.name, pumpings.get(record_of(one)))
-        rows = after.run.rows(after.model, index, after.starts[index])
-        if rows is None:
-            continue
-        phase = None
-        if pumping is not None:
-            physical = physical_times(after.model, one.centres)
-            phase = ((physical - pumping.origin) * pumping.frequency) % 1.0
-        found.append(
-            Run(
-                name=one.name,
-                time=one.centres,
-                measured=one.averaged,
-                before=one.averaged + before.residuals[index],
-                after=one.averaged + after.residuals[index] if repaired else None,
-                position=rows[:, 0],
-                velocity=rows[:, 1],
-                phase=phase,
-                used=one.used,
-                hidden=np.zeros_like(one.used) if heldout else _hidden(one),
-                heldout=heldout,
-                quiet=_quiet(one),
-                labels=labels,
-            )
-        )
-    return found
-
-
-def _hidden(one: Series) -> NDArray[np.bool_]:
-    """The end of a series that was kept from the fit; single blocks that a gap runs through are not meant."""
-    last = np.flatnonzero(one.used)
-    hidden = np.zeros_like(one.used)
-    if len(last):
-        hidden[last[-1] + 1 :] = True
-    return hidden if hidden.sum() > 3 else np.zeros_like(one.used)
-
-
-def _quiet(one: Series) -> bool:
-    return one.command is None or not np.any(one.command.c)
+def _correlation(fit: Fit) -> Correlation | None:
+    """Of the parameters that were fitted; None for a single one."""
+    if len(fit.names) < 2:
+        return None
+    units = [fit.model.parameters[name].unit for name in fit.names]
+    return Correlation(fit.names, JointCovariance.of(fit.names, units, fit.covariance).correlation)
 
 
 def _scores(found: Search) -> tuple[ElementScore, ...]:

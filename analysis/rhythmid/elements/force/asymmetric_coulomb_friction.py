@@ -43,5 +43,6 @@ ELEMENT = Element(
         "coulomb_friction": "the same but for a constant force, which a free rest length absorbs",
         "constant_force": "acts at rest and against both directions alike",
     },
+    switches=("v", ""),
     reference="B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30(7), 1994, 1083-1138",
 )

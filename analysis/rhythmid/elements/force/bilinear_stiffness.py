@@ -38,6 +38,7 @@ ELEMENT = Element(
         "quadratic_stiffness": "kink against curve: vary the amplitude",
         "ground_contact_loss": "the leg's whole force vanishes, damping too, at the rest length",
     },
+    switches=("x", "kink"),
     reference="S. W. Shaw, P. J. Holmes, A periodically forced piecewise linear oscillator, "
     "Journal of Sound and Vibration 90(1), 1983, 129-155",
 )

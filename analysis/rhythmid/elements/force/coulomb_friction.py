@@ -48,5 +48,6 @@ ELEMENT = Element(
         "load_dependent_friction": "same at constant load: vary the actuator force",
         "transmitted_load_friction": "same at constant load: vary the load",
     },
+    switches=("v", ""),
     reference="B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30(7), 1994, 1083-1138",
 )

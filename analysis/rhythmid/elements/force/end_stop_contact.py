@@ -61,5 +61,6 @@ ELEMENT = Element(
     also_known_as=("bump stop", "hard stop", "impact"),
     family="contact",
     confusable={"bilinear_stiffness": "soft, undamped, pulls as well as it pushes"},
+    switches=("x", "position"),
     reference="G. Gilardi, I. Sharf, Mechanism and Machine Theory 37(10), 2002, 1213-1239",
 )

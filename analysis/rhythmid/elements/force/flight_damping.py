@@ -32,5 +32,6 @@ ELEMENT = Element(
         "viscoelastic_relaxation": "short relaxation times: excite high frequencies, or a bias force",
         "quadratic_drag": "one amplitude only",
     },
+    switches=("v", ""),
     reference="Paper, equation (10), with the damper's flight value",
 )

@@ -49,5 +49,6 @@ ELEMENT = Element(
         "coulomb_friction": "differ near v = 0 alone: dwell at low speed, reverse slowly",
         "lugre_friction": "differ in the displacement before sliding and in the lag of friction behind speed",
     },
+    switches=("v", ""),
     reference="B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30(7), 1994, 1083-1138",
 )

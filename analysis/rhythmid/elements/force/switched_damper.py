@@ -28,5 +28,6 @@ ELEMENT = Element(
     also_known_as=("hybrid damper", "asymmetric damper"),
     family="damping",
     confusable={"viscous_damper": "no sidebands; adds the same damping to both phases"},
+    switches=("v", ""),
     reference="Paper, equation (10)",
 )

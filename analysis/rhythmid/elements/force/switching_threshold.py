@@ -57,5 +57,6 @@ ELEMENT = Element(
         "switched_damper": "shifts the switch instants and the even harmonics, not the damping level alone",
         "viscoelastic_relaxation": "a damper that engages late looks like one that relaxes: vary the amplitude",
     },
+    switches=("v", "threshold"),
     reference="Paper, section 4, the switching function s(t)",
 )

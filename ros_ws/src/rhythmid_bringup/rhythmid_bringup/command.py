@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from rhythmid.commands.examples import epilog
-from rhythmid.commands.options import Quiet
+from rhythmid.commands.options import Quiet, ReportFile
 from rhythmid.errors import InputError
 
 from . import isolation
@@ -46,9 +46,12 @@ def add(app: typer.Typer) -> None:
                 "--isolated", help="Give the nodes a network of their own: nobody else reaches them."
             ),
         ] = False,
+        report: ReportFile = None,
         quiet: Quiet = False,
     ) -> None:
         """Run the graph of an experiment: starts, watches and stops its nodes and leaves a bag."""
+        if node is not None and report is not None:
+            raise InputError("--node runs one node, and --report tells of a whole run: give one of the two")
         if node is not None and replace:
             raise InputError("--node runs a node of ours, --replace one of yours: give one of the two")
         if isolated:
@@ -64,4 +67,4 @@ def add(app: typer.Typer) -> None:
         console.quiet = quiet
         if node is not None:
             raise typer.Exit(run_alone(experiment, out, node))
-        raise typer.Exit(run_graph(experiment, out, replacements(replace or ())))
+        raise typer.Exit(run_graph(experiment, out, replacements(replace or ()), report))

@@ -15,10 +15,11 @@ from rich.console import Console
 
 from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment
-from rhythmid.output import require_writable
+from rhythmid.output import require_new, require_writable
 
 from .arguments import command, ros_arguments
 from .environment import own_domain, run_environment
+from .report import write_report
 from .summary import show
 from .supervisor import Supervisor
 
@@ -57,12 +58,18 @@ def replacements(given: Sequence[str]) -> dict[str, list[str]]:
     return found
 
 
-def run_graph(path: Path, out: Path | None, replaced: Mapping[str, Sequence[str]] | None = None) -> int:
-    """Run the whole graph under supervision, with the commands `replaced` in the place of nodes.
+def run_graph(
+    path: Path,
+    out: Path | None,
+    replaced: Mapping[str, Sequence[str]] | None = None,
+    report: Path | None = None,
+) -> int:
+    """Run the whole graph under supervision, with the commands `replaced` in the place of nodes; write a page `report`.
 
     The exit code is 0 when the run came to its end or the user stopped it, 1 when a node died or the excitation
     stopped by itself. Raises InputError when a node refuses its parameters.
     """
+    require_new(report)
     experiment = load(path, out)
     folder = Path(tempfile.mkdtemp(prefix="rhythmid-"))
     with own_domain() as domain, interruptions() as interrupted:
@@ -76,6 +83,9 @@ def run_graph(path: Path, out: Path | None, replaced: Mapping[str, Sequence[str]
         raise InputError(outcome.sentence)
     mend(experiment.record.path)
     show(console, experiment, supervisor.observed, outcome)
+    if report is not None:
+        write_report(report, experiment, supervisor.observed, outcome)
+        console.print(f"report: {report}")
     if outcome.code == 1:
         console.print(f"parameters and logs of the nodes: {folder}")
     return outcome.code

@@ -1,0 +1,56 @@
+"""The report of a run: how it ended and what its nodes tell, then the recording that it left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from rhythmid.commands.options import command_line
+from rhythmid.errors import InputError
+from rhythmid.experiment import Experiment
+from rhythmid.record.bag_report import quality_report
+from rhythmid.record.punctuality import punctuality_notes
+from rhythmid.report.blocks import Bullets, Paragraph, Section, Table
+from rhythmid.report.page import Page, write_page
+from rhythmid.report.quantity import sentence
+from rhythmid.report.recording import recording_page
+
+from .supervisor import Observed, Outcome
+
+
+def write_report(path: Path, experiment: Experiment, observed: Observed, outcome: Outcome) -> None:
+    """Write the page. Raises InputError where its place is not writable, or the run left nothing to read."""
+    write_page(path, run_page(experiment.record.path, observed, outcome))
+
+
+def run_page(bag: Path, observed: Observed, outcome: Outcome) -> Page:
+    """The page of a run that left this bag. Raises InputError where that is no recording."""
+    if not bag.is_dir():
+        raise InputError(f"{bag}: the run left no bag, so there is nothing to report")
+    found = quality_report(bag)
+    section = _run(observed, outcome)
+    good = outcome.code == 0
+    verdict = ("The run came to its end", "good") if good else ("The run broke off", "open")
+    return recording_page(found.to_dict(), found.record, found.remarks, command_line(), (section,), verdict)
+
+
+def _run(observed: Observed, outcome: Outcome) -> Section:
+    lead = f"{sentence(outcome.sentence)} {observed.played:.3f} s were played in {observed.elapsed:.1f} s."
+    notes = punctuality_notes(observed.run)
+    return Section(
+        "The run",
+        (
+            Paragraph(lead, "lead"),
+            *([Bullets(tuple(map(sentence, notes)))] if notes else []),
+            *([_nodes(observed.figures)] if observed.figures else []),
+        ),
+    )
+
+
+def _nodes(figures: Mapping[str, Mapping[str, str]]) -> Table:
+    rows = tuple(
+        (node if number == 0 else "", key, value)
+        for node, told in figures.items()
+        for number, (key, value) in enumerate(told.items())
+    )
+    return Table("What each node tells of its part.", ("node", "quantity", "value"), rows)
