@@ -123,6 +123,24 @@ class Browser:
             raise RuntimeError(str(result["exceptionDetails"]))
         return result["result"].get("value")
 
+    def mouse(self, *steps: tuple[str, float, float], clicks: int = 1) -> None:
+        """Move, press and release the left button: steps (kind, x, y) with kind "moved", "pressed" or "released"."""
+        for kind, x, y in steps:
+            self.call(
+                "Input.dispatchMouseEvent", type=f"mouse{kind.capitalize()}", x=x, y=y, clickCount=0 if kind == "moved" else clicks,
+                button="none" if kind == "moved" else "left", buttons=1 if kind == "pressed" else 0,
+            )  # fmt: skip
+
+    def key(self, key: str) -> None:
+        """Press a key of the keyboard."""
+        text = {"text": key} if len(key) == 1 else {}
+        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, **text)
+        self.call("Input.dispatchKeyEvent", type="keyUp", key=key)
+
+    def settle(self) -> None:
+        """Wait until what was asked for has been drawn."""
+        self.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
     def picture(self, path: Path) -> None:
         """Save the whole page as a PNG."""
         shot = self.call("Page.captureScreenshot", captureBeyondViewport=True)

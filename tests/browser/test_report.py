@@ -65,6 +65,7 @@ def report(tmp_path_factory: pytest.TempPathFactory, browser) -> Path:
 @pytest.mark.parametrize(("width", "dark"), [(1200, False), (1200, True), (390, False)])
 def test_the_page_loads_without_errors_or_requests(browser, report: Path, width: int, dark: bool) -> None:
     browser.open(report, width, dark)
+    browser.settle()
     assert browser.messages == []
     assert browser.requests == [report.as_uri()]
     assert browser.evaluate("document.querySelector('h1').innerText") == "Missing physics: Coulomb friction"
@@ -115,6 +116,7 @@ def test_every_drawing_is_drawn_and_its_text_stays_inside_and_legible(
 ) -> None:
     browser.open(report, width)
     browser.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
+    browser.evaluate("document.querySelector('.drawings').click()")
     assert browser.evaluate("[...document.images].every(i => i.complete && i.naturalWidth > 0)")
     drawn = browser.evaluate(
         """[...document.querySelectorAll('figure svg[role=img]')].filter(s => s.checkVisibility()).map(s => {
@@ -156,11 +158,19 @@ def test_text_stands_out_from_its_background(browser, report: Path, dark: bool) 
             const behind = e => { for (; e; e = e.parentElement) { const c = getComputedStyle(e).backgroundColor;
                 if (rgb(c).length < 4 || rgb(c)[3] > 0) return c } return 'rgb(255,255,255)' };
             const found = [];
-            for (const e of document.querySelectorAll('main p, main td, main th, main li, figcaption, h1, h2, .kicker, dt, dd, svg text')) {
+            for (const e of document.querySelectorAll('main p, main td, main th, main li, figcaption, h1, h2, .kicker, dt, dd, svg text,'
+                + '.legend button, .tools button, .hint, .hint button, .y-label, .tip')) {
                 if (!e.checkVisibility() || e.classList.contains('flag-text')) continue;
                 const svg = e instanceof SVGElement;
                 const [a, b] = [light(svg ? getComputedStyle(e).fill : getComputedStyle(e).color), light(behind(e))].sort((x, y) => y - x);
                 if ((a + 0.05) / (b + 0.05) < 4.5) found.push([(a + 0.05) / (b + 0.05), e.textContent.slice(0, 40)]);
+            }
+            // 1.4.11: curves are told from their ground at a contrast of 3
+            const style = name => { const p = document.createElement('p'); p.style.color = `var(--${name})`; document.body.append(p);
+                const c = getComputedStyle(p).color; p.remove(); return light(c) };
+            for (const name of ['measured', 'before', 'after', 'third']) {
+                const [a, b] = [style(name), style('paper')].sort((x, y) => y - x);
+                if ((a + 0.05) / (b + 0.05) < 3) found.push([(a + 0.05) / (b + 0.05), name]);
             }
             return found })()"""
     )
@@ -172,6 +182,10 @@ def test_in_print_everything_folded_is_unfolded(browser, report: Path) -> None:
     assert browser.evaluate(
         "[...document.querySelectorAll('details')].every(d => d.getBoundingClientRect().height > 100"
         " || d.querySelectorAll('figure, pre, li, tr').length < 3)"
+    )
+    assert not browser.evaluate("[...document.querySelectorAll('.live')].some(e => e.checkVisibility())")
+    assert browser.evaluate(
+        "[...document.querySelectorAll('.enlivened > svg')].every(s => getComputedStyle(s).display === 'block')"
     )
     assert browser.print().startswith(b"%PDF")
 

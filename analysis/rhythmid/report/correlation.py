@@ -46,7 +46,7 @@ def _strongest(found: Correlation) -> str:
         return f"No two are correlated by more than {number(STRONG)}."
     pairs = (
         f"{pretty_name(found.names[columns[k]])} with {pretty_name(found.names[rows[k]])} "
-        f"({_told(found.matrix[rows[k], columns[k]])})"
+        f"({_told(float(found.matrix[rows[k], columns[k]]))})"
         for k in strong
     )
     return f"Hard to tell apart: {'; '.join(pairs)}."
@@ -72,7 +72,7 @@ def _draw(found: Correlation) -> str:
     top = 20.0
     bottom = top + tall * count
     alt = "Correlation of the estimates: " + "; ".join(
-        f"{pretty_name(found.names[j])} with {pretty_name(found.names[i])} {_told(found.matrix[i, j])}"
+        f"{pretty_name(found.names[j])} with {pretty_name(found.names[i])} {_told(float(found.matrix[i, j]))}"
         for i in range(count)
         for j in range(i)
     )

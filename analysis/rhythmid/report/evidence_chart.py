@@ -1,7 +1,7 @@
 """Hypotheses by their evidence: how much worse than the best each predicts unseen data, with its standard error."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -10,7 +10,7 @@ from rhythmid.report.quantity import number
 from rhythmid.report.row_chart import row_label, row_label_width
 
 ROW = 34.0
-NUMBERS = 74.0  # width of the column with probabilities
+NUMBERS = 88.0  # width of the column with probabilities
 CAP = 4.0  # half the height of an error bar's ends
 TICKS = (0.0, 1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
 
@@ -65,7 +65,7 @@ def draw_evidence(alt: str, rows: Sequence[Evidence], level: float, level_label:
     return "".join([*parts, "</svg>"])
 
 
-def _row(row: Evidence, y: float, left: float, place) -> list[str]:
+def _row(row: Evidence, y: float, left: float, place: Callable[[float], float]) -> list[str]:
     low, high, at = place(row.worse - row.error), place(row.worse + row.error), place(row.worse)
     strong = " strong" if row.marked else ""
     return [

@@ -14,6 +14,7 @@ from rhythmid.report.run import Compared, Run, density
 Array = NDArray[np.float64]
 CYCLES = 6.0  # of the strongest line, that a phase portrait shows
 SMOOTHED = 0.1  # of a cycle, over which a cubic is fitted for the velocity
+SWITCHING = "switching"  # what the places are called at which the model switches
 FEWEST_IN_WINDOW = 7  # samples that such a cubic is fitted to at least
 
 
@@ -67,7 +68,9 @@ def portrait(run: Run, compared: Compared) -> Drawing | None:
     factor, unit = scaled(float(np.ptp(run.measured)), compared.unit)
 
     def orbit(signal: Array, label: str, style: str, dashed: bool = True) -> Curve:
-        x, v = (savgol_filter(signal[first:last], window, 3, deriv=order, delta=run.step) for order in (0, 1))
+        piece = signal[first:last]
+        x = np.asarray(savgol_filter(piece, window, 3))
+        v = np.asarray(savgol_filter(piece, window, 3, deriv=1, delta=run.step))
         return Curve(factor * x, factor * v, label, style, dashed)
 
     curves = [
@@ -86,8 +89,8 @@ def portrait(run: Run, compared: Compared) -> Drawing | None:
         Chart(
             f"{run.name}: velocity over position, as measured and as {compared.made}.",
             f"position [{pretty_unit(unit)}]", f"velocity [{pretty_unit(f'{unit}/s')}]", tuple(curves), path=True,
-            uprights=tuple((factor * one.value, one.name) for one in places),
-            levels=tuple({factor * one.value: one.name for one in speeds}.items()),
+            uprights=tuple((factor * value, SWITCHING) for value in sorted({one.value for one in places})),
+            levels=tuple((factor * value, SWITCHING) for value in sorted({one.value for one in speeds})),
         ),
         f"Velocity over position in the last {CYCLES:.0f} cycles, both by a cubic over {100 * SMOOTHED:.0f} % of a cycle.{switching}",
     )  # fmt: skip

@@ -25,7 +25,7 @@ HINT = (
     '<p class="hint screen">Figures: drag to zoom, double-click to show all, press a name in a legend to hide its curve. '
     '<button type="button" class="drawings" aria-pressed="false" hidden>Drawings instead of plots</button></p>'
 )
-SCRIPTS = ("vendor/uplot/uPlot.iife.min.js", "live.js")  # in the order in which they run
+SCRIPTS = ("vendor/uplot/uPlot.iife.min.js", "live_plot.js", "live.js")  # in the order in which they run
 
 
 @dataclass(frozen=True)
