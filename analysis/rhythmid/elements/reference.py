@@ -70,6 +70,8 @@ similar one. What to fill in, besides names, equation, parameters and reference:
   states. It returns its value, and with states their rates after it: `return force, rate`.
 - `history` and `dead_time`: signals of those that the kernel is given which it wants as they were earlier, too, and the parameter
   that says by how much. They are its last arguments.
+- `switches`: where the force changes form, for the phase portraits of reports: `("v", "")` at zero velocity, `("x", "kink")` at
+  the position that the parameter `kink` says.
 - `acts`: which motion a force sees, and where it is added; left out it is `leg`.
 - `size`: the parameter that says how much of the effect there is, and `absent` (0 unless said) the value at which the model
   behaves as without it. The score test moves this parameter alone.
