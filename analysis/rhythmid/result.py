@@ -109,6 +109,18 @@ def optional(package: str, method: str) -> Any:
         ) from None
 
 
+def legend_above(axis: "Axes") -> None:
+    """The legend in a line above the axis, where it hides no curve."""
+    axis.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=3,
+        frameon=False,
+        borderaxespad=0.2,
+        fontsize="small",
+    )
+
+
 def axis_or_new(axis: "Axes | None") -> "Axes":
     """The axis, or one of a new pyplot figure."""
     if axis is not None:

@@ -27,8 +27,9 @@ from rhythmid.progress import Tell
 from rhythmid.record.outlier import without_outliers
 from rhythmid.record.record import Channel, Record
 from rhythmid.report.comparison import LABELS
+from rhythmid.report.quantity import pretty_unit
 from rhythmid.report.run import Run
-from rhythmid.result import Result, Row, axis_or_new
+from rhythmid.result import Result, Row, axis_or_new, legend_above
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -153,13 +154,19 @@ class Comparison(Result):
         show(self.to_dict(), console)
 
     def plot(self, axis: "Axes | None" = None) -> "Axes":
-        """Draw recording, simulation and their difference over time; on a new figure where no axis is given."""
+        """Draw recording and simulation over time, their difference shaded; on a new figure where no axis is given."""
         axis, pair = axis_or_new(axis), self.pair
         axis.plot(pair.time, pair.recording, color="black", linewidth=1.0, label=self.recording)
-        axis.plot(pair.time, pair.simulation, linestyle="--", label=f"{self.simulation} (simulation)")
-        axis.plot(pair.time, pair.recording - pair.simulation, linewidth=0.8, label="difference")
-        axis.set(xlabel="time [s]", ylabel=f"output [{self.unit}]")
-        axis.legend(loc="upper right")
+        (simulated,) = axis.plot(
+            pair.time, pair.simulation, linewidth=1.2, label=f"{self.simulation} (simulation)"
+        )
+        axis.fill_between(
+            pair.time, pair.recording, pair.simulation, color=simulated.get_color(), alpha=0.25, linewidth=0.0,
+            label="difference",
+        )  # fmt: skip
+        axis.set(xlabel="time [s]", ylabel=f"output [{pretty_unit(self.unit)}]")
+        axis.margins(x=0.01)
+        legend_above(axis)
         return axis
 
     def _where(self) -> str:

@@ -115,24 +115,17 @@ class Answer(Result):
         show(self.diagnosis, console)
 
     def plot(self, axis: "Axes | None" = None, most: int = 8) -> "Axes":
-        """Draw how much worse than the best each hypothesis predicts unseen data, with its standard error.
+        """Draw how much worse than the best each hypothesis predicts unseen data, with its standard error and probability.
 
         Parameters
         ----------
         axis : Matplotlib axis; one of a new figure where None.
         most : hypotheses that are drawn.
         """
-        axis, shown = axis_or_new(axis), self.diagnosis.hypotheses[:most]
-        places = range(len(shown))
-        axis.barh(
-            places,
-            [one.score_difference for one in shown],
-            xerr=[one.standard_error for one in shown],
-            height=0.6,
-        )
-        axis.set_yticks(places, [" + ".join(one.elements) or "nominal model" for one in shown])
-        axis.invert_yaxis()
-        axis.set_xlabel("log density of unseen data, less than the best hypothesis")
+        from rhythmid.diagnose.answer.figure import draw_hypotheses
+
+        axis = axis_or_new(axis)
+        draw_hypotheses(axis, self.diagnosis, most)
         return axis
 
     def ledger(self) -> dict[str, Any]:

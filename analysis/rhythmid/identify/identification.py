@@ -18,8 +18,8 @@ from rhythmid.identify.paper import PaperResult
 from rhythmid.ltp.harmonic_estimate import HarmonicEstimate, HarmonicEstimates
 from rhythmid.model import Model
 from rhythmid.record.record import Record
-from rhythmid.report.quantity import percent
-from rhythmid.result import Result, Row, axis_or_new
+from rhythmid.report.quantity import percent, pretty_unit
+from rhythmid.result import Result, Row, axis_or_new, legend_above
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -233,12 +233,13 @@ class Identification(Result):
             raise InputError("the paper's method has no free run to draw; identify with method='joint'")
         axis, fit = axis_or_new(axis), self.joint.fit
         series = fit.run.series[record]
-        axis.plot(series.centres, series.averaged, color="black", linewidth=1.0, label="measured")
+        axis.plot(series.centres, series.averaged, color="0.7", linewidth=3.0, label="measured")
         axis.plot(
-            series.centres, series.averaged + fit.residuals[record], linestyle="--", label="identified model"
+            series.centres, series.averaged + fit.residuals[record], linewidth=1.0, label="identified model"
         )
-        axis.set(xlabel="time [s]", ylabel=f"output [{self.records[0].output.unit}]")
-        axis.legend(loc="upper right")
+        axis.set(xlabel="time [s]", ylabel=f"output [{pretty_unit(self.records[0].output.unit)}]")
+        axis.margins(x=0.01)
+        legend_above(axis)
         return axis
 
     def plot_transfer_function(self, m: int = 0, axis: "Axes | None" = None) -> "Axes":
@@ -254,10 +255,13 @@ class Identification(Result):
         )
         axis.plot(one.frequency, size, ".", markersize=3, color="black", label="estimate")
         units = self.model.units
+        name = f"|$G_{{{m:+d}}}$|" if m else "|$G_0$|"
         axis.set(
-            xlabel="output frequency [Hz]", ylabel=f"|{harmonic_name(m)}| [{units.position}/{units.force}]"
+            xlabel="output frequency [Hz]",
+            ylabel=f"{name} [{pretty_unit(f'{units.position}/{units.force}')}]",
         )
-        axis.legend(loc="upper right")
+        axis.set_ylim(bottom=0.0)
+        legend_above(axis)
         return axis
 
     def to_dict(self) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.report.quantity import pretty_name
 from rhythmid.result import axis_or_new, optional
 
 if TYPE_CHECKING:
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
+DARK = 0.6  # correlation from which a cell of the drawing is dark
+MOST_WRITTEN = 12  # parameters up to which a drawing has room for numbers
 UNDETERMINED = 1e20  # variance from which the records say nothing of a parameter
 
 
@@ -74,13 +77,17 @@ class JointCovariance:
         """Draw the correlation as a coloured matrix; on a new figure where no axis is given."""
         axis = axis_or_new(axis)
         shown = axis.imshow(self.correlation, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
-        places = range(len(self.names))
-        axis.set_xticks(places, self.names, rotation=45, ha="right", rotation_mode="anchor")
-        axis.set_yticks(places, self.names)
+        places, names = range(len(self.names)), [pretty_name(name) for name in self.names]
+        axis.set_xticks(places, names, rotation=45, ha="right", rotation_mode="anchor")
+        axis.set_yticks(places, names)
         for row in places:
             for column in places:
                 value = self.correlation[row, column]
-                if math.isfinite(value):
-                    axis.annotate(f"{value:.2f}", (column, row), ha="center", va="center", fontsize="small")
+                if row != column and math.isfinite(value) and len(places) <= MOST_WRITTEN:
+                    text = f"{value:.2f}".replace("-", "−").replace("−0.00", "0.00")
+                    colour = "white" if abs(value) > DARK else "black"
+                    axis.annotate(
+                        text, (column, row), ha="center", va="center", fontsize="small", color=colour
+                    )
         axis.figure.colorbar(shown, ax=axis, label="correlation")
         return axis

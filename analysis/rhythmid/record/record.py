@@ -182,7 +182,8 @@ class Record(Result):
             raise InputError(f"{self.name}: there is no channel {role!r}; it has {', '.join(self.channels)}")
         axis, channel = axis_or_new(axis), self.channels[role]
         axis.plot(channel.time, channel.value, linewidth=1.0, label=f"{self.name}: {role}")
-        axis.set(xlabel="time [s]", ylabel=f"{role} [{channel.unit}]")
+        axis.set(xlabel="time [s]", ylabel=f"{role} [{channel.unit.replace('*', '·')}]")
+        axis.margins(x=0.01)
         return axis
 
     def cut(self, start: float, end: float) -> "Record":

@@ -13,6 +13,7 @@ from rhythmid.report.quantity import number
 Array = NDArray[np.float64]
 WIDTH, HEIGHT = 400.0, 250.0  # small enough that text stays readable when a phone shrinks the drawing
 LEFT, RIGHT, TOP, BOTTOM = 54.0, 12.0, 26.0, 42.0
+FEWEST_TICKS, MOST_TICKS = 3, 9  # an axis with fewer is hard to read, one with more is crowded
 MOST_OF_PATH = 1500  # points of a path that are drawn
 
 
@@ -100,6 +101,8 @@ def linear_ticks(low: float, high: float, most: int = 6) -> list[float]:
     tens = 10.0 ** math.floor(math.log10(rough))
     step = next(m * tens for m in (1.0, 2.0, 5.0, 10.0) if m * tens >= rough * (1 - 1e-9))
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    if last - first < FEWEST_TICKS - 1 and most < MOST_TICKS:
+        return linear_ticks(low, high, most + 1)
     return [k * step for k in range(first, last + 1)]
 
 

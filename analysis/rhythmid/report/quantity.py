@@ -32,6 +32,7 @@ def plain(text: str) -> str:
     """A line of the command's output as the page says it: names without underscores, χ² and powers of ten spelled out."""
     text = re.sub(r"\b[a-z][a-z0-9]*(?:_[a-z0-9]+)+\b", lambda found: found[0].replace("_", " "), text)
     text = re.sub(r"(?<=[a-z0-9])\.(?=[a-z])", ": ", text)
+    text = re.sub(r"(?<=[A-Za-z])\*(?=[A-Za-z])", "·", text)  # units: N·s/m
     return re.sub(r"\b\d+(?:\.\d+)?e[+-]?\d+\b", lambda found: number(float(found[0])), text).replace(
         "chi2", "χ²"
     )

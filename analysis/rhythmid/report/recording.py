@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rhythmid.record.record import Channel, Record
 from rhythmid.report.blocks import Block, Bullets, Drawing, Paragraph, Section, Table, Tile, Tiles, drawing
@@ -12,8 +13,10 @@ from rhythmid.report.page import Page, Tone
 from rhythmid.report.quantity import NONE, number, pretty_unit, scaled, sentence, with_unit
 from rhythmid.report.sections import reproduce_section
 
+Array = NDArray[np.float64]
 LINK = "time"
 MEGABYTE = 1e6
+EVEN = 1e-3  # of a step, by which steps differ that are drawn as a flat line anyway
 USABLE: dict[bool, tuple[str, Tone]] = {
     True: ("Usable, with remarks", "found"),
     False: ("Usable, and nothing to remark", "good"),
@@ -90,12 +93,18 @@ def _listed(lines: Sequence[str]) -> Block:
 
 
 def _channels(record: Record) -> Section:
-    """Every channel over time with the time between its samples."""
+    """Every channel over time, and the time between its samples where that is not always the same."""
     blocks: list[Block] = []
+    even: list[str] = []
     for role, channel in record.channels.items():
         blocks.append(_over_time(role, channel))
-        if len(channel) > 2:
-            blocks.append(_steps(role, channel))
+        steps = np.diff(channel.time)
+        if len(steps) > 1 and np.ptp(steps) > EVEN * float(np.median(steps)):
+            blocks.append(_steps(role, channel.time[1:], steps))
+        else:
+            even.append(role)
+    if even:
+        blocks.append(Paragraph(f"Evenly spaced in time: {', '.join(even)}.", "note"))
     return Section("Channels", tuple(blocks))
 
 
@@ -106,21 +115,20 @@ def _over_time(role: str, channel: Channel) -> Drawing:
         role.capitalize(),
         Chart(
             f"The channel {role} over time, {len(channel)} samples.", "time [s]",
-            f"{role} [{shown}]" if shown else role, (Curve(channel.time, factor * channel.value, role, "after"),), link=LINK,
+            f"{role} [{shown}]" if shown else role, (Curve(channel.time, factor * channel.value, "", "after"),), link=LINK,
         ),
         f"{len(channel)} samples of {role}, as recorded{f' from {channel.source}' if channel.source else ''}.",
         wide=True,
     )  # fmt: skip
 
 
-def _steps(role: str, channel: Channel) -> Drawing:
-    steps = np.diff(channel.time)
+def _steps(role: str, time: Array, steps: Array) -> Drawing:
     factor, unit = scaled(float(np.median(steps)), "s")
     return drawing(
         f"Time between samples of {role}",
         Chart(
             f"Time between the samples of {role}, over time. Longest: {with_unit(number(factor * float(steps.max()), 3), unit)}.",
-            "time [s]", f"step [{unit}]", (Curve(channel.time[1:], factor * steps, f"step of {role}", "measured"),),
+            "time [s]", f"step [{unit}]", (Curve(time, factor * steps, "", "measured"),),
             from_zero=True, link=LINK,
         ),
         "A flat line is an even clock; its width is jitter, a spike is a gap.",
@@ -150,7 +158,7 @@ def _quality(result: Mapping[str, Any]) -> list[Section]:
 def _topics(result: Mapping[str, Any]) -> list[Section]:
     rows = tuple(
         (
-            one["name"], one["type"], str(one["count"]), with_unit(number(one["rate"], 4), "Hz"), _seconds(one["jitter_std"]),
+            one["name"], one["type"], str(one["count"]), with_unit(number(one["rate"], 4), "Hz") if one["rate"] else NONE, _seconds(one["jitter_std"]),
             str(one["gaps"]), str(one["duplicates"]), _seconds(one["lateness_mean"]),
         )
         for one in result["topics"]

@@ -20,6 +20,7 @@ from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.run import EffortResult
 from rhythmid.identify.inverse_dynamics.estimate import size_of
+from rhythmid.report.quantity import rounded
 
 NO_SENSOR = "The measurement is taken for the motion: effects in the sensor and in the measurement's time are not among the candidates."
 FIXED_SCALE = "The recorded effort is taken to be true in scale."
@@ -132,7 +133,7 @@ def _recalibrated(case: Case, fitted: Fitted) -> tuple[str, ...]:
             4.0 * std[name], 0.02 * abs(value.value)
         ):
             said.append(
-                f"{name}: {value.value:.6g} in the nominal model, {new:.6g} ± {std[name]:.2g} {value.unit} in the records"
+                f"{name}: {value.value:.6g} in the nominal model, {rounded(new, std[name])} ± {std[name]:.2g} {value.unit} in the records"
             )
     return tuple(said)
 
