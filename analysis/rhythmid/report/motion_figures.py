@@ -47,7 +47,7 @@ def over_time(run: Run, compared: Compared) -> Drawing:
             f"{run.name}: the {compared.quantity} as measured and as {compared.made}, over time.",
             "time [s]", f"{compared.quantity} [{pretty_unit(unit)}]", tuple(curves), shaded=hidden, link=time_link(run),
         ),
-        f"The {compared.quantity} of {run.name} and what each model makes of it. {role} Zoom in: the figure below follows.",
+        f"The {compared.quantity} of {run.name} and what each model makes of it. {role}".rstrip(),
         wide=True,
     )  # fmt: skip
 

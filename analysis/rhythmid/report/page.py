@@ -22,7 +22,8 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 STYLES = ("vendor/uplot/uPlot.min.css", "style.css")
 DRAWN_BY = " Figures by uPlot, © Leon Sorokin, MIT licence."
 HINT = (
-    '<p class="hint screen">Figures: drag to zoom, double-click to show all, press a name in a legend to hide its curve. '
+    '<p class="hint screen">Figures: drag to zoom, double-click to show all, press a name in a legend to hide its curve; '
+    "plots over the time of one record move together. "
     '<button type="button" class="drawings" aria-pressed="false" hidden>Drawings instead of plots</button></p>'
 )
 SCRIPTS = ("vendor/uplot/uPlot.iife.min.js", "live_plot.js", "live.js")  # in the order in which they run
