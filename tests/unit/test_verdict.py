@@ -308,3 +308,9 @@ def test_every_verdict_but_consistent_and_missing_physics_has_a_reason_in_words(
     made = contest(NOMINAL, friction(0.6), maps={"velocity": predicted(1e-4)})
     assert decided(made)[1].reason
     assert decided(contest(NOMINAL), 0.8)[1].reason
+
+
+def test_a_longer_delay_does_not_keep_an_effect_beside_it_from_being_named():
+    late = supposed("input_delay.delay friction", predicted(0.01), "delay")
+    alone = supposed("input_delay.delay", predicted(0.5), "delay")
+    assert verdict(contest(NOMINAL, alone, late)) == ("missing_physics", ("friction",))

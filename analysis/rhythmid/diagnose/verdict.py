@@ -11,6 +11,7 @@ from rhythmid.diagnose.evidence import difference, gain_ahead
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, Verdict
 from rhythmid.diagnose.probability import adequacy, joint_probability, weights_of
 from rhythmid.diagnose.selection import Contest, Selection, equivalent
+from rhythmid.simulation.transport import INPUT_DELAY
 
 
 @dataclass(frozen=True)
@@ -136,6 +137,8 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     names = dict(zip(chosen.elements, chosen.names))
     if chosen.kind == "free_map":  # the map is no name
         labels = tuple(label for label in labels if label != chosen.elements[-1])
+    if chosen.kind == "delay" and len(labels) > 1:  # a delay beside effects is told with the delays
+        labels = tuple(label for label in labels if label != INPUT_DELAY)
     explained = 1.0 - left.share
     sure = {label: adequacy(_own_share(shares[label], left.share)) for label in labels}
 
@@ -172,7 +175,7 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
         return answer(
             "undecided", "a value that the nominal model holds fixed explains the records when it is free"
         )
-    if chosen.kind == "delay":
+    if chosen.kind == "delay" and (not stated or stated == (INPUT_DELAY,)):
         return answer("undecided", "a longer delay of the input than was given explains the records")
     if explained < MAINLY:
         return answer(
