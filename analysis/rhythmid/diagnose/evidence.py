@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from rhythmid.diagnose.constants import (
     BLOCK_ODDS,
@@ -205,6 +206,14 @@ def weight_for(first: Prediction, second: Prediction) -> float:
     return float(np.minimum(first.log_density - second.log_density, math.log(BLOCK_ODDS)).sum())
 
 
+def chance_better(first: Prediction, second: Prediction, least: float) -> float:
+    """Chance that the first predicts better than the second by more than the log density `least`, under the Bayesian bootstrap
+    of the blocks."""
+    gain = first.log_density - second.log_density
+    found = len(gain) * _resampled(len(gain)) @ gain - least
+    return float(np.mean(expit(found)))
+
+
 def gain_ahead(first: Prediction, second: Prediction) -> float:
     """By how many standard errors the first predicts better what no fit has seen; infinite where nothing is held out.
 
@@ -224,6 +233,11 @@ def _summed(gain: Array) -> tuple[float, float]:
     return float(gain.sum()), error
 
 
+def _resampled(count: int, seed: int = 0) -> Array:
+    """Weights (draws, count) of the Bayesian bootstrap of so many blocks; each draw sums to one."""
+    return np.random.default_rng(seed).dirichlet(np.ones(count), DRAWS)
+
+
 def probabilities(hypotheses: Sequence[Hypothesis], seed: int = 0) -> Array:
     """Probability (h,) of each hypothesis among these: pseudo-BMA weights under the Bayesian bootstrap of the blocks."""
     if not hypotheses:
@@ -231,8 +245,7 @@ def probabilities(hypotheses: Sequence[Hypothesis], seed: int = 0) -> Array:
     densities = np.array([one.prediction.log_density for one in hypotheses])
     prior = -EFFECT_PRIOR * np.array([len(one.elements) for one in hypotheses], dtype=float)
     count = densities.shape[1]
-    draws = np.random.default_rng(seed).dirichlet(np.ones(count), DRAWS)  # (draws, b)
-    scores = count * draws @ densities.T + prior
+    scores = count * _resampled(count, seed) @ densities.T + prior
     scores -= scores.max(axis=1, keepdims=True)
     each = np.exp(scores)
     return np.asarray((each / each.sum(axis=1, keepdims=True)).mean(axis=0), dtype=np.float64)
