@@ -143,8 +143,11 @@ def test_equal_lockstep_runs_give_equal_bytes(rhythmid, tmp_path):
         path = experiment_file(
             tmp_path, time={"layout": layout, "window": window}, excitation={"sweep": 1.0}
         )  # fmt: skip
-        done = rhythmid("run", path, "--out", tmp_path / layout / "bag")
+        page = tmp_path / f"{layout}.html"
+        done = rhythmid("run", path, "--out", tmp_path / layout / "bag", "--report", page)
         assert done.returncode == 0, done.stderr
+        told = page.read_text(encoding="utf-8")
+        assert "<h1>The run came to its end</h1>" in told and "/hopper/joint_states position[leg]" in told
         found.append({file.name: file.read_bytes() for file in (tmp_path / layout / "bag").iterdir()})
     assert set(found[0]) == set(found[1])
     for name, data in found[0].items():
@@ -318,8 +321,10 @@ def test_a_machine_that_leaves_its_envelope_ends_the_run_with_code_1(rhythmid, t
         excitation={"type": "profile", "points": [[0.0, 0.0], [0.5, 20.0]], "length": 20.0},
         safety={"envelope": [0.0, 0.25], "max_effort": 30.0, "stale_after": 5.0},
     )
-    done = rhythmid("run", path)
+    done = rhythmid("run", path, "--report", tmp_path / "page.html")
     assert done.returncode == 1 and "outside the envelope" in done.stderr
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "<h1>The run broke off</h1>" in page and "outside the envelope" in page
     rows, run = content(tmp_path / "experiment_bag")
     assert run[-1]["state"] == "stopped" and rows["excitation"][-1].effort == 0.0
 

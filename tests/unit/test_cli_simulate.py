@@ -68,8 +68,14 @@ def test_folders_above_a_result_are_made(folder, rhythmid):
     done = rhythmid("simulate", "hopper.yaml", "--experiment", "run.yaml", "--out", "out/of/bags/bag")
     assert (done.returncode, done.stderr) == (0, "")
     assert recorded(folder / "out" / "of" / "bags" / "bag")
-    rhythmid("check", "out/of/bags/bag", "--json", "out/of/checks/bag.json")
-    assert [path.name for path in (folder / "out" / "of" / "checks").iterdir()] == ["bag.json"]
+    checks = folder / "out" / "of" / "checks"
+    done = rhythmid(
+        "check", "out/of/bags/bag", "--json", checks / "bag.json", "--report", checks / "bag.html"
+    )
+    assert done.returncode == 2 and "less than one period of the forcing" in done.stderr
+    assert {path.name for path in checks.iterdir()} == {"bag.json", "bag.html"}
+    page = (checks / "bag.html").read_text(encoding="utf-8")
+    assert "<h1>Not usable</h1>" in page and "less than one period of the forcing" in page
 
 
 def test_a_result_is_never_written_over(folder, rhythmid):

@@ -116,9 +116,11 @@ def test_json_on_standard_output_is_nothing_but_json(bag, rhythmid):
     assert "joint_states" in done.stderr  # the report for people goes where it does not disturb
 
 
-def test_quiet_prints_errors_only(bag, rhythmid):
-    done = rhythmid("check", bag, "-q", "--json", "-")
+def test_quiet_prints_errors_only(bag, rhythmid, tmp_path):
+    done = rhythmid("check", bag, "-q", "--json", "-", "--report", "page.html")
     assert done.returncode == 0 and json.loads(done.stdout)["topics"] and done.stderr == ""
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "<h1>Usable" in page and page.count('<script type="application/json">') >= 2
     refused = rhythmid("check", "nothing", "-q")
     assert refused.returncode == 2 and refused.stderr.startswith("error: ")
 
