@@ -4,10 +4,12 @@ import base64
 import hashlib
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 import pytest
 from reported import REMAINDER, by_effort, estimate, findings, identified, result
 
@@ -178,6 +180,19 @@ def test_experiments_stand_beside_their_actual_delays() -> None:
     )
     assert "20.0 / 16.0 ms" in html and "21.0 / 14.1 ms" in html
     assert "largest error of the final estimates is 1.00\u202fms" in html
+
+
+def test_a_page_of_many_long_records_stays_below_two_megabytes() -> None:
+    made, count = findings(result()), 20_000
+    time, everything = np.arange(count) * 1e-3, np.ones(count, bool)
+    noise = 1e-4 * np.random.default_rng(0).standard_normal((3, count))
+    motion = 0.01 * np.cos(4.0 * np.pi * time)
+    run = replace(
+        made.runs[0], time=time, measured=motion + noise[0], before=motion + noise[1], after=motion + noise[2],
+        position=motion, velocity=np.gradient(motion, 1e-3), phase=time % 1.0, used=everything, hidden=~everything,
+    )  # fmt: skip
+    page = diagnosis_page(replace(made, runs=tuple(replace(run, name=f"run {i}") for i in range(14))))
+    assert 1_000_000 < len(render(page).encode("utf-8")) < 2_000_000
 
 
 def test_a_page_is_written_whole_or_not_at_all(tmp_path: Path) -> None:

@@ -14,7 +14,8 @@ Array = NDArray[np.float64]
 WIDTH, HEIGHT = 400.0, 250.0  # small enough that text stays readable when a phone shrinks the drawing
 LEFT, RIGHT, TOP, BOTTOM = 54.0, 12.0, 26.0, 42.0
 FEWEST_TICKS, MOST_TICKS = 3, 9  # an axis with fewer is hard to read, one with more is crowded
-MOST_OF_PATH = 1500  # points of a path that are drawn
+COLUMN = 2.0  # pixels within which points of a curve are not told apart
+MOST_OF_PATH = 400  # points of a path that are drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,18 +242,30 @@ def _envelope(x: Array, y: Array, columns: int) -> tuple[Array, Array, Array]:
 
 def _curve(curve: Curve, x: Axis, y: Axis) -> str:
     dash = " dashed" if curve.dashed else ""
-    columns = int(abs(x.end - x.begin))
+    columns = int(abs(x.end - x.begin) / COLUMN)
     parts = []
     for piece in _unbroken(np.isfinite(curve.y)):
         across, up = x(curve.x[piece]), y(curve.y[piece])
         if curve.low is not None and curve.high is not None:
             low, high = y(curve.low[piece]), y(curve.high[piece])
             parts.append(f'<path class="band {curve.style}" d="{_ring(across, low, high)}"/>')
-        if len(across) > 3 * columns:  # more samples than pixels: the outline of what they cover
+        if len(across) > 6 * columns:  # more samples than pixels: the outline of what they cover
             parts.append(f'<path class="cover {curve.style}" d="{_ring(*_envelope(across, up, columns))}"/>')
         else:
-            parts.append(f'<path class="line {curve.style}{dash}" d="M{_points(across, up)}"/>')
+            parts.append(f'<path class="line {curve.style}{dash}" d="M{_points(*_visible(across, up))}"/>')
     return "".join(parts)
+
+
+def _visible(x: Array, y: Array) -> tuple[Array, Array]:
+    """The points of a curve that can be told apart: of those in one column of pixels the lowest and the highest."""
+    if len(x) < 3:
+        return x, y
+    column = np.floor(x / COLUMN)
+    edges = np.flatnonzero(np.diff(column, prepend=-np.inf))
+    order = np.lexsort((y, column))
+    last = np.append(edges[1:], len(x)) - 1
+    kept = np.unique(np.concatenate([order[edges], order[last], [0, len(x) - 1]]))
+    return x[kept], y[kept]
 
 
 def _path(curve: Curve, x: Axis, y: Axis) -> str:

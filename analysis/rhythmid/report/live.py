@@ -21,7 +21,7 @@ UNEVEN = 1e-6  # of a step, by which samples may be off an even grid
 
 def most_points(charts: Sequence[Chart], budget: float = BUDGET) -> int:
     """Points that a curve may have for all charts to keep within the budget [bytes]; longer curves are thinned."""
-    sizes = [len(curve.x) for chart in charts for curve in chart.curves for _ in _parts(curve)]
+    sizes = [size for chart in charts for size in _sizes(chart)]
     if VALUE * sum(sizes) <= budget:
         return max(sizes, default=FEWEST)
     low, high = FEWEST, max(sizes)
@@ -29,6 +29,16 @@ def most_points(charts: Sequence[Chart], budget: float = BUDGET) -> int:
         middle = (low + high) // 2
         low, high = (middle, high) if VALUE * sum(min(n, middle) for n in sizes) <= budget else (low, middle)
     return low
+
+
+def _sizes(chart: Chart) -> list[int]:
+    """Number of values of everything that is stored of a chart; one of x counts twice where x is not even."""
+    parts = [part for c in chart.curves for part in (c.y, c.low, c.high) if part is not None]
+    if chart.path:
+        parts += [curve.x for curve in chart.curves]
+    elif chart.curves and _even(chart.curves[0].x) is None:
+        parts += [chart.curves[0].x] * 2
+    return [len(part) for part in parts]
 
 
 def chart_data(chart: Chart, most: int) -> str:
@@ -55,15 +65,10 @@ def chart_data(chart: Chart, most: int) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def _parts(curve: Curve) -> list[Array]:
-    """What is stored of a curve besides x."""
-    return [part for part in (curve.y, curve.low, curve.high) if part is not None]
-
-
 def _over_common_x(chart: Chart, most: int) -> dict[str, Any]:
     shown = [curve for curve in chart.curves if len(curve.x)]
     if not shown:
-        return {"xs": _grid(np.empty(0)), "curves": []}
+        return {"xs": _grid(np.empty(0), most), "curves": []}
     same = all(np.array_equal(curve.x, shown[0].x) for curve in shown)
     x = shown[0].x if same else np.unique(np.concatenate([curve.x for curve in shown]))
 
@@ -74,7 +79,7 @@ def _over_common_x(chart: Chart, most: int) -> dict[str, Any]:
         return _values(_extremes(values, most), chart.y_log)
 
     return {
-        "xs": _grid(_thinned(x, most)),
+        "xs": _grid(x, most),
         "curves": [
             _name(curve)
             | {
@@ -99,28 +104,17 @@ def _name(curve: Curve) -> dict[str, Any]:
     return {"label": curve.label, "style": curve.style, "dashed": curve.dashed}
 
 
-def _edges(count: int, most: int) -> NDArray[np.int64]:
-    """Where the stretches begin of which two points are kept each; the last is `count`."""
-    return np.linspace(0, count, max(most // 2, 1) + 1).astype(np.int64)
-
-
-def _thinned(x: Array, most: int) -> Array:
-    """The points at which thinned curves are stored, two in every stretch."""
-    if len(x) <= most:
-        return x
-    edges = _edges(len(x), most)
-    width = np.diff(edges)
-    return np.ravel(np.stack([x[edges[:-1] + width // 4], x[edges[:-1] + (3 * width) // 4]], axis=1))
+def _stretch(count: int, most: int) -> int:
+    """Samples of a stretch of which two points are kept; a multiple of four, so that these are evenly spaced."""
+    return 4 * -(-count // (2 * most))
 
 
 def _extremes(y: Array, most: int) -> Array:
     """The smallest and the largest value of every stretch, in the order in which they came."""
     if len(y) <= most:
         return y
-    edges = _edges(len(y), most)
     kept = []
-    for begin, end in zip(edges[:-1], edges[1:]):
-        piece = y[begin:end]
+    for piece in np.split(y, range(width := _stretch(len(y), most), len(y), width)):
         if np.isnan(piece).all():
             kept += [np.nan, np.nan]
             continue
@@ -129,13 +123,30 @@ def _extremes(y: Array, most: int) -> Array:
     return np.array(kept)
 
 
-def _grid(x: Array) -> dict[str, Any]:
-    """Points that grow: first and step where they are even, single precision where they are not."""
-    step = (x[-1] - x[0]) / (len(x) - 1) if len(x) > 1 else 0.0
-    if len(x) > 1 and np.max(np.abs(x - x[0] - step * np.arange(len(x)))) < UNEVEN * step:
-        return {"count": len(x), "first": float(x[0]), "step": float(step)}
-    first = float(x[0]) if len(x) else 0.0
-    return {"first": first, "float32": _base64((x - first).astype("<f4"))}
+def _even(x: Array) -> tuple[float, float] | None:
+    """First point and step of points that are evenly spaced; None where they are not."""
+    if len(x) < 2:
+        return None
+    step = float(x[-1] - x[0]) / (len(x) - 1)
+    off = float(np.max(np.abs(x - x[0] - step * np.arange(len(x)))))
+    return (float(x[0]), step) if off < UNEVEN * step else None
+
+
+def _grid(x: Array, most: int) -> dict[str, Any]:
+    """Points that grow, thinned as `_extremes` does: first and step where they are even, single precision where not."""
+    even, places = _even(x), np.arange(len(x))
+    if len(x) > most:
+        width = _stretch(len(x), most)
+        places = np.arange(width // 4, 2 * -(-len(x) // width) * (width // 2), width // 2)
+    if even is not None:
+        first, step = even
+        apart = float(places[1] - places[0])
+        return {"count": len(places), "first": first + step * float(places[0]), "step": step * apart}
+    origin = float(x[0]) if len(x) else 0.0
+    return {
+        "first": origin,
+        "float32": _base64((x[np.minimum(places, len(x) - 1)] - origin).astype("<f4")),
+    }
 
 
 def _values(y: Array, log: bool = False) -> dict[str, Any]:

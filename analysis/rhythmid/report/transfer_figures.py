@@ -60,9 +60,10 @@ def transfer_grid(functions: Sequence[TransferFunction], unit: str) -> Columns:
                 Chart(
                     f"Magnitude of {name} over frequency.",
                     "output frequency [Hz]",
-                    f"[{label}]",
+                    f"magnitude [{label}]",
                     tuple(curves),
                     from_zero=True,
+                    link=f"frequency of {name}",
                 ),
                 f"How strongly an input {_shift(one.m)}. Band: 95 %.",
             )
@@ -99,9 +100,12 @@ def _phase(one: TransferFunction, name: str, band: Array | None, magnitude: Arra
         curves.append(Curve(one.frequency, turns, "fitted model", "before", dashed=True))
     return drawing(
         f"∠{name}, phase",
-        Chart(f"Phase of {name} over frequency.", "output frequency [Hz]", "[degrees]", tuple(curves)),
+        Chart(
+            f"Phase of {name} over frequency.", "output frequency [Hz]", "phase [degrees]", tuple(curves),
+            link=f"frequency of {name}",
+        ),
         "Its slope is the delay. Not drawn where the magnitude is below 2 % of its peak or less than its own interval.",
-    )
+    )  # fmt: skip
 
 
 def change_figures(
