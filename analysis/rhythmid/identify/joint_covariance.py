@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.report.quantity import pretty_name
 from rhythmid.result import axis_or_new, optional
 
 if TYPE_CHECKING:
@@ -77,9 +76,9 @@ class JointCovariance:
         """Draw the correlation as a coloured matrix; on a new figure where no axis is given."""
         axis = axis_or_new(axis)
         shown = axis.imshow(self.correlation, vmin=-1.0, vmax=1.0, cmap="RdBu_r")
-        places, names = range(len(self.names)), [pretty_name(name) for name in self.names]
-        axis.set_xticks(places, names, rotation=45, ha="right", rotation_mode="anchor")
-        axis.set_yticks(places, names)
+        places = range(len(self.names))
+        axis.set_xticks(places, self.names, rotation=45, ha="right", rotation_mode="anchor")
+        axis.set_yticks(places, self.names)
         for row in places:
             for column in places:
                 value = self.correlation[row, column]

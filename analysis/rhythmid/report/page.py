@@ -26,7 +26,8 @@ HINT = (
     "plots over the time of one record move together. "
     '<button type="button" class="drawings" aria-pressed="false" hidden>Drawings instead of plots</button></p>'
 )
-SCRIPTS = ("vendor/uplot/uPlot.iife.min.js", "live_plot.js", "live.js")  # in the order in which they run
+LIBRARY, LICENCE = "vendor/uplot/uPlot.iife.min.js", "vendor/uplot/LICENSE"
+SCRIPTS = ("live_plot.js", "live.js")  # of our own, in the order in which they run
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def render(page: Page) -> str:
     style = "\n".join(map(_file, STYLES))
     charts = charts_of([block for section in page.sections for block in section.blocks])
     most = most_points(charts)
-    scripts = [_file(name) for name in SCRIPTS] if charts else []
+    scripts = _scripts() if charts else []
     names = _anchors([section.title for section in page.sections])
     contents = "".join(
         f'<li><a href="#{name}">{escape(section.title)}</a></li>'
@@ -98,6 +99,11 @@ def render(page: Page) -> str:
 
 def _file(name: str) -> str:
     return files("rhythmid.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _scripts() -> list[str]:
+    """The library, with the licence that every copy of it has to bear, and our own."""
+    return [f"/*\n{_file(LICENCE)}*/\n{_file(LIBRARY)}", *map(_file, SCRIPTS)]
 
 
 def _policy(scripts: list[str]) -> str:
