@@ -26,6 +26,7 @@ def others(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
         "names": ["a.b", "c.d", "e.f"],
         "correlation": [[1, 0.95, None], [0.95, 1, -0.2], [None, -0.2, 1]],
     }
+    time = np.delete(np.arange(6000) * 1e-3, 3000)  # with a gap
     made = {
         "diagnosis": diagnosis_page(told),
         "identification": identification_page(
@@ -33,7 +34,7 @@ def others(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
         ),
         "recording": recording_page(
             {"path": EVIL, "size": 5e6, "duration": 6.0, "truncated": False, "usable": True, "topics": [], "channels": {}, "problems": []},
-            Record(EVIL, Channel(np.arange(6000) * 1e-3, np.sin(np.arange(6000) * 1e-2), "rad")), (EVIL,), "rhythmid check bag",
+            Record(EVIL, Channel(time, np.sin(10.0 * time), "rad")), (EVIL,), "rhythmid check bag",
         ),
         "hostile": diagnosis_page(findings(result(), name=EVIL)),
         "effort": diagnosis_page(by_effort()),
