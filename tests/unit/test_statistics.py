@@ -12,7 +12,7 @@ from rhythmid.identify.identifiability import Offset, _intervals
 from rhythmid.identify.identification import Estimate
 from rhythmid.proof.rate import Rate
 from rhythmid.report import residual_figures
-from rhythmid.report.chart import Chart
+from rhythmid.report.blocks import charts_of
 from rhythmid.report.quantity import estimate, plus_minus
 from rhythmid.report.run import SEGMENTS, Compared, Run, by_phase, error_of, harmonics
 from rhythmid.statistics import NORMAL_95
@@ -61,11 +61,9 @@ def test_the_interval_of_an_error_is_the_scatter_of_its_segments():
     assert found.half == pytest.approx(QUANTILE * found.ratio * 0.5 * of_mean, rel=1e-6)
 
 
-def test_the_mean_over_the_cycle_is_drawn_with_its_95_percent_interval(monkeypatch):
+def test_the_mean_over_the_cycle_is_drawn_with_its_95_percent_interval():
     noisy = run(1e-4 * np.random.default_rng(0).standard_normal(len(TIME)))
-    charts: list[Chart] = []
-    monkeypatch.setattr(residual_figures, "drawing", lambda _title, chart, _caption: charts.append(chart))
-    residual_figures.residual_grid(noisy, Compared("motion", "m"), "m")
+    charts = charts_of(residual_figures.residual_figures(noisy, Compared("motion", "m"), "m"))
     found = by_phase(noisy, "before")
     assert found is not None
     curve, _ = next(chart for chart in charts if chart.x_label.startswith("phase")).curves
