@@ -116,13 +116,14 @@ def fork_each(
         return
     context = multiprocessing.get_context("fork")
     waiting, tried = deque(range(len(items))), set[int]()
-    running: dict[Any, tuple[Any, int, int]] = {}  # its process, the item at hand, items that it may still take
+    running: dict[
+        Any, tuple[Any, int, int]
+    ] = {}  # its process, the item at hand, items that it may still take
 
     def start() -> None:
         ours, theirs = context.Pipe()
-        process = context.Process(
-            target=_work, args=(function, items, iter(theirs.recv, None), theirs), daemon=True
-        )
+        given: Iterator[int] = iter(theirs.recv, None)
+        process = context.Process(target=_work, args=(function, items, given, theirs), daemon=True)
         process.start()
         theirs.close()
         hand_on(ours, process, lifetime)
@@ -142,7 +143,8 @@ def fork_each(
         while waiting or running:
             while waiting and len(running) < (workers or cores()):
                 start()
-            for pipe in multiprocessing.connection.wait(list(running)):
+            ready = multiprocessing.connection.wait(list(running))
+            for pipe in [one for one in running if one in ready]:
                 process, index, left = running.pop(pipe)
                 try:
                     _, result, error = pipe.recv()

@@ -12,8 +12,15 @@ from rhythmid.batch.answered import Answered
 from rhythmid.batch.scatter import Slope, groups_agree, holm, homogeneous, random_effects, trend
 from rhythmid.batch.task import Task
 
-LEVEL = 0.05  # chance that any parameter of a batch is said to differ where there is nothing but the stated noise
-UNITS = ((86400.0, "day"), (3600.0, "h"), (60.0, "min"), (1.0, "s"))  # of time, the longest that the runs span twice
+LEVEL = (
+    0.05  # chance that any parameter of a batch is said to differ where there is nothing but the stated noise
+)
+UNITS = (
+    (86400.0, "day"),
+    (3600.0, "h"),
+    (60.0, "min"),
+    (1.0, "s"),
+)  # of time, the longest that the runs span twice
 Verdict = Literal["agrees", "differs", "too few runs"]
 RUN = "run"  # unit of time where no clock tells it: the number of the run
 

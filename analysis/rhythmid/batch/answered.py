@@ -28,7 +28,9 @@ from rhythmid.record.signals import Signals
 from rhythmid.report.page import Page, render
 
 CALENDAR = 1e8  # [s], three years: a clock that reads more counts from 1970, not from the start of a machine
-KIBIBYTE = 1 if sys.platform == "darwin" else 1024  # bytes in which the system counts the largest memory of a process
+KIBIBYTE = (
+    1 if sys.platform == "darwin" else 1024
+)  # bytes in which the system counts the largest memory of a process
 LONGEST = 300  # characters of a reason
 
 
@@ -113,14 +115,21 @@ def command_line(task: Task) -> str:
     if isinstance(task.options, IdentifyOptions):
         for name, value in asdict(task.options).items():
             if value != getattr(IdentifyOptions(), name):
-                words += [f"--{name.replace('_', '-')}", *map(str, value if isinstance(value, tuple) else [value])]
+                words += [
+                    f"--{name.replace('_', '-')}",
+                    *map(str, value if isinstance(value, tuple) else [value]),
+                ]
     return shlex.join(words)
 
 
 def _signals(task: Task) -> Signals | None:
     if task.signals is None:
         return None
-    return Signals.load(task.signals) if task.joint is None else JointSignals.load(task.signals).joints[task.joint]
+    return (
+        Signals.load(task.signals)
+        if task.joint is None
+        else JointSignals.load(task.signals).joints[task.joint]
+    )
 
 
 def _records(task: Task) -> tuple[list[Record], list[Record]]:
@@ -210,7 +219,9 @@ def _diagnosed(task: Task) -> Answered:
 def _diagnosed_machine(task: Task, machine: Machine) -> Answered:
     assert isinstance(task.options, DiagnoseOptions)
     records, unseen = _joint_records(task)
-    answer = diagnose_machine(records, machine, unseen, load_catalogue(task.elements), budget=task.options.budget)
+    answer = diagnose_machine(
+        records, machine, unseen, load_catalogue(task.elements), budget=task.options.budget
+    )
     found = answer.diagnosis
     values, notes = _values(found.parameters), (*found.assumptions, *found.notes)
     return Answered(
@@ -267,7 +278,9 @@ def _plain(
     sections += [Section("What was found" if not values else "Notes", (Bullets(notes),))] if notes else []
     sections.append(reproduce_section(command_line(task), {} if model is None else {"Model": model}))
     title = f"{task.command.capitalize()}: {task.name}"
-    return Page(title, f"{task.command} of {task.bag}", task.name, headline, "plain", Tiles(()), tuple(sections))
+    return Page(
+        title, f"{task.command} of {task.bag}", task.name, headline, "plain", Tiles(()), tuple(sections)
+    )
 
 
 def _name(task: Task) -> str:

@@ -27,7 +27,9 @@ class Kept:
             if not folder.is_dir():
                 raise InputError(f"{folder}: exists already and is no folder; name another with --out")
             if any(folder.iterdir()):
-                raise InputError(f"{folder}: exists already and is no batch's; name another folder with --out")
+                raise InputError(
+                    f"{folder}: exists already and is no batch's; name another folder with --out"
+                )
         require_writable(folder / MARK)
         self.folder = folder
 
@@ -49,7 +51,9 @@ class Kept:
         if answered.failure:
             return
         write_text(self._path(task, ".html"), answered.page)
-        write_json(self._path(task, ".json"), {"key": task.key, "name": task.name, "answer": answered.to_dict()})
+        write_json(
+            self._path(task, ".json"), {"key": task.key, "name": task.name, "answer": answered.to_dict()}
+        )
 
     def page(self, task: Task) -> str:
         """Where the page of an answer lies, relative to the folder, as a link."""

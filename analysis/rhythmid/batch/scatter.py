@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 from scipy.stats import chi2, f, t
 
 Array = NDArray[np.float64]
@@ -39,6 +39,11 @@ class Slope:
     p_value: float
     freedom: int
 
+    @property
+    def half(self) -> float:
+        """Half of the 95 % interval."""
+        return float(t.ppf(0.975, self.freedom)) * self.std
+
 
 @dataclass(frozen=True)
 class Mean:
@@ -56,7 +61,8 @@ def fit(design: Array, values: Array, stds: Array, between: float = 0.0) -> Fit:
     coefficients, _, rank, _ = np.linalg.lstsq(scaled, wanted, rcond=None)
     residual = wanted - scaled @ coefficients
     left = float(residual @ residual)
-    return Fit(coefficients, np.linalg.pinv(scaled.T @ scaled), left, len(values) - int(rank))
+    covariance: Array = np.linalg.pinv(scaled.T @ scaled).astype(np.float64)
+    return Fit(coefficients.astype(np.float64), covariance, left, len(values) - int(rank))
 
 
 def between_runs(design: Array, values: Array, stds: Array) -> float:
@@ -72,7 +78,7 @@ def between_runs(design: Array, values: Array, stds: Array) -> float:
     high = float(np.ptp(values)) or float(np.max(stds))
     while excess(high) > 0.0:
         high *= 2.0
-    return float(brentq(excess, 0.0, high))
+    return float(root_scalar(excess, bracket=(0.0, high), method="brentq").root)
 
 
 def random_effects(values: Array, stds: Array) -> Mean:

@@ -39,12 +39,17 @@ def by_cluster(tasks: Sequence[Task], address: str) -> Answers:
     except (OSError, ValueError, TimeoutError) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"--scheduler {address}: no Dask scheduler answers: {reason}") from None
-    with client:
-        threads = sum(client.nthreads().values())
+    with client, client.as_current():
+        threads = sum(one["nthreads"] for one in client.scheduler_info(n_workers=-1)["workers"].values())
         if not threads:
-            raise InputError(f"--scheduler {address}: the scheduler has no workers; start some with: dask worker {address}")
+            raise InputError(
+                f"--scheduler {address}: the scheduler has no workers; start some with: dask worker {address}"
+            )
         waiting = iter(tasks)
-        running = {client.submit(answer, task, key=f"rhythmid-{task.key}", pure=False): task for task in islice(waiting, AHEAD * threads)}
+        running = {
+            client.submit(answer, task, key=f"rhythmid-{task.key}", pure=False): task
+            for task in islice(waiting, AHEAD * threads)
+        }
         done = as_completed(list(running))
         for future in done:
             task, error = running.pop(future), future.exception()
