@@ -17,7 +17,7 @@ from scipy.optimize import root_scalar
 from scipy.stats import chi2, f, t
 
 Array = NDArray[np.float64]
-EXACT = 1e-12  # share of its own size below which a sum of squares is rounding
+EXACT = 1e-12  # share of their own size below which residuals are rounding
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,8 @@ def fit(design: Array, values: Array, stds: Array, between: float = 0.0) -> Fit:
     coefficients, _, rank, _ = np.linalg.lstsq(scaled, wanted, rcond=None)
     residual = wanted - scaled @ coefficients
     left = float(residual @ residual)
+    if left <= EXACT**2 * float(wanted @ wanted):
+        left = 0.0
     covariance: Array = np.linalg.pinv(scaled.T @ scaled).astype(np.float64)
     return Fit(coefficients.astype(np.float64), covariance, left, len(values) - int(rank))
 
@@ -110,7 +112,7 @@ def groups_agree(values: Array, stds: Array, groups: Sequence[str]) -> float | N
     between = between_runs(design, values, stds)
     whole, apart = (fit(one, values, stds, between) for one in (np.ones((len(values), 1)), design))
     more = design.shape[1] - 1
-    return _f_test(max(whole.left - apart.left, 0.0), more, apart.left, apart.freedom, whole.left)
+    return _f_test(max(whole.left - apart.left, 0.0), more, apart.left, apart.freedom)
 
 
 def trend(values: Array, stds: Array, groups: Sequence[str], times: Array) -> Slope | None:
@@ -124,8 +126,8 @@ def trend(values: Array, stds: Array, groups: Sequence[str], times: Array) -> Sl
     made = fit(design, values, stds, between_runs(design, values, stds))
     slope = float(made.coefficients[-1])
     std = math.sqrt(float(made.covariance[-1, -1]) * made.left / made.freedom)
-    if std <= EXACT * abs(slope):
-        return Slope(slope, std, 0.0 if slope else 1.0, made.freedom)
+    if std == 0.0:  # all on one line, which is level where the values are equal
+        return Slope(slope, std, 0.0 if np.ptp(values) else 1.0, made.freedom)
     return Slope(slope, std, float(2.0 * t.sf(abs(slope) / std, made.freedom)), made.freedom)
 
 
@@ -144,7 +146,7 @@ def _means(groups: Sequence[str]) -> Array:
     return np.stack([names == name for name in dict.fromkeys(groups)], axis=1).astype(np.float64)
 
 
-def _f_test(more: float, more_freedom: int, left: float, freedom: int, whole: float) -> float:
-    if left <= EXACT * whole or whole == 0.0:
-        return 1.0 if more <= EXACT * whole or whole == 0.0 else 0.0
+def _f_test(more: float, more_freedom: int, left: float, freedom: int) -> float:
+    if left == 0.0:  # the runs of each group are equal
+        return 0.0 if more > 0.0 else 1.0
     return float(f.sf((more / more_freedom) / (left / freedom), more_freedom, freedom))

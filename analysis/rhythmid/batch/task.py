@@ -94,6 +94,8 @@ def _tasks(
     sources = [rest] if entry.together else [(bag,) for bag in rest]
     for own, (model_name, model), (signals_name, file) in product(sources, models.items(), signals.items()):
         machine, known = joints_of(model, file, elements)
+        if entry.joints and not known:
+            settled.place.fail("'joints:' is for signals files with joints; name one in 'signals:'")
         joints = (None,) if machine or not known else tuple(entry.joints or known)
         for joint in joints:
             if joint is not None and joint not in known:
