@@ -39,6 +39,11 @@ def processor_time() -> float:
     return sum(one.ru_utime + one.ru_stime for one in spent)
 
 
+def kept(folder: Path) -> int:
+    """Answers that are there."""
+    return len(list((folder / "out").glob("answers/*.json")))
+
+
 def stage(folder: Path, runs: int, jobs: int) -> Batch:
     """Identify the first `runs` recordings."""
     for run in range(runs):
@@ -81,21 +86,21 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(given.get(2, temporary)).resolve()
         write_files(folder)
-        found, before = None, 0
+        found = None
         for part in range(1, STAGES + 1):
             count = runs * part // STAGES
+            before = kept(folder)
             cpu, wall = processor_time(), time.monotonic()
             found = stage(folder, count, jobs)
             cpu, wall = processor_time() - cpu, time.monotonic() - wall
             own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / MEGABYTE
             worker = max(one.memory for _, one in found.answers) / MEGABYTE
-            new = max(count - before, 1)
+            new = kept(folder) - before
             print(
-                f"{count:4d} answers: {new} new ones in {wall:.0f} s, {cpu / new:.2f} s of processor time each; "
+                f"{count:4d} answers: {new} new ones in {wall:.0f} s, {cpu / max(new, 1):.2f} s of processor time each; "
                 f"largest memory {own:.0f} MB here, {worker:.0f} MB in a worker",
                 flush=True,
             )
-            before = count
         assert found is not None
         begun = time.monotonic()
         page = render(present(found, lambda task: task.file))

@@ -38,7 +38,7 @@ def test_every_recording_is_a_task_once_with_what_is_said_above_the_entries(fold
     tasks = load(folder, GOOD)
     assert [(task.name, task.group, task.options.method) for task in tasks] == [
         ("a/1.csv", "rig A", "joint"), ("a/2.csv", "rig A", "joint"),
-        ("b/1.csv", "rig B", "paper"), ("b/2.csv", "rig B", "paper"),
+        ("b/1.csv · method paper", "rig B", "paper"), ("b/2.csv · method paper", "rig B", "paper"),
     ]  # fmt: skip
     assert len({task.file for task in tasks}) == 4
 
@@ -46,9 +46,15 @@ def test_every_recording_is_a_task_once_with_what_is_said_above_the_entries(fold
 def test_recordings_are_answered_with_each_model_and_each_joint(folder):
     (folder / "stiff.yaml").write_text((folder / "model.yaml").read_text().replace("220", "300"))
     (folder / "signals.yaml").write_text(SIGNALS.replace("y", '"*"') + "joints: [y, u]\n")
-    tasks = load(folder, "model: [model.yaml, stiff.yaml]\n" + GOOD.replace("model: model.yaml\n", ""))
+    tasks = load(
+        folder,
+        "model: [model.yaml, stiff.yaml]\n"
+        + GOOD.replace("model: model.yaml\n", "").replace("paper", "joint"),
+    )
     assert len(tasks) == 4 * 2 * 2
-    assert tasks[1].name == "a/1.csv · model · u" and tasks[1].joint == "u"
+    assert {task.name for task in tasks[:4]} == {
+        "a/1.csv · y · model", "a/1.csv · u · model", "a/1.csv · y · stiff", "a/1.csv · u · stiff",
+    }  # fmt: skip
     only = load(folder, "joints: u\n" + GOOD)
     assert [task.joint for task in only] == ["u"] * 4
 

@@ -11,6 +11,7 @@ import numpy as np
 from rhythmid.batch.answered import Answered
 from rhythmid.batch.scatter import Slope, groups_agree, holm, homogeneous, random_effects, trend
 from rhythmid.batch.task import Task
+from rhythmid.report.quantity import pretty_name
 
 LEVEL = (
     0.05  # chance that any parameter of a batch is said to differ where there is nothing but the stated noise
@@ -105,8 +106,10 @@ def agreements(answers: Iterable[tuple[Task, Answered]]) -> tuple[Agreement, ...
 
 def subject(task: Task, answered: Answered) -> str:
     """What is compared with what: only estimates of the same model from the same channels are."""
-    effects = [f"with {' and '.join(answered.missing)}"] if answered.missing else []
-    return " · ".join([task.command, *(one for one in (*task.labels, task.joint) if one), *effects])
+    effects = [f"with {' and '.join(map(pretty_name, answered.missing))}"] if answered.missing else []
+    return " · ".join(
+        [task.command, *(one for one in (*task.labels, task.joint, task.variant) if one), *effects]
+    )
 
 
 def _finite(value: float | None) -> bool:

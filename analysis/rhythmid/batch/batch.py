@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from rich.console import Console
 
+MOST_NAMED = 4  # parameters in a headline
+
 
 @dataclass(frozen=True)
 class Batch(Result):
@@ -39,9 +41,9 @@ class Batch(Result):
     folder: Path
 
     @property
-    def failures(self) -> dict[str, str]:
+    def failures(self) -> dict[Task, str]:
         """Why there is no answer, by task."""
-        return {task.name: one.failure for task, one in self.answers if one.failure}
+        return {task: one.failure for task, one in self.answers if one.failure}
 
     @property
     def headline(self) -> str:
@@ -51,12 +53,13 @@ class Batch(Result):
         compared = [one for one in self.agreements if one.verdict != "too few runs"]
         if not compared:
             return f"{answered}; no parameter was estimated twice"
-        differ = [
-            f"{pretty_name(one.name)} ({', '.join(one.different)})" for one in compared if one.different
-        ]
+        differ = [one for one in compared if one.different]
         if not differ:
             return f"{answered}; all {len(compared)} parameters agree"
-        return f"{answered}; {len(differ)} of {len(compared)} parameters differ: {'; '.join(differ)}"
+        said = list(dict.fromkeys(f"{pretty_name(one.name)} ({', '.join(one.different)})" for one in differ))
+        more = [f"{len(said) - MOST_NAMED} more"] if len(said) > MOST_NAMED else []
+        named = "; ".join([*said[:MOST_NAMED], *more])
+        return f"{answered}; {len(differ)} of {len(compared)} parameters differ: {named}"
 
     def tables(self) -> Mapping[str, Sequence[Row]]:
         """`values`, a row for each number of each answer and one for each failure; `agreement`; `answers`."""

@@ -32,13 +32,14 @@ if TYPE_CHECKING:
 Link = Callable[[Task], str]
 MEBIBYTE = 2.0**20
 NO_GROUP = "all runs"
+MOST_OPEN = 30  # answers up to which their lists are open
 
 
 def present(found: "Batch", link: Link, command: str = "") -> Page:
     """The index page of a batch; `link` is where the page of a task's answer lies."""
     answered = [pair for pair in found.answers if not pair[1].failure]
     sections = [
-        *_failed(found.failures),
+        *_failed({task.name: reason for task, reason in found.failures.items()}),
         *_agreement(found.agreements),
         *_over_runs(found.agreements, link),
         *_verdicts(answered),
@@ -112,7 +113,7 @@ def _agreement(found: Sequence[Agreement]) -> list[Section]:
     lead = (
         f"Shaded rows differ: with nothing but the stated noise, the chance of any shaded row on this page is at most {100 * LEVEL:g} %. "
         "Run to run compares the runs of each rig with the intervals that they state; a ratio above 1 says that the intervals are too small. "
-        "Rig to rig compares the rigs with the scatter of their runs. The trend is that within each rig."
+        "Rig to rig compares the rigs with the scatter of their runs. The trend is the change over time within each rig."
     )
     blocks: list[Block] = [Paragraph(lead)]
     for subject, own in _by_subject(found).items():
@@ -149,11 +150,11 @@ def _agreement_row(one: Agreement) -> tuple[str, ...]:
         return pretty_name(one.name), runs, NONE, NONE, NONE, NONE, NONE, "not determined"
     factor, unit = scaled(max(abs(one.mean), NORMAL_95 * one.std), one.unit)
     between = NONE if not one.between else with_unit(number(factor * one.between, 2), unit)
-    repeated = NONE if one.birge is None else f"p {p_value(one.runs_p)}, ratio {number(one.birge, 2)}"
+    repeated = NONE if one.birge is None else f"p\u00a0{p_value(one.runs_p)}, ratio {number(one.birge, 2)}"
     said = f"differs: {', '.join(one.different)}" if one.different else one.verdict
     return (
         pretty_name(one.name), runs, estimate(one.mean, one.std, unit, factor), between, repeated,
-        NONE if one.groups_p is None else f"p {p_value(one.groups_p)}", trend_words(one), said,
+        NONE if one.groups_p is None else f"p\u00a0{p_value(one.groups_p)}", trend_words(one), said,
     )  # fmt: skip
 
 
@@ -190,9 +191,9 @@ def _drawn(one: Agreement) -> Drawing:
         )
         for place, run in zip(places, one.runs)
     ]  # fmt: skip
-    name, in_unit = pretty_name(one.name), f" [{pretty_unit(unit)}]" if pretty_unit(unit) else ""
+    name = pretty_name(one.name)
     alt = f"{name} of {len(points)} runs with 95 % intervals; {_agreement_row(one)[-1]}"
-    svg = draw_runs(alt, label, f"{name}{in_unit}", points, factor * one.mean)
+    svg = draw_runs(alt, label, pretty_unit(unit) or "1", points, factor * one.mean)
     groups = list(dict.fromkeys(point.group for point in points))
     legend = tuple((style(number), group) for number, group in enumerate(groups)) if len(groups) > 1 else ()
     caption = f"95 % intervals of each run; dotted: the mean, {_agreement_row(one)[2]}."
@@ -236,15 +237,25 @@ def _said(one: Answered) -> str:
 
 
 def _answers(answered: Sequence[tuple[Task, Answered]], link: Link) -> Section:
+    """Every answer with a link to its report, folded by rig where there are many."""
+    if not answered:
+        return Section("All answers", (Paragraph("There is none."),))
+    groups = dict.fromkeys(task.group for task, _ in answered)
+    folds = []
+    for group in groups:
+        own = [(task, one) for task, one in answered if task.group == group]
+        title = f"{group or NO_GROUP}: {len(own)} answers"
+        folds.append(Fold(title, (_answers_table(own, link),), len(answered) <= MOST_OPEN))
+    return Section("All answers", tuple(folds))
+
+
+def _answers_table(answered: Sequence[tuple[Task, Answered]], link: Link) -> Table:
     rows = tuple(
         (
-            task.name, task.group or NONE, task.command, one.headline, with_unit(number(one.seconds, 2), "s"),
+            task.name, task.command, one.headline, with_unit(number(one.seconds, 2), "s"),
             with_unit(number(one.memory / MEBIBYTE, 3), "MiB"),
         )
         for task, one in answered
     )  # fmt: skip
-    columns = ("recording", "rig", "command", "answer", "time", "memory of its process")
-    if not rows:
-        return Section("All answers", (Paragraph("There is none."),))
-    table = Table("Each leads to its report.", columns, rows, links=tuple(link(task) for task, _ in answered))
-    return Section("All answers", (table,))
+    columns = ("recording", "command", "answer", "time", "memory of its process")
+    return Table("Each leads to its report.", columns, rows, links=tuple(link(task) for task, _ in answered))

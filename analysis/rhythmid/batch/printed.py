@@ -22,8 +22,8 @@ def show(found: "Batch", console: Console) -> None:
         rows = [_row(one) for one in found.agreements if one.subject == subject and one.runs]
         if rows:
             print_table(console, f"{subject}: p-values", HEADS, rows, right=("runs",))
-    for name, reason in found.failures.items():
-        console.print(f"failed: {escape(name)}: {escape(reason)}", highlight=False, soft_wrap=True)
+    for task, reason in found.failures.items():
+        console.print(f"failed: {escape(task.name)}: {escape(reason)}", highlight=False, soft_wrap=True)
 
 
 def _row(one: Agreement) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rhythmid import __version__
 from rhythmid.batch.fingerprint import Fingerprint
-from rhythmid.batch.manifest import Command, DiagnoseOptions, Manifest, Options, Settled
+from rhythmid.batch.manifest import Command, DiagnoseOptions, IdentifyOptions, Manifest, Options, Settled
 from rhythmid.body.machine import Machine, describes_machine
 from rhythmid.document import Node, read
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
@@ -30,7 +30,7 @@ class Task:
 
     Attributes
     ----------
-    name : the recording, and where there are several the model, signals and joint, for people.
+    name : the recording, then the joint and what else tells it from other answers to the same recording; for people.
     bag : the recording as the manifest finds it; several that are answered together are joined by " + ".
     group : the rig, or what else recordings are compared by.
     sources, holdout : recordings to answer and to judge by.
@@ -55,6 +55,15 @@ class Task:
     key: str = ""
 
     @property
+    def variant(self) -> str:
+        """Options of an identification that are not the usual ones, in words: answers that differ in them are not compared."""
+        if not isinstance(self.options, IdentifyOptions):
+            return ""
+        usual = asdict(IdentifyOptions())
+        said = {name: value for name, value in asdict(self.options).items() if value != usual[name]}
+        return ", ".join(f"{name} {value}" for name, value in said.items())
+
+    @property
     def file(self) -> str:
         """Name of its answer's files, without suffix."""
         plain = re.sub(r"[^A-Za-z0-9]+", "-", self.name).strip("-")[:LONGEST].strip("-")
@@ -74,7 +83,23 @@ def tasks_of(manifest: Manifest) -> tuple[Task, ...]:
             if task.key in found:
                 settled.place.fail(f"asks for {task.name} a second time, with the same files and options")
             found[task.key] = task
-    return tuple(found.values())
+    return _named(tuple(found.values()))
+
+
+def _named(tasks: tuple[Task, ...]) -> tuple[Task, ...]:
+    """The tasks with command, model, signals and options in their names, as far as the batch has several of them."""
+
+    def labels(task: Task) -> tuple[str, ...]:
+        return (task.command, *task.labels, task.variant)
+
+    several = [len(set(one)) > 1 for one in zip(*map(labels, tasks))]
+    return tuple(
+        replace(
+            task,
+            name=" · ".join([task.name, *(one for one, many in zip(labels(task), several) if many and one)]),
+        )
+        for task in tasks
+    )
 
 
 def _tasks(
@@ -101,9 +126,7 @@ def _tasks(
             if joint is not None and joint not in known:
                 settled.place.at("joints").fail(f"{joint!r} is none of {file}: {', '.join(known)}")
             bag = " + ".join(relpath(one, folder) for one in own)
-            several = ((model_name, models), (signals_name, signals))
-            labels = [label for label, options_ in several if len(options_) > 1]
-            name = " · ".join([bag, *labels, *([joint] if joint else [])])
+            name = f"{bag} · {joint}" if joint else bag
             yield Task(
                 name, bag, entry.group or "", command, own, holdout, model, machine, file, joint, elements,
                 (model_name, signals_name), options,

@@ -1,7 +1,7 @@
 """Numbers of a comparison in words."""
 
 from rhythmid.batch.agreement import Agreement
-from rhythmid.report.quantity import NONE, number, plus_minus, with_unit
+from rhythmid.report.quantity import NONE, number, plus_minus, pretty_unit, scaled, with_unit
 
 SMALLEST = 1e-4  # p-value below which only that is told
 
@@ -10,15 +10,16 @@ def p_value(p: float | None) -> str:
     """A p-value to two digits."""
     if p is None:
         return NONE
-    return f"< {number(SMALLEST, 1)}" if p < SMALLEST else number(p, 2)
+    return "<\u00a00.0001" if p < SMALLEST else number(p, 2)
 
 
 def trend_words(one: Agreement) -> str:
     """The slope with its interval and p-value."""
-    if one.slope is None:
+    slope = one.slope
+    if slope is None:
         return NONE
-    unit = "" if one.unit in ("1", "-") else one.unit
-    slope = with_unit(
-        plus_minus(one.slope.value, one.slope.half), f"{unit}/{one.per}" if unit else f"1/{one.per}"
+    factor, unit = scaled(max(abs(slope.value), slope.half), one.unit)
+    change = with_unit(
+        plus_minus(factor * slope.value, factor * slope.half), f"{pretty_unit(unit) or '1'}/{one.per}"
     )
-    return f"{slope} (p {p_value(one.slope.p_value)})"
+    return f"{change}, p\u00a0{p_value(slope.p_value)}"
