@@ -4,6 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
+from rhythmid.batch.agreement import agreements
+from rhythmid.batch.answered import Answered, Value
+from rhythmid.batch.batch import Batch
+from rhythmid.batch.manifest import Manifest
+from rhythmid.batch.task import tasks_of
 from rhythmid.excitation.sequence import build
 from rhythmid.model import Model
 from rhythmid.simulation.signal import zero_order_hold
@@ -45,3 +50,25 @@ def write_swing(path: Path, rate: float = RATE) -> None:
     time = np.arange(0.0, 2.0, 1.0 / rate)
     table = np.column_stack([time, np.ones_like(time), np.cos(5.0 * time)])
     np.savetxt(path, table, delimiter=",", header="t,u,y", comments="")
+
+
+def made_up(folder: Path, values, times=None, stds=None, groups=("rig A",)) -> Batch:
+    """A batch of answers with these values of one parameter [N], of the groups by turns."""
+    write_files(folder)
+    for number in range(len(values)):
+        (folder / f"{number:03d}.csv").touch()
+    entries = [
+        {
+            "bags": [f"{folder}/{number:03d}.csv"],
+            "group": groups[number % len(groups)],
+            "signals": f"{folder}/signals.yaml",
+        }
+        for number in range(len(values))
+    ]
+    tasks = tasks_of(Manifest.of({"command": "identify", "entries": entries}))
+    answers = []
+    for number, task in enumerate(tasks):
+        gain = Value("gain", values[number], 1.0 if stds is None else stds[number], "N")
+        time = None if times is None else times[number]
+        answers.append((task, Answered(verdict="identified", headline="found", time=time, values=(gain,))))
+    return Batch(tuple(answers), agreements(answers), folder / "out")

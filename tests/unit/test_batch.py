@@ -10,13 +10,11 @@ from html.parser import HTMLParser
 import numpy as np
 import pandas as pd
 import pytest
-from batches import write_files, write_run, write_swing
+from batches import made_up, write_files, write_run, write_swing
 from matplotlib.figure import Figure
 
 import rhythmid as rh
-from rhythmid.batch.agreement import agreements
-from rhythmid.batch.answered import Answered, Value, command_line
-from rhythmid.batch.batch import Batch
+from rhythmid.batch.answered import command_line
 from rhythmid.batch.manifest import Manifest
 from rhythmid.batch.present import present
 from rhythmid.batch.task import tasks_of
@@ -125,21 +123,6 @@ def test_two_rigs_that_differ_are_told_from_runs_that_agree(tmp_path):
     json.dumps(found.to_dict(), allow_nan=False)
 
 
-def made_up(tmp_path, values, times=None, stds=None):
-    """A batch of answers with these values of one parameter."""
-    write_files(tmp_path)
-    for number in range(len(values)):
-        (tmp_path / f"{number:03d}.csv").touch()
-    entries = [{"bags": f"{tmp_path}/*.csv", "group": "rig A", "signals": f"{tmp_path}/signals.yaml"}]
-    tasks = tasks_of(Manifest.of({"command": "identify", "entries": entries}))
-    answers = [
-        (task, Answered(verdict="identified", headline="found", time=None if times is None else times[number],
-                        values=(Value("gain", values[number], 1.0 if stds is None else stds[number], "N"),)))
-        for number, task in enumerate(tasks)
-    ]  # fmt: skip
-    return Batch(tuple(answers), agreements(answers), tmp_path / "out")
-
-
 def test_a_drift_is_told_per_day_where_the_clocks_tell(tmp_path):
     noise = np.random.default_rng(0).normal(size=20)
     times = [1.7e9 + 43200.0 * number for number in range(20)]
@@ -204,6 +187,19 @@ def test_a_scheduler_that_is_not_there_is_refused_in_one_line(folder, monkeypatc
     monkeypatch.setattr("rhythmid.batch.workers.CONNECT", "1s")
     with pytest.raises(rh.InputError, match="--scheduler tcp://127.0.0.1:1: no Dask scheduler answers"):
         rh.batch("batch.yaml", "out", scheduler="tcp://127.0.0.1:1")
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"jobs": 0}, "--jobs 0: a whole number greater than 0"),
+        ({"jobs": 2, "scheduler": "tcp://x:1"}, "give one of them"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(folder, options, told):
+    with pytest.raises(rh.InputError, match=told):
+        rh.batch("batch.yaml", "out", **options)
+    assert not (folder / "out").exists()
 
 
 def test_a_folder_with_other_things_in_it_is_not_written_to(folder):

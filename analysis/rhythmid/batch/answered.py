@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from rhythmid.batch.manifest import Command, DiagnoseOptions, IdentifyOptions
 from rhythmid.batch.task import Task, loaded
 from rhythmid.body.machine import Machine
@@ -88,7 +90,8 @@ def answer(task: Task) -> Answered:
     """The answer to a task, or the reason why there is none."""
     began = time.perf_counter()
     try:
-        found = COMMANDS[task.command](task)
+        with threadpool_limits(1):  # as many answers are sought at a time as there are processors
+            found = COMMANDS[task.command](task)
     except InputError as error:
         found = failed(str(error))
     except Exception as error:  # one recording must not take the others' answers with it
