@@ -123,6 +123,20 @@ def test_two_rigs_that_differ_are_told_from_runs_that_agree(tmp_path):
     json.dumps(found.to_dict(), allow_nan=False)
 
 
+def test_recordings_are_diagnosed_with_what_is_held_out(folder):
+    for number in (0, 1):
+        write_run(folder / "rig" / f"{number}.csv", number)
+    options = {"holdout": "rig/1.csv", "budget": 0.001}  # one round of the search
+    entry = {"bags": "rig/*.csv", "options": options}
+    files = {"model": "model.yaml", "signals": "signals.yaml"}
+    found = rh.batch({"command": "diagnose", **files, "entries": [entry]}, "out")
+    ((task, answered),) = found.answers
+    assert task.name == "rig/0.csv" and answered.verdict == "consistent"
+    assert "linear_spring.stiffness" in {one.name for one in answered.values}
+    page = (folder / "out" / "index.html").read_text()
+    assert "What the diagnoses say" in page
+
+
 def test_a_drift_is_told_per_day_where_the_clocks_tell(tmp_path):
     noise = np.random.default_rng(0).normal(size=20)
     times = [1.7e9 + 43200.0 * number for number in range(20)]
