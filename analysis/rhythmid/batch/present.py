@@ -39,7 +39,7 @@ def present(found: "Batch", link: Link, command: str = "") -> Page:
     """The index page of a batch; `link` is where the page of a task's answer lies."""
     answered = [pair for pair in found.answers if not pair[1].failure]
     sections = [
-        *_failed({task.name: reason for task, reason in found.failures.items()}),
+        *_failed(found.failures),
         *_agreement(found.agreements),
         *_over_runs(found.agreements, link),
         *_verdicts(answered),
@@ -95,10 +95,10 @@ def _tiles(found: "Batch") -> Tiles:
     return Tiles(tuple(tiles))
 
 
-def _failed(failures: Mapping[str, str]) -> list[Section]:
+def _failed(failures: Mapping[Task, str]) -> list[Section]:
     if not failures:
         return []
-    rows = tuple(failures.items())
+    rows = tuple((task.name, reason) for task, reason in failures.items())
     said = "They are tried again when the same command is run again; all others are kept."
     return [
         Section(
@@ -112,7 +112,7 @@ def _agreement(found: Sequence[Agreement]) -> list[Section]:
         return []
     lead = (
         f"Shaded rows differ: with nothing but the stated noise, the chance of any shaded row on this page is at most {100 * LEVEL:g} %. "
-        "Run to run compares the runs of each rig with the intervals that they state; a ratio above 1 says that the intervals are too small. "
+        "Run to run compares the runs of each rig with the intervals that they state; a significant ratio above 1 says that they are too small or that the machine changes. "
         "Rig to rig compares the rigs with the scatter of their runs. The trend is the change over time within each rig."
     )
     blocks: list[Block] = [Paragraph(lead)]
