@@ -12,7 +12,6 @@ import pytest
 import yaml
 
 from rhythmid.elements.catalogue import load_catalogue
-from rhythmid.experiment import Experiment
 from rhythmid.model import Model
 from rhythmid.offline_run import simulate
 from rhythmid.record.signals import Signals
@@ -105,7 +104,7 @@ def test_the_files_of_the_tutorial_make_the_recordings_of_the_tutorial(tmp_path)
     assert "coulomb_friction.force" in Model.load(tmp_path / "robot.yaml").parameters
     assert set(believed.free) == {"input_delay.delay", "linear_spring.stiffness", "viscous_damper.damping"}
     for name in ("small", "large", "unseen"):
-        assert simulate(None, Experiment.load(tmp_path / f"{name}.yaml")).record.duration > 19.0
+        assert simulate(None, tmp_path / f"{name}.yaml").record.duration > 19.0
 
 
 def test_the_element_that_is_shown_can_be_loaded_and_simulated(tmp_path):

@@ -156,7 +156,7 @@ class Comparison(Result):
         started = any(one.slot is None for one in self.explanations)
         if not self.parted:
             return (
-                f"Simulation and recording agree within the noise: the difference of {size} follows nothing."
+                f"Simulation and recording agree within the noise: the difference of {size} is related to no signal."
                 if not started
                 else f"Simulation and recording agree but for another start, which dies out; the difference was {size}."
             )
