@@ -29,7 +29,9 @@ def page() -> str:
 
 def _section(name: str, command: Any) -> str:
     arguments = [one for one in command.params if not one.opts[0].startswith("-")]
-    options = [one for one in command.params if one.opts[0].startswith("-") and one.name != "help" and not one.hidden]
+    options = [
+        one for one in command.params if one.opts[0].startswith("-") and one.name != "help" and not one.hidden
+    ]
     usage = " ".join(["rhythmid", name, *(["[OPTIONS]"] if options else []), *map(_placeholder, arguments)])
     parts = [f"## rhythmid {name}", _paragraphs(command.help), f"    {usage}"]
     if arguments:

@@ -32,7 +32,11 @@ FRICTION = MissingEffect(
     "coulomb_friction", "force", "F = −F_c sgn v", 0.92, 0.97, {"force": Estimate(0.8, 0.01, "N")}
 )
 LIMIT = Rejection(
-    ("second_mode",), "within_bounds", 0.0, 1e-3, "only a limit of its parameters is identifiable, where it is another effect"
+    ("second_mode",),
+    "within_bounds",
+    0.0,
+    1e-3,
+    "only a limit of its parameters is identifiable, where it is another effect",
 )
 ANSWER = Diagnosis(
     "missing_physics",

@@ -74,7 +74,9 @@ def test_every_link_within_the_site_leads_to_a_page_and_a_place_that_exist(site,
 
 def test_a_page_loads_nothing_from_elsewhere(pages):
     for path in pages:
-        loaded = re.findall(r"<(?:script|img|link)\b[^>]*?(?:src|href)=\"(https?:[^\"]*)", path.read_text("utf-8"))
+        loaded = re.findall(
+            r"<(?:script|img|link)\b[^>]*?(?:src|href)=\"(https?:[^\"]*)", path.read_text("utf-8")
+        )
         assert loaded == [], path.name
 
 
@@ -110,7 +112,9 @@ def test_the_files_of_the_tutorial_make_the_recordings_of_the_tutorial(tmp_path)
 def test_the_element_that_is_shown_can_be_loaded_and_simulated(tmp_path):
     folder = tmp_path / "my_elements"
     folder.mkdir()
-    (folder / "cubic_drag.py").write_text(block("own_element.md", "my_elements/cubic_drag.py"), encoding="utf-8")
+    (folder / "cubic_drag.py").write_text(
+        block("own_element.md", "my_elements/cubic_drag.py"), encoding="utf-8"
+    )
     catalogue = load_catalogue([folder])
     assert catalogue["cubic_drag"].size == "coefficient"
     text = block("tutorial.md", "model.yaml") + "  - cubic_drag: {coefficient: 0.5}\n"

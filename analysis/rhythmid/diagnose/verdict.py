@@ -155,7 +155,10 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     if not chosen.elements:
         explainable = left.share * (contest.nominal.prediction.mean_square - contest.floor)
         if left.significant and explainable > (contest.practical * contest.size) ** 2:
-            return answer("unknown_physics", f"no effect of the catalogue explains the mismatch: it goes with {left.goes_with}")
+            return answer(
+                "unknown_physics",
+                f"no effect of the catalogue explains the mismatch: it goes with {left.goes_with}",
+            )
         missed = math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300)
         if missed > BLIND:
             return answer(
