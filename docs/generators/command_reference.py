@@ -68,10 +68,10 @@ def _spelling(option: Any) -> str:
 
 
 def _table(kind: str, rows: list[tuple[str, Any]]) -> str:
-    lines = [f"| {kind} | meaning | default |", "| --- | --- | --- |"]
-    for spelling, one in rows:
-        lines.append(f"| {spelling} | {_cell(one.help or '')} | {_default(one)} |")
-    return "\n".join(lines)
+    cells = [[spelling, _cell(one.help or ""), _default(one)] for spelling, one in rows]
+    width = 3 if any(default for *_, default in cells) else 2
+    table = [[kind, "meaning", "default"], ["---"] * 3, *cells]
+    return "\n".join(f"| {' | '.join(row[:width])} |" for row in table)
 
 
 def _default(one: Any) -> str:

@@ -21,6 +21,7 @@ ELSEWHERE = {  # page: document of the repository
     "contributing.md": "CONTRIBUTING.md",
     "quality.md": "QUALITY_DECLARATION.md",
 }
+LAST = "changelog.md"  # in the results of a search: it holds every word
 PAGES = {document: page for page, document in ELSEWHERE.items()}
 LINK = re.compile(r"\[([^\]\n]*)\]\(([^)\s#]+)(#[^)\s]*)?\)")
 
@@ -37,6 +38,8 @@ def on_files(files: Files, config: Any) -> Files:
 def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
     """Turn links to files of the repository into links to their pages."""
     uri = page.file.src_uri
+    if uri == LAST:
+        page.meta["search"] = {"boost": 0.1}
     folder = posixpath.dirname(ELSEWHERE.get(uri, f"docs/{uri}"))
 
     def led(link: re.Match[str]) -> str:

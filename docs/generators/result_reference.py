@@ -8,7 +8,7 @@ SCHEMA = Path(__file__).parents[1] / "schema" / "diagnose.schema.json"
 HEAD = """# JSON of a diagnosis
 
 This page is generated from [diagnose.schema.json](schema/diagnose.schema.json), the JSON schema of what `rhythmid diagnose --json`
-writes. What the fields mean, and how to read them, is told in [How to read a diagnosis](diagnose.md#the-json).
+writes. [Read a diagnosis](diagnose.md#the-json) says what the fields mean.
 """
 
 

@@ -92,8 +92,18 @@ class Requirements:
 
         Parameters
         ----------
-        model, duration, band, max_effort, envelope, noise_std
-            As for `design` and `Requirements`.
+        model
+            The machine, which says forcing and delays where they are not given.
+        duration
+            Length of the run [s].
+        band
+            Lowest and highest frequency of the command [Hz].
+        max_effort
+            Largest |u| [N].
+        envelope
+            Lowest and highest measured position [m].
+        noise_std
+            Standard deviation of a single measured sample [m].
         forcing
             On the robot.
         delays

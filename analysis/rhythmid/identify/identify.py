@@ -118,8 +118,10 @@ def identify(
         M, sidebands on either side that the paper's method estimates.
     method
         `joint` maximum likelihood, or the `paper`'s two steps.
-    forcing, offset
-        How the forcing reaches the machine, and what is known of its clock; see `delays_of`.
+    forcing
+        How the forcing reaches the machine; see `delays_of`.
+    offset
+        What is known of the offset of the forcing's clock [s].
     htf
         How the harmonic transfer functions of the first record are found; see `harmonic_transfer_functions`. The
         paper's method brings its own, equation (5), where this is `auto`.
