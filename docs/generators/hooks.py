@@ -46,7 +46,9 @@ def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
         text, target, anchor = link[1], link[2], link[3] or ""
         document = posixpath.normpath(posixpath.join(folder, target))
         found = PAGES.get(document, document.removeprefix("docs/"))
-        if files.get_file_from_path(found):
+        if file := files.get_file_from_path(found):
+            if text.endswith(".md") and file.page is not None:
+                text = file.page.title  # a name of a file says little on a site
             return f"[{text}]({os.path.relpath(found, posixpath.dirname(uri) or '.')}{anchor})"
         if "://" not in target and (ROOT / document).exists():  # not part of the site
             return text if text.startswith("`") else f"`{document}`"

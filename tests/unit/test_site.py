@@ -11,6 +11,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 import yaml
 
+import rhythmid
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.model import Model
 from rhythmid.offline_run import simulate
@@ -93,8 +94,6 @@ def test_the_reference_has_every_command(pages, site):
 
 
 def test_the_reference_of_the_python_interface_has_every_public_name(pages, site):
-    import rhythmid
-
     places = {place.rpartition(".")[2] for place in pages[site / "api.html"].places}
     assert set(rhythmid.__all__) - {"__version__"} <= places
 
@@ -128,6 +127,12 @@ def test_the_signals_and_parameters_that_are_shown_are_read(tmp_path):
     assert set(nodes) == {"/**/excitation", "/**/command_guard", "/**/recorder"}
 
 
+def test_the_citation_is_of_this_version():
+    assert (
+        yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))["version"] == rhythmid.__version__
+    )
+
+
 def test_the_figures_of_the_summary_are_those_of_the_pages_that_it_sums_up():
     summary = (DOCS / "validation.md").read_text(encoding="utf-8")
     concealed = summary.partition("## Concealed effects, in numbers")[2].partition("## Real")[0]
@@ -136,4 +141,4 @@ def test_the_figures_of_the_summary_are_those_of_the_pages_that_it_sums_up():
         assert re.search(rf"\| {cases} \| {re.escape(measured)}", proof), measured
     real = (DOCS / "real.md").read_text(encoding="utf-8")
     for before, after in re.findall(r"([\d.]+) → ([\d.]+) %", summary):
-        assert f"| {before} -> {after} |" in real, before
+        assert f"| {before} → {after} |" in real, before
