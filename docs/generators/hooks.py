@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import command_reference  # beside this file
+import notebook
 import result_reference
 from mkdocs.structure.files import File, Files
 
@@ -21,8 +22,11 @@ ELSEWHERE = {  # page: document of the repository
     "contributing.md": "CONTRIBUTING.md",
     "quality.md": "QUALITY_DECLARATION.md",
 }
+NOTEBOOKS = {f"notebook_{path.stem}.md": path for path in (ROOT / "docs" / "notebooks").glob("*.ipynb")}
 LAST = "changelog.md"  # in the results of a search: it holds every word
-PAGES = {document: page for page, document in ELSEWHERE.items()}
+PAGES = {document: page for page, document in ELSEWHERE.items()} | {
+    path.relative_to(ROOT).as_posix(): page for page, path in NOTEBOOKS.items()
+}
 LINK = re.compile(r"\[([^\]\n]*)\]\(([^)\s#]+)(#[^)\s]*)?\)")
 
 
@@ -30,6 +34,8 @@ def on_files(files: Files, config: Any) -> Files:
     """Add the pages that are not files of docs/."""
     for page, make in GENERATED.items():
         files.append(File.generated(config, page, content=make()))
+    for page, path in NOTEBOOKS.items():
+        files.append(File.generated(config, page, content=notebook.page(path)))
     for page, document in ELSEWHERE.items():
         files.append(File.generated(config, page, content=(ROOT / document).read_text(encoding="utf-8")))
     return files
@@ -45,7 +51,9 @@ def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
     def led(link: re.Match[str]) -> str:
         text, target, anchor = link[1], link[2], link[3] or ""
         document = posixpath.normpath(posixpath.join(folder, target))
-        found = PAGES.get(document, document.removeprefix("docs/"))
+        found = document.removeprefix("docs/")
+        if uri not in NOTEBOOKS:  # whose link to the notebook itself is meant
+            found = PAGES.get(document, found)
         if file := files.get_file_from_path(found):
             if text.endswith(".md") and file.page is not None:
                 text = file.page.title  # a name of a file says little on a site
