@@ -215,7 +215,7 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     if explained < EXPLAINED:
         return answer(
             "unknown_physics",
-            f"this is the main effect, but {100.0 * left.share:.0f} % of the mismatch goes with {left.goes_with}",
+            f"this effect is mainly what is missing, but {100.0 * left.share:.0f} % of the mismatch goes with {left.goes_with}",
         )
     if groups or joint_probability([names[label] for label in labels], contest, chosen, weights) < STATED:
         return answer("undecided", "the evidence does not separate several explanations")
