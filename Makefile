@@ -9,7 +9,7 @@ UPLOT    := analysis/rhythmid/report/vendor/uplot
 UPLOT_VERSION := 1.6.32
 
 .DEFAULT_GOAL := help
-.PHONY: help install test lint format demo picture benchmark naming docker dist vendor lock clean
+.PHONY: help install test lint format demo docs picture benchmark naming docker dist vendor lock clean
 
 help: ## Show this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -63,6 +63,9 @@ naming: install ## Compare the naming of missing physics with PySINDy and a Gaus
 	$(BIN)/python -m pip install --quiet --constraint requirements.lock pysindy scikit-learn
 	$(BIN)/python benchmarks/naming.py
 
+docs: install ## Build the documentation site into site/, without warnings
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+
 picture: install ## Draw the pictures of the README
 	$(BIN)/python docs/signal_path.py
 	$(BIN)/python docs/delay_noise.py
@@ -86,8 +89,8 @@ lock: install ## Resolve the requirements anew into requirements.lock
 	$(BIN)/python -m pip install --quiet uv
 	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.11 \
 		--custom-compile-command "make lock" --output-file requirements.lock \
-		analysis/pyproject.toml --extra ros --group pyproject.toml:test
+		analysis/pyproject.toml --extra ros --group pyproject.toml:test --group pyproject.toml:docs
 
 clean: ## Remove what was built, not what was recorded
-	rm -rf $(VENV) build install log .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build install log site .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -o -name '*.egg-info' | xargs rm -rf
