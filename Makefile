@@ -35,11 +35,13 @@ $(VENV)/.warm: $(VENV)/.packages
 	@$(BIN)/python -m rhythmid.warm_up || true
 	@touch $@
 
-test: lint ## Run the linters and all tests, fast ones first
+test: lint ## Run the linters and all tests
+	@# the longest files first, so that neither worker ends long after the other
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder \
-		tests/unit tests/faults tests/proof tests/browser
-	@# what runs in real time has the machine to itself
-	$(BIN)/python -m pytest tests/ros
+		tests/proof tests/unit tests/faults tests/browser
+	@# graphs in domains of their own, which wait more than they work; then what asserts about real time
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not alone" tests/ros
+	$(BIN)/python -m pytest -m alone tests/ros
 
 lint: $(VENV)/.packages ## Run ruff and pyright
 	$(BIN)/ruff check .
