@@ -30,7 +30,7 @@ def tour() -> list[list[str]]:
 
 
 @pytest.mark.timeout(300)
-def test_every_command_of_the_tour_works_as_printed(domain, rhythmid, tmp_path):
+def test_every_command_of_the_tour_works_as_printed(rhythmid, tmp_path):
     folder = tmp_path / "config"
     shutil.copytree(ROOT / "ros_ws" / "src" / "rhythmid_bringup" / "config", folder)
     for name, excitation in SHORTER.items():
