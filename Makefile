@@ -7,7 +7,7 @@ PACKAGES := analysis $(patsubst %/setup.py,%,$(wildcard ros_ws/src/*/setup.py))
 METADATA := $(wildcard $(foreach package,$(PACKAGES),$(addprefix $(package)/,*.py *.cfg *.toml *.xml launch/* config/* layouts/*)))
 
 .DEFAULT_GOAL := help
-.PHONY: help install test lint format demo picture benchmark naming docker dist lock clean
+.PHONY: help install test graphs computing lint format demo picture benchmark naming docker dist lock clean
 
 help: ## Show this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -36,12 +36,17 @@ $(VENV)/.warm: $(VENV)/.packages
 	@touch $@
 
 test: lint ## Run the linters and all tests
-	@# the longest files first, so that neither worker ends long after the other
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder \
-		tests/proof tests/unit tests/faults tests/browser
-	@# graphs in domains of their own, which wait more than they work; then what asserts about real time
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile -m "not alone" tests/ros
+	@# graphs wait more than they work; what only computes runs beside them, at a lower priority
+	$(MAKE) --no-print-directory --jobs=2 --output-sync graphs computing
+	@# what asserts about real time has the machine to itself
 	$(BIN)/python -m pytest -m alone tests/ros
+
+graphs:
+	$(BIN)/python -m pytest -m "not alone" tests/ros
+
+computing: # folders with the longest files first, so that neither worker ends long after the other
+	nice -n 10 $(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder \
+		tests/proof tests/browser tests/faults tests/unit
 
 lint: $(VENV)/.packages ## Run ruff and pyright
 	$(BIN)/ruff check .

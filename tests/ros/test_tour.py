@@ -29,7 +29,7 @@ def tour() -> list[list[str]]:
     return [words[1:] for words in commands]
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(600)
 def test_every_command_of_the_tour_works_as_printed(rhythmid, tmp_path):
     folder = tmp_path / "config"
     shutil.copytree(ROOT / "ros_ws" / "src" / "rhythmid_bringup" / "config", folder)
