@@ -89,7 +89,7 @@ def test_ctrl_c_ends_with_130_and_leaves_neither_files_nor_processes(folder, com
         process.send_signal(signal.SIGINT)
     said = process.stderr.read()
     process.stderr.close()
-    assert process.wait(PATIENCE) == 130
+    assert process.wait(PATIENCE) == 130, said
     assert "Traceback" not in said
     assert sorted(folder.iterdir()) == before
     deadline = time.monotonic() + PATIENCE

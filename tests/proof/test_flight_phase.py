@@ -20,10 +20,7 @@ force:
   - linear_spring: {stiffness: {value: 765.0, unit: N/m}, rest_length: {value: 0.29, unit: m}}
   - viscous_damper: {damping: {value: 9.8, unit: N*s/m}}
 """
-RIVALS = (  # other laws of the position, and what a leg that is not there might pass for
-    "bilinear_stiffness", "coulomb_friction", "cubic_stiffness", "end_stop_contact", "flight_damping", "freeplay",
-    "quadratic_damping", "quadratic_stiffness", "travel_stop", "viscoelastic_relaxation",
-)  # fmt: skip
+RIVALS = ("bilinear_stiffness", "coulomb_friction", "freeplay", "quadratic_stiffness", "travel_stop")
 
 
 def records() -> list[Record]:

@@ -10,7 +10,7 @@ import yaml
 
 ROOT = Path(__file__).parents[2]
 SHORTER = {  # the tour's own runs last a minute in real time; these give the same files
-    "demo.yaml": {"repetitions": 3, "shift": {"period": 1.0, "count": 3}},
+    "demo.yaml": {"repetitions": 4, "shift": {"period": 1.0, "count": 4}},
     "lockstep.yaml": {"repetitions": 1, "shift": {"period": 1.0, "count": 1}},
 }
 RATE = 250  # Hz
