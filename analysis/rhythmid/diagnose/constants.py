@@ -53,6 +53,10 @@ EDGE = 1e-3
 # `ADEQUATE`, falling with its power `STEEPNESS` (fitted to sealed cases whose truth was in the catalogue or not: docs/proof.md)
 ADEQUATE = 0.1
 STEEPNESS = 1.5
+# chance that a law which the catalogue lacks would have shown, as a function of the log density by which the nearest other name
+# predicts worse: half at `ALIKE`, rising with its power `SHARPNESS` (fitted to the same cases)
+ALIKE = 10.0
+SHARPNESS = 0.5
 # effect that the records would not show, as a share of what was measured, from which they decide nothing: as large as what
 # the refitted model of a machine may leave and still be called identified
 BLIND = 0.2
