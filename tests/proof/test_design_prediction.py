@@ -21,7 +21,7 @@ WANTED = Requirements(
     input_delay=0.0403, measurement_delay=0.0551,
 )  # fmt: skip
 COMB = replace(WANTED, kind="comb", duration=50.0, harmonics=1, rate=500)
-RUNS = 60  # the scatter of a scatter is 9 % then; the draws are fixed
+RUNS = 100  # the scatter of a scatter is 7 % then; the draws are fixed
 OFF = {
     "linear_spring.stiffness": 202.0,
     "switched_damper.stance": 2.05,
