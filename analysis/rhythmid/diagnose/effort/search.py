@@ -178,8 +178,8 @@ class _Search:
             gain, error = difference(others[best], others[index])
             rest = others[index].mean_square - free.mean_square
             removed = others[index].mean_square - others[best].mean_square
-            practical = (PRACTICAL_EFFORT * size_of(self.balance)) ** 2
-            if gain < EQUIVALENT * error or removed < max(REST * rest, practical):
+            whole = float(np.mean(self.nominal.fit.residual**2)) - free.mean_square
+            if gain < EQUIVALENT * error or removed < max(REST * rest, MISMATCH * whole):
                 best = index
         return new[best] if self._worth(others[best], before, free, tried) else None
 
