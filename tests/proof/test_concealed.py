@@ -17,7 +17,7 @@ SINGLES = [Task(60403, "single", 0, design) for design in ("servo", "pendulum", 
 NULLS = [Task(60402, "null", 0, design, cluttered=True) for design in ("pendulum", "motor", "servo")]
 LEFT_OUT = [Task(60405, "left-out", index, "axis", cluttered=True) for index in (0, 1)]
 
-pytestmark = pytest.mark.timeout(2900)
+pytestmark = pytest.mark.timeout(900)
 
 
 @pytest.fixture(scope="module")
