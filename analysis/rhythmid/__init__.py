@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rhythmid.batch.batch import Batch, batch
     from rhythmid.compare.compare import Comparison, compare
     from rhythmid.design.designer import Design, design
     from rhythmid.design.requirements import Requirements
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 __all__ = [
     "Answer",
+    "Batch",
     "Comparison",
     "Design",
     "Experiment",
@@ -35,6 +37,7 @@ __all__ = [
     "Record",
     "Requirements",
     "__version__",
+    "batch",
     "compare",
     "design",
     "diagnose",
@@ -47,6 +50,7 @@ __all__ = [
 
 _MODULES = {
     "Answer": "rhythmid.diagnose.diagnosis",
+    "Batch": "rhythmid.batch.batch",
     "Comparison": "rhythmid.compare.compare",
     "Design": "rhythmid.design.designer",
     "Experiment": "rhythmid.experiment",
@@ -61,7 +65,13 @@ _MODULES = {
     "paper_hopper": "rhythmid.identify.identify",
     "simulate": "rhythmid.offline_run",
 }
-_PACKAGES = ("compare", "design", "diagnose", "identify")  # that can be called: see callable_package.py
+_PACKAGES = (
+    "batch",
+    "compare",
+    "design",
+    "diagnose",
+    "identify",
+)  # that can be called: see callable_package.py
 
 
 def __getattr__(name: str) -> Any:

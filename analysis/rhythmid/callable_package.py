@@ -11,6 +11,7 @@ from types import ModuleType
 from typing import Any
 
 FUNCTIONS = {
+    "rhythmid.batch": "rhythmid.batch.batch",
     "rhythmid.compare": "rhythmid.compare.compare",
     "rhythmid.design": "rhythmid.design.designer",
     "rhythmid.diagnose": "rhythmid.diagnose.diagnosis",

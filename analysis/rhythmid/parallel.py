@@ -12,8 +12,9 @@ import pickle
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
 from rhythmid.errors import InputError
@@ -44,7 +45,7 @@ def _interrupted_afterwards() -> Iterator[None]:
             signal.raise_signal(signal.SIGINT)
 
 
-def _work(function: Callable[[Any], Any], items: Sequence[Any], own: Sequence[int], pipe: Any) -> None:
+def _work(function: Callable[[Any], Any], items: Sequence[Any], own: Iterable[int], pipe: Any) -> None:
     # What was inherited is not this process's to collect: going through it would copy the parent's memory, and may
     # meet frames of threads that exist in the parent only.
     gc.freeze()
@@ -118,4 +119,66 @@ def fork_map(
                 yield index, error if error is not None else result
     finally:
         for process, _ in running.values():
+            process.terminate()
+
+
+def fork_each(
+    function: Callable[[Item], Result], items: Sequence[Item], workers: int | None = None, lifetime: int = 8
+) -> Iterator[tuple[int, Result | Exception]]:
+    """As `fork_map`, for items that take long and must not harm one another; every failure is a result.
+
+    Whoever is free takes the next item. A process ends after `lifetime` items, which gives back what memory has gathered. An item whose
+    process is killed is tried once more; a RuntimeError that tells the signal is its result where that process is killed, too.
+    """
+    if multiprocessing.current_process().daemon or "fork" not in multiprocessing.get_all_start_methods():
+        yield from fork_map(function, items, 1)
+        return
+    context = multiprocessing.get_context("fork")
+    waiting, tried = deque(range(len(items))), set[int]()
+    running: dict[
+        Any, tuple[Any, int, int]
+    ] = {}  # its process, the item at hand, items that it may still take
+
+    def start() -> None:
+        ours, theirs = context.Pipe()
+        given: Iterator[int] = iter(theirs.recv, None)
+        process = context.Process(target=_work, args=(function, items, given, theirs), daemon=True)
+        with _interrupted_afterwards():
+            process.start()
+            theirs.close()
+            hand_on(ours, process, lifetime)
+
+    def hand_on(pipe: Any, process: Any, left: int) -> None:
+        if waiting and left:
+            running[pipe] = (process, waiting.popleft(), left - 1)
+            with suppress(OSError):  # killed while idle: seen when it is listened to
+                pipe.send(running[pipe][1])
+            return
+        with suppress(OSError):
+            pipe.send(None)
+        process.join()
+        pipe.close()
+
+    try:
+        while waiting or running:
+            while waiting and len(running) < (workers or cores()):
+                start()
+            ready = multiprocessing.connection.wait(list(running))
+            for pipe in [one for one in running if one in ready]:
+                process, index, left = running.pop(pipe)
+                try:
+                    _, result, error = pipe.recv()
+                except (EOFError, OSError):  # killed
+                    process.join()
+                    pipe.close()
+                    if index not in tried:
+                        tried.add(index)
+                        waiting.appendleft(index)
+                        continue
+                    yield index, RuntimeError(f"its process was killed twice, exit code {process.exitcode}")
+                    continue
+                hand_on(pipe, process, left)
+                yield index, result if error is None else error
+    finally:
+        for process, *_ in running.values():
             process.terminate()

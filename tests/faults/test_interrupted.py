@@ -1,5 +1,6 @@
 """Ctrl-C while identify and diagnose work: exit code 130, nothing written, no process left behind."""
 
+import json
 import os
 import signal
 import subprocess
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from batches import write_files, write_run
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
@@ -92,10 +94,40 @@ def test_ctrl_c_ends_with_130_and_leaves_neither_files_nor_processes(folder, com
     assert process.wait(PATIENCE) == 130, said
     assert "Traceback" not in said
     assert sorted(folder.iterdir()) == before
+    assert nobody_left(process.pid)
+
+
+def nobody_left(group: int) -> bool:
+    """Whether all processes of a group end."""
     deadline = time.monotonic() + PATIENCE
-    while children(process.pid) and time.monotonic() < deadline:
+    while children(group) and time.monotonic() < deadline:
         time.sleep(0.05)
-    assert not children(process.pid)
+    return not children(group)
+
+
+def test_ctrl_c_ends_a_batch_with_130_and_its_finished_answers_are_kept(tmp_path):
+    write_files(tmp_path)
+    for number in range(4):
+        write_run(tmp_path / "runs" / f"{number}.csv", number)
+    (tmp_path / "batch.yaml").write_text(
+        "command: identify\nmodel: model.yaml\nsignals: signals.yaml\nentries: [{bags: 'runs/*.csv'}]\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rhythmid.cli", "batch", "batch.yaml", "--out", "out", "--jobs", "1"],
+        cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    answers = tmp_path / "out" / "answers"
+    deadline = time.monotonic() + PATIENCE
+    while not list(answers.glob("[!.]*.json")) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130 and "Traceback" not in said
+    assert "the same command goes on" in said
+    kept = [json.loads(path.read_text())["answer"]["verdict"] for path in answers.glob("*.json")]
+    assert 1 <= len(kept) < 4 and set(kept) == {"identified"}
+    assert nobody_left(process.pid)
+    assert not (tmp_path / "out" / "index.html").exists()
 
 
 def test_a_result_that_cannot_be_put_in_its_place_leaves_nothing(tmp_path):

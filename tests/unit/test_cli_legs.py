@@ -8,6 +8,7 @@ import pytest
 from legged import fixed_leg
 from typer.testing import CliRunner
 
+import rhythmid as rh
 from rhythmid.cli import app
 from rhythmid.errors import InputError
 
@@ -72,6 +73,17 @@ def test_a_leg_is_identified_from_its_bag(bags: Path):
     inertia = found["inertia"]
     assert 0 < inertia["rank"] < inertia["count"] == 20
     assert inertia["links"]["shank"]["m"] == pytest.approx(0.22, rel=0.2)
+
+
+def test_a_leg_is_answered_in_a_batch_as_alone(bags: Path):
+    entries = [{"bags": str(bags / "rough")}]
+    files = {"model": str(bags / "rough.yaml"), "signals": str(bags / "signals.yaml")}
+    found = rh.batch({"command": "identify", **files, "entries": entries}, bags / "batch")
+    ((task, answered),) = found.answers
+    assert not answered.failure and task.machine
+    values = {one.name: one for one in answered.values}
+    assert values["knee.coulomb_friction.force"].value == pytest.approx(0.3, abs=0.02)
+    assert "knee: coulomb friction" in (bags / "batch" / "answers" / f"{task.file}.html").read_text()
 
 
 @pytest.mark.parametrize(

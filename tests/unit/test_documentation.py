@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import rhythmid
+from rhythmid.batch.manifest import Manifest
 from rhythmid.diagnose.answer.result import ANSWER, Diagnosis
 from rhythmid.diagnose.rejections import table
 from rhythmid.experiment import Experiment
@@ -39,6 +40,15 @@ def test_the_experiment_file_that_is_shown(tmp_path):
     assert experiment.count == 300_000
 
 
+def test_the_manifest_that_is_shown(tmp_path):
+    text = (ROOT / "docs" / "batch.md").read_text(encoding="utf-8")
+    found = re.search(r"```yaml\n(.*?)```", text, re.DOTALL)
+    assert found is not None
+    (tmp_path / "week.yaml").write_text(found[1], encoding="utf-8")
+    first, second = Manifest.load(tmp_path / "week.yaml").entries
+    assert first.entry.group == "rig A" and second.options.method == "joint"
+
+
 def test_the_signals_file_that_is_shown(tmp_path):
     (tmp_path / "signals.yaml").write_text(block("signals.yaml"), encoding="utf-8")
     assert Signals.load(tmp_path / "signals.yaml").use == (10.0, 90.0)
@@ -60,6 +70,7 @@ def test_the_files_of_other_machines_are_read_and_fit_together(machine, tmp_path
     "document",
     [
         "README.md",
+        "docs/batch.md",
         "docs/files.md",
         "docs/machines.md",
         "docs/real.md",

@@ -22,6 +22,7 @@ from rhythmid.record.record import Channel, Record
 from rhythmid.result import Result, optional
 
 FUNCTIONS = {
+    "batch": "rhythmid.batch.batch",
     "compare": "rhythmid.compare.compare",
     "design": "rhythmid.design.designer",
     "diagnose": "rhythmid.diagnose.diagnosis",

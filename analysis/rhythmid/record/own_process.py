@@ -1,7 +1,7 @@
 """Arrays read in a process of its own, for readers in machine code that trust their file: a damaged one may kill the process."""
 
 import faulthandler
-import multiprocessing
+import os
 import resource
 from collections.abc import Callable, Mapping
 from tempfile import TemporaryFile
@@ -23,25 +23,31 @@ def arrays_in_own_process(read: Callable[[], Arrays], problem: str) -> Arrays:
     anything else. Raises InputError, beginning with `problem`, where it raises or the process dies; NotImplementedError where it
     raises that. Where the system cannot fork, `read` is called here.
     """
-    if "fork" not in multiprocessing.get_all_start_methods():
+    if not hasattr(os, "fork"):
         return read()
     with TemporaryFile() as file:
-        process = multiprocessing.get_context("fork").Process(target=_write, args=(read, file), daemon=True)
-        process.start()
-        process.join()
+        child = os.fork()  # not multiprocessing's: its workers may have none of their own
+        if child == 0:
+            code = 1
+            try:
+                code = _write(read, file)
+            finally:
+                os._exit(code)
+        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         file.seek(0)
-        if process.exitcode == UNSUPPORTED:
+        if code == UNSUPPORTED:
             raise NotImplementedError
-        if process.exitcode == FAILED:
+        if code == FAILED:
             raise InputError(f"{problem}: {file.read().decode()}")
-        if process.exitcode != 0:
+        if code != 0:
             raise InputError(f"{problem}: it is damaged such that its reader fails")
         with np.load(file, allow_pickle=False) as found:
             names, *keys = found.files
             return dict(zip(found[names].tolist(), (found[key] for key in keys), strict=True))
 
 
-def _write(read: Callable[[], Arrays], file: IO[bytes]) -> None:
+def _write(read: Callable[[], Arrays], file: IO[bytes]) -> int:
+    """Write what `read` returns, or why it fails; the exit code says which."""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     faulthandler.disable()  # the parent tells of it, in one line
     try:
@@ -50,10 +56,11 @@ def _write(read: Callable[[], Arrays], file: IO[bytes]) -> None:
         np.savez(file, np.array(list(found), dtype=str), *arrays)
         file.flush()
     except NotImplementedError:
-        raise SystemExit(UNSUPPORTED) from None
+        return UNSUPPORTED
     except Exception as error:  # the reader of damaged files raises anything
         file.seek(0)
         file.truncate()
         file.write(" ".join(str(error).split()).encode())
         file.flush()
-        raise SystemExit(FAILED) from None
+        return FAILED
+    return 0

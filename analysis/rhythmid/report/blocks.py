@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
 from typing import Union
+from urllib.parse import quote
 
 from rhythmid.report.chart import Chart, draw
 
@@ -44,7 +45,7 @@ class Equation:
 @dataclass(frozen=True)
 class Table:
     """Rows of text under `columns`. `marked` are rows that stand out, `formulas` columns whose texts hold symbols
-    with indices. The first column names the row.
+    with indices. The first column names the row, and leads to the address in `links` where there is one.
 
     On a narrow screen each row becomes a card of its own.
     """
@@ -54,6 +55,7 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     marked: tuple[int, ...] = ()
     formulas: tuple[int, ...] = ()
+    links: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -168,7 +170,10 @@ def _table(table: Table) -> str:
     rows = []
     for index, row in enumerate(table.rows):
         mark = ' class="marked"' if index in table.marked else ""
-        cells = [f'<th role="rowheader" scope="row">{words(row[0])}</th>']
+        named = words(row[0])
+        if index < len(table.links) and table.links[index]:
+            named = f'<a href="{escape(quote(table.links[index]), quote=True)}">{named}</a>'
+        cells = [f'<th role="rowheader" scope="row">{named}</th>']
         cells += [
             f'<td role="cell" data-label="{escape(name, quote=True)}"><span>{formula(text) if i in table.formulas else words(text)}</span></td>'
             for i, (name, text) in enumerate(zip(table.columns[1:], row[1:]), start=1)

@@ -1,0 +1,44 @@
+"""The table of a batch as CSV and as Parquet."""
+
+import csv
+import io
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from rhythmid.errors import InputError
+from rhythmid.output import write_text
+from rhythmid.result import Row
+
+NUMBERS = ("value", "std")  # columns that hold numbers; the others hold text
+
+
+def write_csv(path: Path, rows: Sequence[Row]) -> None:
+    """Write the rows whole or not at all; what is not known is empty."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(path, text.getvalue())
+
+
+def write_parquet(path: Path, rows: Sequence[Row]) -> bool:
+    """Write the rows whole or not at all; what is not known is null. False, and nothing is written, where pyarrow is not installed."""
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ModuleNotFoundError:
+        return False
+    fields = [(name, pyarrow.float64() if name in NUMBERS else pyarrow.string()) for name in rows[0]]
+    table = pyarrow.Table.from_pylist([dict(row) for row in rows], pyarrow.schema(fields))
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        parquet.write_table(table, partial)
+        os.replace(partial, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+    finally:
+        with suppress(OSError):
+            partial.unlink()
+    return True
