@@ -7,7 +7,7 @@ PACKAGES := analysis $(patsubst %/setup.py,%,$(wildcard ros_ws/src/*/setup.py))
 METADATA := $(wildcard $(foreach package,$(PACKAGES),$(addprefix $(package)/,*.py *.cfg *.toml *.xml launch/* config/* layouts/*)))
 
 .DEFAULT_GOAL := help
-.PHONY: help install test graphs computing lint format demo picture benchmark naming docker dist lock clean
+.PHONY: help install test graphs computing lint format demo docs picture benchmark naming docker dist lock clean
 
 help: ## Show this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -68,6 +68,9 @@ naming: install ## Compare the naming of missing physics with PySINDy and a Gaus
 	$(BIN)/python -m pip install --quiet --constraint requirements.lock pysindy scikit-learn
 	$(BIN)/python benchmarks/naming.py
 
+docs: install ## Build the documentation site into site/, without warnings
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+
 picture: install ## Draw the pictures of the README
 	$(BIN)/python docs/signal_path.py
 	$(BIN)/python docs/delay_noise.py
@@ -84,8 +87,8 @@ lock: install ## Resolve the requirements anew into requirements.lock
 	$(BIN)/python -m pip install --quiet uv
 	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.11 \
 		--custom-compile-command "make lock" --output-file requirements.lock \
-		analysis/pyproject.toml --extra ros --group pyproject.toml:test
+		analysis/pyproject.toml --extra ros --group pyproject.toml:test --group pyproject.toml:docs
 
 clean: ## Remove what was built, not what was recorded
-	rm -rf $(VENV) build install log .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build install log site .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -o -name '*.egg-info' | xargs rm -rf

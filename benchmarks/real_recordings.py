@@ -139,7 +139,7 @@ def cells(row: Row) -> tuple[str, ...]:
     errors = (
         "-"
         if row.before is None
-        else f"{100 * row.before:.3g} -> {'-' if row.after is None else f'{100 * row.after:.3g}'}"
+        else f"{100 * row.before:.3g} → {'-' if row.after is None else f'{100 * row.after:.3g}'}"
     )
     share = "-" if row.share is None else f"{row.share:.2f}"
     return (

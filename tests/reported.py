@@ -58,7 +58,7 @@ def result(
             hypothesis("freed_value", 300.0, 0.0, ["inertia.mass"]), hypothesis("nominal", 400.0, 0.0, []),
         ],
         "rejections": [
-            {"hypothesis": ["stribeck_friction"], "name": "within_bounds", "statistic": 0.0, "threshold": 1e-3, "reason": "the effect has become the limit of another one"},
+            {"hypothesis": ["stribeck_friction"], "name": "within_bounds", "statistic": 0.0, "threshold": 1e-3, "reason": "only a limit of its parameters is identifiable, where it is another effect"},
             {"hypothesis": ["inertia.mass"], "name": "share_of_rest", "statistic": None, "threshold": 0.2, "reason": "so small a part belongs to something else"},
         ],
         "remainder": {"share": 0.0, "significant": False, "goes_with": None, "curve": None},

@@ -60,7 +60,17 @@ class Term:
 
 @dataclass(frozen=True)
 class Model:
-    """An inertia and the elements along the path command -> actuator -> force -> sensor."""
+    """An inertia and the elements along the path command -> actuator -> force -> sensor.
+
+    Attributes
+    ----------
+    mass
+        The inertia.
+    terms
+        The elements in the order of the path.
+    units
+        In which forces and positions are counted.
+    """
 
     mass: Value
     terms: tuple[Term, ...]

@@ -29,8 +29,10 @@ class OfflineRun(Result):
 
     Attributes
     ----------
-    experiment : as it was run.
-    messages : what each topic carries, by its name within the namespace; the true motion is `plant/joint_states`.
+    experiment
+        As it was run.
+    messages
+        What each topic carries, by its name within the namespace; the true motion is `plant/joint_states`.
     """
 
     experiment: Experiment
@@ -122,9 +124,12 @@ def simulate(
 
     Parameters
     ----------
-    model : the machine, or its file; None for the one that the experiment names.
-    experiment : an experiment.yaml, or its content as a mapping: excitation, forcing, delays, noise, duration, …
-    elements : folders with elements of your own.
+    model
+        The machine, or its file; None for the one that the experiment names.
+    experiment
+        An experiment.yaml, or its content as a mapping: excitation, forcing, delays, noise, duration, …
+    elements
+        Folders with elements of your own.
 
     Returns
     -------

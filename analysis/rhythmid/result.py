@@ -44,7 +44,8 @@ class Result(ABC):
 
         Parameters
         ----------
-        width : characters of a line; tables fit 40 and more.
+        width
+            Characters of a line; tables fit 40 and more.
         """
         from rich.console import Console
 
@@ -57,7 +58,8 @@ class Result(ABC):
 
         Parameters
         ----------
-        table : name of the table; the main one where None.
+        table
+            Name of the table; the main one where None.
 
         Raises
         ------

@@ -85,7 +85,7 @@ def test_without_a_controller_only_the_sum_with_the_measurement_delay_is_told():
     total = found.sums["measurement_delay"]
     assert total.value == pytest.approx(0.042, abs=4.0 * total.std) and total.std < 1e-3
     assert found.reason == delays.assumption
-    assert found.reason == "only the sum of actuator_delay with measurement_delay shows, not how it divides"
+    assert found.reason == "only the sum of actuator_delay with measurement_delay is identifiable"
     assert delays.to_dict()["inner"]["actuator_delay"]["sums"]["measurement_delay"]["value"] == total.value
 
 
@@ -106,6 +106,6 @@ def test_two_dead_times_in_one_loop_show_their_sum():
     assert set(delays.inner["actuator_delay"].sums) == {"feedback_delay", "measurement_delay"}
     assert delays.inner["actuator_delay"].sums["feedback_delay"].value == pytest.approx(0.02, abs=2e-4)
     assert delays.inner["feedback_delay"].reason == (
-        "only the sum of feedback_delay with actuator_delay shows, not how it divides"
+        "only the sum of feedback_delay with actuator_delay is identifiable"
     )
     assert delays.input.value == pytest.approx(0.02, abs=4.0 * delays.input.std)

@@ -32,7 +32,11 @@ FRICTION = MissingEffect(
     "coulomb_friction", "force", "F = −F_c sgn v", 0.92, 0.97, {"force": Estimate(0.8, 0.01, "N")}
 )
 LIMIT = Rejection(
-    ("second_mode",), "within_bounds", 0.0, 1e-3, "the effect has become the limit of another one"
+    ("second_mode",),
+    "within_bounds",
+    0.0,
+    1e-3,
+    "only a limit of its parameters is identifiable, where it is another effect",
 )
 ANSWER = Diagnosis(
     "missing_physics",
@@ -76,9 +80,9 @@ def printed(answer: Diagnosis = ANSWER) -> str:
         "scored: by the recorded effort below 12 Hz: a controller holds the machine",
         "assumption: The recorded effort is taken to be true in scale.",
         "not tried: sensor_lag, sensor_drift: not seen",
-        "not believed: second mode (the effect has become the limit of another one)",
-        "refitted nominal: NRMSE 0.05000 seen, 0.06000 held out",
-        "augmented: NRMSE 0.01000 seen, — held out",
+        "not believed: second mode (only a limit of its parameters is identifiable, where it is another effect)",
+        "refitted nominal: NRMSE 0.05000 on fitted data, 0.06000 held out",
+        "augmented: NRMSE 0.01000 on fitted data, — held out",
         "next experiment: a slow reversal [of the speed]",
     ],
 )
@@ -142,4 +146,4 @@ def test_the_verdict_is_not_said_twice():
 
 def test_several_names_come_with_their_joint_probability():
     lag = replace(FRICTION, element="actuator_lag")
-    assert "all of these names together: 97 %" in printed(replace(ANSWER, missing=(FRICTION, lag)))
+    assert "joint probability of these names: 97 %" in printed(replace(ANSWER, missing=(FRICTION, lag)))

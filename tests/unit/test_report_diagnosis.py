@@ -31,7 +31,7 @@ def test_hypotheses_stand_with_how_much_worse_they_predict_and_how_sure_that_is(
 
 def test_rejections_stand_with_statistic_threshold_and_reason() -> None:
     html = render(diagnosis_page(findings(result())))
-    (row,) = rows_with(html, "the effect has become the limit of another one")
+    (row,) = rows_with(html, "only a limit of its parameters is identifiable, where it is another effect")
     assert "Stribeck friction" in row and "within bounds" in row and "0.001" in row
 
 

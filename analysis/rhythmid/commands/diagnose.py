@@ -44,7 +44,8 @@ def diagnose(
         ),
     ] = None,
     holdout: Annotated[
-        list[Path] | None, typer.Option("--holdout", help="Records to judge by only; may be repeated.")
+        list[Path] | None,
+        typer.Option("--holdout", help="Held-out records: used to judge, never to fit. May be repeated."),
     ] = None,
     elements: Elements = None,
     json: JsonFile = None,

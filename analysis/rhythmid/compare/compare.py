@@ -48,7 +48,35 @@ class HarmonicRatio:
 
 @dataclass(frozen=True, eq=False)
 class Comparison(Result):
-    """A simulation beside a recording. `left` (n,) is what the explanations leave of the difference."""
+    """A simulation beside a recording.
+
+    Attributes
+    ----------
+    simulation, recording
+        Names of the two records.
+    alignment
+        Offset between their clocks, and what it was found from.
+    through_model
+        Whether a model ran in the simulation's place.
+    rates
+        Of simulation and recording [Hz].
+    pair
+        Both on common times.
+    nrmse
+        Root mean square of the difference over the standard deviation of the recording.
+    explanations
+        Changes that reduce the difference, the largest share first.
+    left
+        What the explanations leave of the difference; float64[n], in `unit`.
+    place
+        Where in time, frequency, cycle and state the difference lies.
+    harmonics
+        Of the forcing, recording over simulation.
+    unit
+        Of the measured motion.
+    notes
+        What the user should know, one line each.
+    """
 
     simulation: str
     recording: str
@@ -128,7 +156,7 @@ class Comparison(Result):
         started = any(one.slot is None for one in self.explanations)
         if not self.parted:
             return (
-                f"Simulation and recording agree within the noise: the difference of {size} follows nothing."
+                f"Simulation and recording agree within the noise: the difference of {size} is related to no signal."
                 if not started
                 else f"Simulation and recording agree but for another start, which dies out; the difference was {size}."
             )
@@ -229,10 +257,14 @@ def compare(
 
     Parameters
     ----------
-    simulation : record of the simulation.
-    recordings : one or more records of the machine.
-    model : runs in the simulation's place, fitted to it, where the excitations differ.
-    tell : is told what begins.
+    simulation
+        Record of the simulation.
+    recordings
+        One or more records of the machine.
+    model
+        Runs in the simulation's place, fitted to it, where the excitations differ.
+    tell
+        Called with a sentence at the beginning of each step.
 
     Raises
     ------

@@ -44,10 +44,30 @@ BIASED = 1.0  # standard deviations of bias that deserve a word
 class Design(Result):
     """An experiment ready to be played, with what is predicted of it.
 
-    `command` holds the samples that the file will hold; `machine` is the model linearised about its limit cycle,
-    without delays; `bias` of a fit to transfer functions, in standard deviations of each parameter; `visible` are the
-    harmonics |m| of the response that will stand out of the noise. `output` (n,) is the measured position [m] without
-    noise, `still` (n,) the same without command.
+    Attributes
+    ----------
+    requirements
+        What was asked for.
+    plan
+        Frequencies and phases of the signal.
+    command
+        The samples that the file will hold.
+    amplitude
+        The size of the command, and which limit set it.
+    experiment
+        The run, as `rhythmid run` and `rhythmid simulate` play it.
+    machine
+        The model linearised about its limit cycle, without delays.
+    prediction
+        Standard deviations of all parameters and delays (Cramér-Rao bound).
+    distortion
+        Nonlinear part of the response, as a share of it.
+    bias
+        Of a fit to transfer functions, in standard deviations of each parameter.
+    visible
+        Harmonics |m| of the response that will stand out of the noise.
+    output, still
+        Measured position without noise, with and without command; float64[n], [m].
     """
 
     requirements: Requirements
@@ -193,10 +213,15 @@ def design(
 
     Parameters
     ----------
-    model : the machine; every parameter that is not fixed is to be determined.
-    requirements : length, limits and circumstances of the run; `Requirements.of(model, …)` takes forcing and delays from the model.
-    catalogue : elements beside the built-in ones.
-    progress : is told what begins.
+    model
+        The machine; every parameter that is not fixed is to be determined.
+    requirements
+        Length, limits and circumstances of the run; `Requirements.of(model, …)` takes forcing and delays from the
+        model.
+    catalogue
+        Elements beside the built-in ones.
+    progress
+        Called with a sentence at the beginning of each step.
 
     Raises
     ------

@@ -17,12 +17,43 @@ KINDS: tuple[Kind, ...] = ("comb", "multisine")
 class Requirements:
     """Length, limits and circumstances of the run to be designed.
 
-    `duration` [s]; `band` of the command [Hz]; `max_effort` largest |u| [N]; `envelope` of the measured position [m];
-    `noise_std` of a single measured sample [m]; `kind` a comb of shifted chirps or an interleaved multisine; `rate` [Hz];
-    `harmonics` M: responses at ω + mω_p, |m| ≤ M, are to stay apart; `forcing` on the robot; `input_delay` and
-    `measurement_delay` [s] as expected; `longest_delay` [s] that either may have; `max_distortion`, a share of the
-    response that the nonlinear part may reach, None for any. `shifts` K of a comb, `period` [s] and `spacing` [Hz] of a
-    multisine's lines are chosen where they are None. Raises InputError, naming the option, for what contradicts itself.
+    Attributes
+    ----------
+    duration
+        Length of the run [s].
+    band
+        Lowest and highest frequency of the command [Hz].
+    max_effort
+        Largest |u| [N].
+    envelope
+        Lowest and highest measured position [m].
+    noise_std
+        Standard deviation of a single measured sample [m].
+    kind
+        A comb of shifted chirps or an interleaved multisine.
+    rate
+        Samples per second [Hz].
+    harmonics
+        M: the responses at ω + mω_p, |m| ≤ M, are to stay apart.
+    forcing
+        Periodic force made on the robot.
+    input_delay, measurement_delay
+        As expected [s].
+    longest_delay
+        The longest that either may be [s].
+    max_distortion
+        Largest share of the response that its nonlinear part may reach; None for any.
+    shifts
+        K start phases of a comb; chosen where None.
+    period, spacing
+        Period [s] and spacing of the lines [Hz] of a multisine; chosen where None.
+    seed
+        Of the random phases.
+
+    Raises
+    ------
+    InputError
+        Naming the option, for requirements that contradict one another.
     """
 
     duration: float
@@ -61,10 +92,24 @@ class Requirements:
 
         Parameters
         ----------
-        model, duration, band, max_effort, envelope, noise_std : as for `design` and `Requirements`.
-        forcing : on the robot.
-        delays : of command and measurement [s].
-        further : the other attributes of `Requirements`.
+        model
+            The machine, which says forcing and delays where they are not given.
+        duration
+            Length of the run [s].
+        band
+            Lowest and highest frequency of the command [Hz].
+        max_effort
+            Largest |u| [N].
+        envelope
+            Lowest and highest measured position [m].
+        noise_std
+            Standard deviation of a single measured sample [m].
+        forcing
+            On the robot.
+        delays
+            Of command and measurement [s].
+        further
+            The other attributes of `Requirements`.
         """
         late = transport_delays(model) if delays is None else delays
         return cls(

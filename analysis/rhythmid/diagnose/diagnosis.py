@@ -49,9 +49,12 @@ class Answer(Result):
 
     Attributes
     ----------
-    diagnosis : verdict, names, sizes, hypotheses and rejections: the content of `diagnose --json`.
-    model : the nominal model with what it lacked, refitted.
-    result : everything behind the decision.
+    diagnosis
+        Verdict, names, sizes, hypotheses and rejections: the content of `diagnose --json`.
+    model
+        The nominal model with what it lacked, refitted.
+    result
+        Everything behind the decision.
     """
 
     diagnosis: Diagnosis
@@ -119,8 +122,10 @@ class Answer(Result):
 
         Parameters
         ----------
-        axis : Matplotlib axis; one of a new figure where None.
-        most : hypotheses that are drawn.
+        axis
+            Matplotlib axis; one of a new figure where None.
+        most
+            Hypotheses that are drawn.
         """
         axis, shown = axis_or_new(axis), self.diagnosis.hypotheses[:most]
         places = range(len(shown))
@@ -152,12 +157,18 @@ def diagnose(
 
     Parameters
     ----------
-    records : one or more, to which the models are fitted.
-    model : the nominal model.
-    holdout : records to judge by only; without any, the last fifth of every record is held out.
-    catalogue : elements that may be missing; the built-in ones by default.
-    tell : is told what begins.
-    budget : seconds that the search may take; the answer says what was not tried.
+    records
+        One or more, to which the models are fitted.
+    model
+        The nominal model.
+    holdout
+        Records to judge by only; without any, the last fifth of every record is held out.
+    catalogue
+        Elements that may be missing; the built-in ones by default.
+    tell
+        Called with a sentence at the beginning of each step.
+    budget
+        Seconds that the search may take; the answer says what was not tried.
 
     Returns
     -------

@@ -32,7 +32,7 @@ INTEGRATES = (
     "the model integrates or is unstable, so that a long free run would add up every small disturbance"
 )
 FREE_RUN = "the model follows the machine in free run"
-LOSES = "in free run the nominal model loses the machine"
+LOSES = "in free run the nominal model does not follow the machine"
 
 
 @dataclass(frozen=True)

@@ -176,7 +176,10 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     if not chosen.elements:
         explainable = left.share * (contest.nominal.prediction.mean_square - contest.floor)
         if left.significant and explainable > (contest.practical * contest.size) ** 2:
-            return answer("unknown_physics", f"no name explains what is there: it goes with {left.goes_with}")
+            return answer(
+                "unknown_physics",
+                f"no effect of the catalogue explains the mismatch: it goes with {left.goes_with}",
+            )
         missed = math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300)
         if missed > BLIND:
             return answer(
@@ -198,21 +201,21 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     if explained < MAINLY:
         return answer(
             "unknown_physics",
-            f"the names leave {100.0 * left.share:.0f} % of what goes with {left.goes_with}",
+            f"the named effects leave {100.0 * left.share:.0f} % of the mismatch, which goes with {left.goes_with}",
         )
     if chosen.kind == "free_map":
         return answer("unknown_physics", "a free map explains the records as well as several names together")
     if chosen.kind == "location":
         return answer(
             "undecided",
-            "the effect explains the records best in a place where the catalogue has nothing like it",
+            "the effect explains the records best in a slot for which the catalogue has no such element",
         )
     if stated:
         return answer("missing_physics", "", stated)
     if explained < EXPLAINED:
         return answer(
             "unknown_physics",
-            f"it is mainly this, but {100.0 * left.share:.0f} % of the mismatch goes with {left.goes_with}",
+            f"this effect is mainly what is missing, but {100.0 * left.share:.0f} % of the mismatch goes with {left.goes_with}",
         )
     if groups or joint_probability([names[label] for label in labels], contest, chosen, weights) < STATED:
         return answer("undecided", "the evidence does not separate several explanations")

@@ -119,8 +119,15 @@ class Catalogue(Mapping[str, Element]):
 def load_catalogue(folders: Iterable[str | Path] = ()) -> Catalogue:
     """All elements: built in, from installed packages (entry points `rhythmid.elements`), and from `folders`.
 
-    A folder may hold element files directly or in sub-folders named after the slots. Raises InputError for a folder
-    that is missing or empty, a file that does not load, and a name that is defined twice.
+    Parameters
+    ----------
+    folders
+        Each holds element files, directly or in sub-folders named after the slots.
+
+    Raises
+    ------
+    InputError
+        For a folder that is missing or empty, a file that does not load, and a name that is defined twice.
     """
     found: dict[str, Element] = {}
 

@@ -184,7 +184,7 @@ def _of_paths(
         words = "nothing that is recorded drives the machine, so no delay shows"
         return Delays(nothing, nothing, nothing, False, words, undetermined=directions)
     if joint.pumping is None or not joint.pumping.active:
-        words = "no forcing is known, so nothing tells when the cycle is at which phase: only the sum of the delays shows"
+        words = "no forcing is known, and with it no phase of the cycle: only the sum of the delays is identifiable"
         return Delays(nothing, nothing, total, False, words, undetermined=directions)
     if INPUT_DELAY not in fit.model.parameters or MEASUREMENT_DELAY not in fit.model.parameters:
         here = sum_of(fit, MEASUREMENT_DELAY)
@@ -203,8 +203,8 @@ def _of_paths(
         return only_sum("the records do not tell the two delays apart", intervals)
     if told == "delayed":
         return only_sum(
-            "the forcing comes through the same delayed channel as the command: only the sum of the delays shows, "
-            "whatever a solver returns",
+            "the forcing comes through the same delayed channel as the command: only the sum of the delays "
+            "is identifiable",
             intervals,
         )
     if told == "clock_unknown":

@@ -132,15 +132,24 @@ class Identification(Result):
 
     Attributes
     ----------
-    model : the model with all estimates in it, delays included.
-    parameters : estimates by "element.parameter".
-    delays : of the command and measurement paths.
-    shown : transfer functions, as far as their conditions hold.
-    paper : the paper's method, record by record; empty where it finds nothing.
-    quality : rate [Hz], gaps, jitter_std [s], nrmse and what else tells how far to trust the rest.
-    joint : the joint fit; None where another method was asked for.
-    notes : what the user should know, one line each.
-    cautions : what should keep a user from believing the estimates.
+    model
+        The model with all estimates in it, delays included.
+    parameters
+        Estimates by "element.parameter".
+    delays
+        Of the command and measurement paths.
+    shown
+        Transfer functions, as far as their conditions hold.
+    paper
+        The paper's method, record by record; empty where it finds nothing.
+    quality
+        Rate [Hz], gaps, jitter_std [s], nrmse and what else tells how far to trust the rest.
+    joint
+        The joint fit; None where another method was asked for.
+    notes
+        What the user should know, one line each.
+    cautions
+        What should keep a user from believing the estimates.
     """
 
     model: Model
@@ -221,8 +230,10 @@ class Identification(Result):
 
         Parameters
         ----------
-        axis : Matplotlib axis; one of a new figure where None.
-        record : which of the records.
+        axis
+            Matplotlib axis; one of a new figure where None.
+        record
+            Which of the records.
 
         Raises
         ------

@@ -110,14 +110,23 @@ def identify(
 
     Parameters
     ----------
-    records : one or more recordings of the same machine.
-    model : what is known of it; the paper's hopper where None.
-    harmonics : M, sidebands on either side that the paper's method estimates.
-    method : `joint` maximum likelihood, or the `paper`'s two steps.
-    forcing, offset : how the forcing reaches the machine, and what is known of its clock; see `delays_of`.
-    htf : how the harmonic transfer functions of the first record are found; see `harmonic_transfer_functions`. The paper's
-        method brings its own, equation (5), where this is `auto`.
-    tell : is told what begins.
+    records
+        One or more recordings of the same machine.
+    model
+        What is known of it; the paper's hopper where None.
+    harmonics
+        M, sidebands on either side that the paper's method estimates.
+    method
+        `joint` maximum likelihood, or the `paper`'s two steps.
+    forcing
+        How the forcing reaches the machine; see `delays_of`.
+    offset
+        What is known of the offset of the forcing's clock [s].
+    htf
+        How the harmonic transfer functions of the first record are found; see `harmonic_transfer_functions`. The
+        paper's method brings its own, equation (5), where this is `auto`.
+    tell
+        Called with a sentence at the beginning of each step.
 
     Returns
     -------

@@ -87,7 +87,7 @@ def _refused(fit: Fit, name: str, among: Sequence[str], directions: Array) -> In
         for one in same
     }
     reason = (
-        f"only the sum of {label} with {' and with '.join(sums)} shows, not how it divides"
+        f"only the sum of {label} with {' and with '.join(sums)} is identifiable"
         if sums
         else f"nothing in the records determines {label}, nor its sum with other delays"
     )

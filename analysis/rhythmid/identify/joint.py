@@ -243,7 +243,7 @@ def joint_likelihood(records: Record | Sequence[Record], model: Model) -> JointF
         return found
     raise InputError(
         f"no answer: {found.search}; either the search is stuck or the machine has physics that the model lacks: "
-        "start from better values, look for delays elsewhere, or run `rhythmid diagnose`"
+        "start from better values or other delays, or run `rhythmid diagnose`"
     )
 
 

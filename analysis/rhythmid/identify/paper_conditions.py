@@ -23,8 +23,8 @@ def lacks_transfer_functions(pumping: Pumping, result: PaperResult | str) -> str
     share = response_share(result)
     if share > SMALL:
         return (
-            f"the excitation is not small: the response to it is {share:.0%} of the limit cycle's motion, and a linearisation bears "
-            f"{SMALL:.0%}; excite less"
+            f"the excitation is not small: the response to it is {share:.0%} of the limit cycle's motion, and linearisation allows "
+            f"{SMALL:.0%}; reduce the amplitude"
         )
     return None
 

@@ -22,7 +22,7 @@ NO_PHASE = (
 NO_SIDEBANDS = (
     "the excitation reaches the sidebands at too few frequencies to tell the two delays apart by their phases"
 )
-NO_FORCING = "no forcing is known, so nothing tells when the machine's cycle is at which phase"
+NO_FORCING = "no forcing is known, and with it no phase of the machine's cycle"
 
 
 def combined(estimates: Sequence[tuple[float, float]]) -> tuple[float, float]:

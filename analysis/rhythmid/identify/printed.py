@@ -22,7 +22,7 @@ def show(result: Mapping[str, Any], console: Console) -> None:
     console.print(f"assuming that {delays['assumption']}")
     if delays["closure"]["z"] is not None:
         console.print(
-            f"closure of phase, offset and slope: {delays['closure']['z']:+.2f} standard deviations"
+            f"closure (phase of the cycle + offset of the sidebands − slope): {delays['closure']['z']:+.2f} standard deviations"
         )
     for name, (low, high) in (delays["intervals"] or {}).items():
         console.print(f"{name} delay: between {1e3 * low:.3f} and {1e3 * high:.3f} ms (95 %)")

@@ -104,8 +104,8 @@ def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tupl
         if name == "input_delay_drift":
             told = "the input delay drifts"
         notes.append(
-            f"{told}: {1e6 * value:+.3f} ± {1e6 * std:.3f} µs/s; part of the model, and the delays are those at the "
-            "record's zero"
+            f"{told}: {1e6 * value:+.3f} ± {1e6 * std:.3f} µs/s; it is part of the model, and the delays are those at "
+            "the start of the record"
         )
     found = replace(joint, fit=fit)
     if (

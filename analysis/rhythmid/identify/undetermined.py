@@ -58,10 +58,10 @@ def _direction(names: Sequence[str], vector: Array, size: Array, felt: Array) ->
     if len(moved) == 1:
         words = f"nothing in the records determines {moved[0]}"
     elif set(moved) == {INPUT_DELAY, MEASUREMENT_DELAY} and abs(step.sum()) < 0.05 * np.abs(step).max():
-        words = "only the sum of the input delay and the measurement delay shows, not how it divides"
+        words = "only the sum of the input delay and the measurement delay is identifiable"
     else:
         change = ", ".join(f"{name} by {s / step[0]:+.3g}" for name, s in zip(moved, step))
-        words = f"these can change together and nothing recorded would change: {change}"
+        words = f"these can change together without any effect on the records: {change}"
     return Direction(tuple(moved), vector[large], words)
 
 

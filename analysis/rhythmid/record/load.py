@@ -19,9 +19,14 @@ def load(
 
     Parameters
     ----------
-    source : a bag directory, an .mcap or .db3 file, a table (.csv, .mat, .npz, .parquet), or a signals.yaml that names tables.
-    signals : which channel is what: a signals.yaml, or its content as a mapping; by default the topics of rhythmid's own nodes.
-    use : first and last second of the recording that are used.
+    source
+        A bag directory, an .mcap or .db3 file, a table (.csv, .mat, .npz, .parquet), or a signals.yaml that names
+        tables.
+    signals
+        Which channel is what: a signals.yaml, or its content as a mapping; by default the topics of rhythmid's own
+        nodes.
+    use
+        First and last second of the recording that are used.
 
     Returns
     -------

@@ -51,10 +51,14 @@ class Uniform:
 
     Attributes
     ----------
-    time : float64[n], relative to the record's start [s].
-    input, output, forcing, velocity, effort, reference : float64[n] or None, in the units of the record's channels.
-    period, rate : of the grid [s, Hz].
-    valid : bool[n]; False where a channel has a gap, so that its value is no more than a bridge.
+    time
+        Float64[n], relative to the record's start [s].
+    input, output, forcing, velocity, effort, reference
+        Float64[n] or None, in the units of the record's channels.
+    period, rate
+        Of the grid [s, Hz].
+    valid
+        Bool[n]; False where a channel has a gap, so that its value is no more than a bridge.
     """
 
     time: Array
@@ -81,17 +85,28 @@ class Record(Result):
 
     Attributes
     ----------
-    input : what drives the machine; None in a free decay.
-    output : the measured motion.
-    forcing, velocity, effort, reference : where recorded; `effort` is the total actuator force.
-    start_ns : time of the record's zero on the recording's clock [ns].
-    hold : how the input continues between its samples. With 'zero', a value holds from its stamp until the next one.
-    input_kind : force, base_displacement, base_acceleration or reference (of a controller that the model holds).
-    output_kind : position, velocity or acceleration.
-    forcing_law : the forcing's formula, if that is how it is known; `forcing` then holds samples of it.
-    run : the description of the experiment that the recording itself carries.
-    parameters : what parameters of the model, by "element.parameter", were in this record, where that is declared.
-    whole : name of the record that this one is a stretch of; empty for a whole one.
+    input
+        What drives the machine; None in a free decay.
+    output
+        The measured motion.
+    forcing, velocity, effort, reference
+        Where recorded; `effort` is the total actuator force.
+    start_ns
+        Time of the record's zero on the recording's clock [ns].
+    hold
+        How the input continues between its samples. With 'zero', a value holds from its stamp until the next one.
+    input_kind
+        Force, base_displacement, base_acceleration or reference (of a controller that the model holds).
+    output_kind
+        Position, velocity or acceleration.
+    forcing_law
+        The forcing's formula, if that is how it is known; `forcing` then holds samples of it.
+    run
+        The description of the experiment that the recording itself carries.
+    parameters
+        What parameters of the model, by "element.parameter", were in this record, where that is declared.
+    whole
+        Name of the record that this one is a stretch of; empty for a whole one.
     """
 
     name: str

@@ -147,7 +147,7 @@ def unknown_section(found: Findings) -> Section:
     elif verdict == "unknown_physics":
         said = (
             "Something is left that no element of the catalogue explains, and no function of one of the quantities that were "
-            "tried either: memory, a disturbance, or an effect on the way in or out."
+            "tried either: memory, a disturbance, or an effect in the path of command or measurement."
         )
     else:
         said = (

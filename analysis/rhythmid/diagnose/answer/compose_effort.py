@@ -21,7 +21,7 @@ from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.run import EffortResult
 from rhythmid.identify.inverse_dynamics.estimate import size_of
 
-NO_SENSOR = "The measurement is taken for the motion: effects in the sensor and in the measurement's time are not among the candidates."
+NO_SENSOR = "The measurement is assumed to be the motion: effects in the sensor and in the measurement's time are not among the candidates."
 FIXED_SCALE = "The recorded effort is taken to be true in scale."
 
 

@@ -33,7 +33,7 @@ def show(found: Diagnosis, console: Console) -> None:
             console, "", {name: asdict(one) for name, one in effect.parameters.items()}, "parameter"
         )
     if len(found.missing) > 1 and found.verdict == "missing_physics":
-        lines.said("all of these names together", _probability(found.joint_probability))
+        lines.said("joint probability of these names", _probability(found.joint_probability))
     for group in found.indistinguishable:
         lines.said("indistinguishable here", ", ".join(group))
     if len(found.hypotheses) > 1:
@@ -44,7 +44,7 @@ def show(found: Diagnosis, console: Console) -> None:
         if name == "augmented" and fit == found.refitted_nominal:
             continue  # nothing was added
         held = NONE if fit.heldout_nrmse is None else f"{fit.heldout_nrmse:.5f}"
-        lines.said(name.replace("_", " "), f"NRMSE {fit.train_nrmse:.5f} seen, {held} held out")
+        lines.said(name.replace("_", " "), f"NRMSE {fit.train_nrmse:.5f} on fitted data, {held} held out")
     for label, group in (
         ("assumption", found.assumptions),
         ("calibration", found.calibration),

@@ -94,7 +94,7 @@ def summary_of(
             return f"{said} They are {'; '.join(groups)}."
         return said + (f" Best so far: {names}." if names else "")
     return f"Something is missing that the catalogue does not know: {decision.reason}." + (
-        f" The nearest, not the name: {names}." if names else ""
+        f" The nearest known effects do not explain it: {names}." if names else ""
     )
 
 

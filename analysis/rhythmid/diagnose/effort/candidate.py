@@ -74,7 +74,7 @@ def not_tried(catalogue: Catalogue, model: Model, sizes: Scales) -> dict[str, st
             reasons[element.name] = f"it acts in the {element.slot} path, which the effort does not show"
         elif element.candidate and element.history:
             reasons[element.name] = (
-                "it acts on the past, which a balance of effort at one instant does not know"
+                "it acts on past values, which the balance of effort at one instant does not contain"
             )
     return reasons
 

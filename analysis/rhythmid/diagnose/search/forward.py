@@ -184,7 +184,7 @@ def search(
     ):
         if budget.spent:
             untried = [score.element.name for score, _ in distinct(now.scores, REFITTED)]
-            excluded.append((tuple(untried), "not tried, for the time given was spent"))
+            excluded.append((tuple(untried), "the time given was spent"))
             break
         count = REFITTED if not best.added else REFITTED - 1
         proposals, enough = _proposals(here.model, replace(now, added=here.added), count, here.chi2)

@@ -122,7 +122,7 @@ def not_tried(nominal: Fit, catalogue: Catalogue, first: Round) -> list[tuple[tu
     scored = {score.element.name for score in first.scores}
     lost = dict.fromkeys(element.name for element, _ in known.tried if element.name not in scored)
     reasons = dict(known.not_tried) | dict.fromkeys(
-        lost, "with every first guess the model diverges, or does as without it"
+        lost, "from every first guess the model diverges or behaves as without the effect"
     )
     return [((name,), why) for name, why in reasons.items()]
 

@@ -1,0 +1,144 @@
+"""The documentation site: it builds without a warning, its links hold, and what its pages show works."""
+
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+import yaml
+
+import rhythmid
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.model import Model
+from rhythmid.offline_run import simulate
+from rhythmid.record.signals import Signals
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+
+
+class Page(HTMLParser):
+    """What a page refers to, and the places in it that can be referred to."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.targets: list[str] = []
+        self.places: set[str] = set()
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for name, value in attrs:
+            if name in ("href", "src") and value:
+                self.targets.append(value)
+            elif name == "id" and value:
+                self.places.add(value)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    built = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", folder],
+        cwd=ROOT, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"}, capture_output=True, text=True, timeout=280,
+    )  # fmt: skip
+    assert built.returncode == 0, built.stderr
+    assert "WARNING" not in built.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def pages(site) -> dict[Path, Page]:
+    return {path: Page(path) for path in site.rglob("*.html") if path.name != "404.html"}
+
+
+def block(page: str, name: str) -> str:
+    found = re.search(rf"```\w+\n(# {re.escape(name)}\n.*?)```", (DOCS / page).read_text("utf-8"), re.DOTALL)
+    assert found is not None, name
+    return found[1]
+
+
+def test_every_link_within_the_site_leads_to_a_page_and_a_place_that_exist(site, pages):
+    for path, page in pages.items():
+        for target in page.targets:
+            parts = urlsplit(target)
+            if parts.scheme or parts.netloc:
+                continue
+            led = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            assert led.exists(), f"{path.name}: {target}"
+            if parts.fragment and led in pages:
+                assert unquote(parts.fragment) in pages[led].places, f"{path.name}: {target}"
+
+
+def test_a_page_loads_nothing_from_elsewhere(pages):
+    for path in pages:
+        loaded = re.findall(
+            r"<(?:script|img|link)\b[^>]*?(?:src|href)=\"(https?:[^\"]*)", path.read_text("utf-8")
+        )
+        assert loaded == [], path.name
+
+
+def test_every_page_is_reached_from_the_navigation(site):
+    config = re.sub(r"!!python\S*", "", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
+    named = set(re.findall(r"[\w]+\.md", str(yaml.safe_load(config)["nav"])))
+    assert {path.name for path in DOCS.glob("*.md")} <= named
+
+
+def test_the_reference_has_every_command(pages, site):
+    places = pages[site / "cli.html"].places
+    for command in ("check", "diagnose", "identify", "run", "simulate", "watch"):
+        assert f"rhythmid-{command}" in places
+
+
+def test_the_reference_of_the_python_interface_has_every_public_name(pages, site):
+    places = {place.rpartition(".")[2] for place in pages[site / "api.html"].places}
+    assert set(rhythmid.__all__) - {"__version__"} <= places
+
+
+def test_the_files_of_the_tutorial_make_the_recordings_of_the_tutorial(tmp_path):
+    for name in ("robot", "model", "small", "large", "unseen"):
+        (tmp_path / f"{name}.yaml").write_text(block("tutorial.md", f"{name}.yaml"), encoding="utf-8")
+    believed = Model.load(tmp_path / "model.yaml")
+    assert "coulomb_friction.force" in Model.load(tmp_path / "robot.yaml").parameters
+    assert set(believed.free) == {"input_delay.delay", "linear_spring.stiffness", "viscous_damper.damping"}
+    for name in ("small", "large", "unseen"):
+        assert simulate(None, tmp_path / f"{name}.yaml").record.duration > 19.0
+
+
+def test_the_element_that_is_shown_can_be_loaded_and_simulated(tmp_path):
+    folder = tmp_path / "my_elements"
+    folder.mkdir()
+    (folder / "cubic_drag.py").write_text(
+        block("own_element.md", "my_elements/cubic_drag.py"), encoding="utf-8"
+    )
+    catalogue = load_catalogue([folder])
+    assert catalogue["cubic_drag"].size == "coefficient"
+    text = block("tutorial.md", "model.yaml") + "  - cubic_drag: {coefficient: 0.5}\n"
+    assert Model.from_text(text, catalogue=catalogue).value("cubic_drag.coefficient") == 0.5
+
+
+def test_the_signals_and_parameters_that_are_shown_are_read(tmp_path):
+    signals = Signals.from_text(block("bag.md", "signals.yaml"), tmp_path / "signals.yaml")
+    assert signals.use == (5.0, 120.0)
+    nodes = yaml.safe_load(block("robot.md", "robot.yaml"))
+    assert set(nodes) == {"/**/excitation", "/**/command_guard", "/**/recorder"}
+
+
+def test_the_citation_is_of_this_version():
+    assert (
+        yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))["version"] == rhythmid.__version__
+    )
+
+
+def test_the_figures_of_the_summary_are_those_of_the_pages_that_it_sums_up():
+    summary = (DOCS / "validation.md").read_text(encoding="utf-8")
+    concealed = summary.partition("## Concealed effects, in numbers")[2].partition("## Real")[0]
+    proof = (DOCS / "proof.md").read_text(encoding="utf-8")
+    for cases, measured in re.findall(r"\| (\d+) \| ([^|]+) \|$", concealed, re.MULTILINE):
+        assert re.search(rf"\| {cases} \| {re.escape(measured)}", proof), measured
+    real = (DOCS / "real.md").read_text(encoding="utf-8")
+    for before, after in re.findall(r"([\d.]+) → ([\d.]+) %", summary):
+        assert f"| {before} → {after} |" in real, before
