@@ -1,15 +1,22 @@
-"""What all tests share: where compiled models and ROS logs go, how examples are drawn, and the command `rhythmid`."""
+"""What all tests share: where compiled models go, how examples are drawn, and the command `rhythmid`, as a process or within this one."""
 
 import os
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
-settings.register_profile("rhythmid", deadline=None, derandomize=True, database=None, max_examples=40)
+from rhythmid import cli
+
+os.environ.setdefault(
+    "OMP_NUM_THREADS", "1"
+)  # before numpy: every worker has a core, and threads would wait for each other
+
+settings.register_profile("rhythmid", deadline=None, derandomize=True, database=None, max_examples=25)
 settings.load_profile("rhythmid")
 
 Command = Callable[..., subprocess.CompletedProcess[str]]
@@ -33,3 +40,41 @@ def rhythmid(tmp_path: Path) -> Command:
         )  # fmt: skip
 
     return run
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a call of the command left behind."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def command(capsys, monkeypatch, tmp_path) -> Callable[..., Answer]:
+    """command("check", bag): the entry point of the command, called in `tmp_path`."""
+
+    def call(*arguments: object) -> Answer:
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["rhythmid", *map(str, arguments)])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        said = capsys.readouterr()
+        return Answer(ended.value.code, said.out, said.err)
+
+    return call
+
+
+@pytest.fixture
+def refused(command) -> Callable[..., str]:
+    """refused("check", bag): the one line with which a call is refused; fails where it is not, or not in that way."""
+
+    def call(*arguments: object) -> str:
+        answer = command(*arguments)
+        assert answer.code == 2, answer
+        assert answer.err.startswith("error: ") and answer.err.count("\n") == 1, answer.err
+        return answer.err.removeprefix("error: ").rstrip("\n")
+
+    return call

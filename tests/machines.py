@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.search.trial import Trial
-from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.excitation.sequence import build
 from rhythmid.experiment import Delay, Experiment, Forcing, Noise, TimeMode, perform
 from rhythmid.identify.output_error import Fit
@@ -27,6 +27,11 @@ SHORT = (
     ({"type": "chirp", "amplitude": 1.2, "sweep": 10.0, "band": [7.0, 0.0]}, 1.0),
     ({"type": "silence", "length": 6.0}, 3.0),
 )
+
+
+def only(*names: str) -> Catalogue:
+    """The catalogue with these candidates: each one more is a model to compile and to fit."""
+    return CATALOGUE.without(*[n for n, e in CATALOGUE.items() if e.candidate and n not in names])
 
 
 def hopper() -> Model:

@@ -10,10 +10,11 @@ import multiprocessing.connection
 import os
 import pickle
 import signal
+import threading
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
 from rhythmid.errors import InputError
@@ -25,6 +26,23 @@ Result = TypeVar("Result")
 def cores() -> int:
     """Processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+
+
+@contextmanager
+def _interrupted_afterwards() -> Iterator[None]:
+    """Within this, Ctrl-C is put off to the end: what its handler raises among the callbacks of a fork, Python prints and forgets."""
+    usual = signal.getsignal(signal.SIGINT)
+    if usual is None or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+        if came:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _work(function: Callable[[Any], Any], items: Sequence[Any], own: Iterable[int], pipe: Any) -> None:
@@ -70,13 +88,14 @@ def fork_map(
     def start(own: list[int]) -> None:
         receive, send = context.Pipe(duplex=False)
         process = context.Process(target=_work, args=(function, items, tuple(own), send), daemon=True)
-        process.start()
+        with _interrupted_afterwards():
+            process.start()
+            running[receive] = (process, own)
         send.close()
-        running[receive] = (process, own)
 
-    for worker in range(count):
-        start(list(range(worker, len(items), count)))
     try:
+        for worker in range(count):
+            start(list(range(worker, len(items), count)))
         while running:
             ready = multiprocessing.connection.wait(list(running))
             for pipe in [one for one in running if one in ready]:
@@ -124,9 +143,10 @@ def fork_each(
         ours, theirs = context.Pipe()
         given: Iterator[int] = iter(theirs.recv, None)
         process = context.Process(target=_work, args=(function, items, given, theirs), daemon=True)
-        process.start()
-        theirs.close()
-        hand_on(ours, process, lifetime)
+        with _interrupted_afterwards():
+            process.start()
+            theirs.close()
+            hand_on(ours, process, lifetime)
 
     def hand_on(pipe: Any, process: Any, left: int) -> None:
         if waiting and left:

@@ -1,14 +1,11 @@
-"""What the tests of bad input share: the command line called within this process, and bags that can be spoilt."""
+"""What the tests of bad input share: bags that can be spoilt."""
 
-import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rhythmid import cli
 from rhythmid.record.bag_writer import write_bag
 from rhythmid.record.messages import Messages
 
@@ -30,44 +27,6 @@ def good_topics() -> dict[str, Messages]:
 @pytest.fixture
 def topics() -> dict[str, Messages]:
     return good_topics()
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What a call of the command left behind."""
-
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def command(capsys, monkeypatch, tmp_path) -> Callable[..., Answer]:
-    """command("check", bag): the entry point of the command, called in `tmp_path`."""
-
-    def call(*arguments: object) -> Answer:
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(sys, "argv", ["rhythmid", *map(str, arguments)])
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        said = capsys.readouterr()
-        return Answer(ended.value.code, said.out, said.err)
-
-    return call
-
-
-@pytest.fixture
-def refused(command) -> Callable[..., str]:
-    """refused("check", bag): the one line with which a call is refused; fails where it is not, or not in that way."""
-
-    def call(*arguments: object) -> str:
-        answer = command(*arguments)
-        assert answer.code == 2, answer
-        assert answer.err.startswith("error: ") and answer.err.count("\n") == 1, answer.err
-        return answer.err.removeprefix("error: ").rstrip("\n")
-
-    return call
 
 
 @pytest.fixture

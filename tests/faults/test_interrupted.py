@@ -29,22 +29,21 @@ force:
 PATIENCE = 120.0  # s
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
-    """A table of a mass on a spring with friction, and the files that describe it."""
-    made = tmp_path_factory.mktemp("interrupted")
+@pytest.fixture
+def folder(tmp_path) -> Path:
+    """A table of a mass on a spring with friction, and the files that describe it; what one command leaves is no other's."""
     machine = Model.from_text(NOMINAL).with_element(load_catalogue()["coulomb_friction"], {"force": 0.3})
     time = np.arange(6000) / 300.0
     command = build({"type": "multisine", "rms": 3.0, "period": 10.0, "periods": 2, "band": [0.3, 6.0]})(time)
     output = simulate(machine, time, zero_order_hold(time, command)).output
     output += np.random.default_rng(0).normal(0.0, 2e-5, len(time))
     table = np.column_stack([time, command, output])
-    np.savetxt(made / "log.csv", table, delimiter=",", header="t,u,y", comments="")
-    (made / "model.yaml").write_text(NOMINAL)
-    (made / "signals.yaml").write_text(
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="t,u,y", comments="")
+    (tmp_path / "model.yaml").write_text(NOMINAL)
+    (tmp_path / "signals.yaml").write_text(
         "time: {column: t}\ntables: {file: log.csv}\ninput: {column: u, unit: N, hold: zero}\noutput: {column: y, unit: m}\n"
     )
-    return made
+    return tmp_path
 
 
 def children(group: int) -> list[int]:
@@ -83,7 +82,8 @@ def test_ctrl_c_ends_with_130_and_leaves_neither_files_nor_processes(folder, com
         cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
     assert process.stderr is not None
-    assert any(stage in line for line in process.stderr)
+    told: list[str] = []
+    assert any(told.append(line) or stage in line for line in process.stderr), told
     time.sleep(0.3)  # into the work that was told
     if to == "terminal":
         os.killpg(process.pid, signal.SIGINT)
@@ -91,7 +91,7 @@ def test_ctrl_c_ends_with_130_and_leaves_neither_files_nor_processes(folder, com
         process.send_signal(signal.SIGINT)
     said = process.stderr.read()
     process.stderr.close()
-    assert process.wait(PATIENCE) == 130
+    assert process.wait(PATIENCE) == 130, said
     assert "Traceback" not in said
     assert sorted(folder.iterdir()) == before
     assert nobody_left(process.pid)

@@ -11,7 +11,7 @@ from rhythmid.identify.identifiability import Offset, aliases, delays_of, offset
 from rhythmid.identify.identification import Delays
 from rhythmid.identify.identify import identify
 from rhythmid.identify.joint import JointFit, joint_likelihood
-from rhythmid.identify.output_error import estimate
+from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.series import prepare
 from rhythmid.identify.undetermined import undetermined
 from rhythmid.model import Model
@@ -122,22 +122,23 @@ def with_free_gravity(joint) -> Model:
     return hopper().with_parameters({"gravity.acceleration": replace(gravity, fixed=False)})
 
 
+@pytest.fixture(scope="module")
+def searched(joint, with_free_gravity) -> Fit:
+    return joint_likelihood(joint.records, with_free_gravity).fit
+
+
 @pytest.mark.parametrize("search", [True, False])
-def test_parameters_that_act_alike_are_named(joint, with_free_gravity, search):
-    if search:
-        fit = joint_likelihood(joint.records, with_free_gravity).fit
-    else:
-        fit = estimate(with_free_gravity, prepare(joint.records), iterations=6)
+def test_parameters_that_act_alike_are_named(joint, searched, with_free_gravity, search):
+    fit = searched if search else estimate(with_free_gravity, prepare(joint.records), iterations=6)
     words = [d.words for d in undetermined(fit)]
     assert len(words) == 1
     assert "gravity.acceleration" in words[0] and "linear_spring.rest_length" in words[0]
     assert fit.std["gravity.acceleration"] > 1e3 and fit.std["linear_spring.rest_length"] > 1e3
 
 
-def test_what_is_undetermined_leaves_the_other_intervals_alone(joint, with_free_gravity):
-    fit = joint_likelihood(joint.records, with_free_gravity).fit
+def test_what_is_undetermined_leaves_the_other_intervals_alone(joint, searched):
     for name in ("input_delay.delay", "measurement_delay.delay", "switched_damper.stance"):
-        assert fit.std[name] == pytest.approx(joint.fit.std[name], rel=0.05)
+        assert searched.std[name] == pytest.approx(joint.fit.std[name], rel=0.05)
 
 
 def test_an_undetermined_parameter_is_given_no_value(joint, with_free_gravity):

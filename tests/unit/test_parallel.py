@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -54,3 +56,19 @@ def test_a_worker_does_its_own_parts_one_after_another():
         return [result for _, result in fork_map(lambda n: start + n, [1, 2])]
 
     assert dict(fork_map(within, [10, 20], 2)) == {0: [11, 12], 1: [21, 22]}
+
+
+def test_an_interruption_amid_a_fork_is_not_lost():
+    code = """
+import os, signal
+from rhythmid.parallel import fork_map
+os.register_at_fork(after_in_parent=lambda: signal.raise_signal(signal.SIGINT))
+try:
+    list(fork_map(abs, [1, 2], 2))
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60.0, check=True
+    )
+    assert (done.stdout, done.stderr) == ("interrupted\n", "")
