@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rhythmid import mujoco
     from rhythmid.compare.compare import Comparison, compare
     from rhythmid.design.designer import Design, design
     from rhythmid.design.requirements import Requirements
@@ -41,6 +42,7 @@ __all__ = [
     "identify",
     "load",
     "load_catalogue",
+    "mujoco",
     "paper_hopper",
     "simulate",
 ]
@@ -61,7 +63,8 @@ _MODULES = {
     "paper_hopper": "rhythmid.identify.identify",
     "simulate": "rhythmid.offline_run",
 }
-_PACKAGES = ("compare", "design", "diagnose", "identify")  # that can be called: see callable_package.py
+# the first four can be called: see callable_package.py
+_PACKAGES = ("compare", "design", "diagnose", "identify", "mujoco")
 
 
 def __getattr__(name: str) -> Any:

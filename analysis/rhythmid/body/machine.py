@@ -194,6 +194,7 @@ def _machine(document: Node, folder: Path, catalogue: Catalogue) -> Machine:
             node.fail(f"{body.path.name} has no such joint; it has {', '.join(body.joints)}")
         if name == body.base:
             node.fail("is the joint of the base, which nothing drives; leave it out here")
+    body = body.with_losses(name for name in body.joints if name not in given)
     free = keys[BODY].mapping().get("free")
     inertial = {} if free is None else _free(free, body)
     changed = {n: v.value for n, v in inertial.items() if v.value != body.parameters[n]}

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PPoly
 
-from rhythmid.body.body import Array
+from rhythmid.body.body import Array, Joint
 from rhythmid.body.machine import Machine
-from rhythmid.body.stepping_source import COLUMNS, Layout, generate
+from rhythmid.body.path_source import COLUMNS, Layout
+from rhythmid.body.stepping_source import generate
 from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.simulation.machine_code import load_run
@@ -196,8 +197,8 @@ def run_steps(
     done = stepping.run(
         model._address, data._address, data.qpos, data.qvel, data.qfrc_applied, model.dof_damping,
         np.array([one.position for one in places]), np.array([one.velocity for one in places]), begin, step,
-        commands, forcings, vector_of(machine, stepping.layout),
-        start_states(machine, stepping.layout, pose, rate, commands[0], forcings[0]),
+        commands, forcings, vector_of(machine.paths, stepping.layout),
+        start_states(machine.paths, machine.body.joints, stepping.layout, pose, rate, commands[0], forcings[0]),
         np.empty((count, stepping.layout.pasts)), out,
     )  # fmt: skip
     if done < count:
@@ -205,9 +206,9 @@ def run_steps(
     return begin + step * np.arange(count, dtype=np.float64), out
 
 
-def vector_of(machine: Machine, layout: Layout) -> Array:
-    """Parameter vector of a machine with this structure."""
-    known = {joint: model.parameters for joint, model in machine.paths.items()}
+def vector_of(paths: Mapping[str, Model], layout: Layout) -> Array:
+    """Parameter vector of paths with this structure."""
+    known = {joint: model.parameters for joint, model in paths.items()}
     return np.array(
         [
             known[joint][name].value if name in known[joint] else default
@@ -218,12 +219,18 @@ def vector_of(machine: Machine, layout: Layout) -> Array:
 
 
 def start_states(
-    machine: Machine, layout: Layout, pose: Array, rate: Array, command: NDArray, forcing: NDArray
+    paths: Mapping[str, Model],
+    joints: Mapping[str, Joint],
+    layout: Layout,
+    pose: Array,
+    rate: Array,
+    command: NDArray,
+    forcing: NDArray,
 ) -> Array:
     """The elements' own states at the start, as they would be there after a while."""
     found: dict[tuple[str, str], float] = {}
-    for place, (joint, model) in enumerate(machine.paths.items()):
-        own = machine.body.joints[joint]
+    for place, (joint, model) in enumerate(paths.items()):
+        own = joints[joint]
         x, v = float(pose[own.position]), float(rate[own.velocity])
         asked = float(command[place])
         for term in model.terms:
