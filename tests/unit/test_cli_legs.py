@@ -1,6 +1,8 @@
 """The commands for machines of several joints, from simulation to diagnosis."""
 
 import json
+import subprocess
+import sys
 from importlib.resources import files
 from pathlib import Path
 
@@ -74,6 +76,21 @@ def test_a_leg_is_identified_from_its_bag(bags: Path):
     assert inertia["links"]["shank"]["m"] == pytest.approx(0.22, rel=0.2)
 
 
+def test_an_exported_leg_in_a_loop_of_mujocos_own_is_nearer_to_the_recording_with_its_paths_applied(
+    bags: Path,
+):
+    for name, model in (("before", "leg.yaml"), ("after", "rough.yaml")):
+        called("export", str(bags / model), "--to", "mujoco", "--out", str(bags / f"{name}.xml"))
+    arguments = [
+        *(str(bags / name) for name in ("before.xml", "after.xml", "rough")),
+        str(bags / "signals.yaml"),
+    ]
+    script = Path(__file__).parents[2] / "docs" / "examples" / "mujoco_loop.py"
+    printed = subprocess.run([sys.executable, script, *arguments], capture_output=True, text=True, check=True)
+    errors = {line.split(":")[0]: float(line.split()[2]) for line in printed.stdout.splitlines()}
+    assert errors["after, knee"] < 0.3 * errors["before, knee"] and errors["before, knee"] > 0.5
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -90,6 +107,8 @@ def test_a_leg_is_identified_from_its_bag(bags: Path):
             ["identify", "{bag}", "--model", "{other}", "--signals", "{signals}"],
             "the joint 'leg' is not recorded",
         ),
+        (["export", "{leg}", "--to", "sdf", "--out", "{new}"], "is written as mujoco or urdf"),
+        (["export", "{leg}", "--to", "urdf", "--out", "{new}"], "a file that ends in .urdf"),
         (["simulate", "{leg}", "--experiment", "{wrong}", "--out", "{new}"], "the joint 'ankle' has no path"),
     ],
 )

@@ -102,6 +102,8 @@ def mjcf_of(machine: Machine, folder: Path) -> str:
     spec.compile()
     root = tree.fromstring(spec.to_xml())
     _values(root, machine)
+    if not machine.body.contacts:
+        _section(_section(root, "option"), "flag").set("contact", "disable")
     _actuators(root, machine, step)
     _embed(root, machine, step)
     tree.indent(root)
