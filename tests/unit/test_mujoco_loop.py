@@ -121,7 +121,7 @@ def test_actuators_of_the_users_file_keep_their_places_and_take_the_paths_comman
     machine = Machine.load(tmp_path / "leg.yaml").with_path("knee", plain_leg().paths["knee"])
     folder = tmp_path / "out"
     folder.mkdir()
-    model, data, asked = in_the_air(folder, machine)
+    model, data, _ = in_the_air(folder, machine)
     assert model.nu == 3 and model.actuator(0).name == "lift"
     run = simulate(machine, np.arange(200) * machine.body.step)
     for k in range(200):

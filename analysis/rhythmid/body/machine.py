@@ -70,6 +70,10 @@ class Machine:
         """The joints that have a path, in the file's order."""
         return tuple(self.paths)
 
+    def controlled(self, joint: str) -> bool:
+        """Whether a joint's command is a position reference for a controller in its path."""
+        return any(term.element.name == "position_control" for term in self.paths[joint].terms)
+
     @cached_property
     def parameters(self) -> dict[str, Value]:
         """All parameters: "joint.element.parameter", and "body.link.mass" and "body.joint.armature" of those that the file

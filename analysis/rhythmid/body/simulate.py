@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, PPoly
 
 from rhythmid.body.body import Array, Joint
+from rhythmid.body.held_means import held_means
 from rhythmid.body.machine import Machine
 from rhythmid.body.path_source import COLUMNS, Layout
 from rhythmid.body.stepping_source import generate
@@ -21,6 +22,7 @@ from rhythmid.simulation.signal import FAR
 from rhythmid.simulation.simulate import delayed_command, physical_times, samplers
 
 Start = Mapping[str, float]
+ON_STEP = 1e-6  # of a step: a time that near to a step's begin is meant to be there
 AT_ONCE = 2e7  # numbers that a run may keep
 
 
@@ -99,16 +101,9 @@ def means(signal: PPoly | None, begin: float, step: float, count: int) -> Array:
     if signal is None:
         return np.zeros(count)
     edges = begin + step * np.arange(count + 1)
-    first = float(signal.x[0])
-    if (
-        signal.x[-1] > FAR / 2
-    ):  # held: its knots' impulse, whose antiderivative has no use for a last piece without an end
-        knots, level = signal.x[:-1], signal.c[-1]
-        impulse = np.concatenate([[0.0], np.cumsum(level[:-1] * np.diff(knots))])
-        piece = np.clip(np.searchsorted(knots, edges, side="right") - 1, 0, len(level) - 1)
-        total = np.where(edges < first, 0.0, impulse[piece] + level[piece] * (edges - knots[piece]))
-        return np.diff(total) / step
-    last = float(signal.x[-1])
+    if signal.x[-1] > FAR / 2:
+        return held_means(signal.x[:-1], signal.c[-1], edges)
+    first, last = float(signal.x[0]), float(signal.x[-1])
     inside = np.clip(edges, first, last)
     total = signal.antiderivative()(inside) + (edges - inside) * signal(inside)
     return np.diff(total) / step
@@ -141,27 +136,56 @@ def simulate(
         raise InputError("simulation times must increase")
     physical = {joint: physical_times(model, times) for joint, model in machine.paths.items()}
     step = machine.body.step
-    begin = min(float(times[0]), *(float(one[0]) for one in physical.values()))
+    begin = begin_of(float(times[0]), min(float(one[0]) for one in physical.values()), step)
     count = math.ceil((float(times[-1]) - begin) / step - 1e-6) + 2
     grid, rows = run_steps(machine, begin, count, command, forcing, start, worker)
+    noise = {
+        joint: [] if seed is None else samplers(model, seed + place)
+        for place, (joint, model) in enumerate(machine.paths.items())
+    }
+    return sampled(machine, times, physical, grid, rows, noise)
+
+
+def begin_of(first: float, earliest: float, step: float) -> float:
+    """Where a run begins [s]: whole steps before its first stamp, when the oldest of the first measurements is taken or before."""
+    return first - step * max(math.ceil((first - earliest) / step - 1e-6), 0)
+
+
+def sampled(
+    machine: Machine,
+    times: Array,
+    physical: Mapping[str, Array],
+    grid: Array,
+    rows: Array,
+    noise: Mapping[str, list],
+) -> JointTrajectory:
+    """What is measured at stamps `times` (n,) of a run with these times (m,) of steps and rows.
+
+    `physical` has by joint when the measurements were taken, (n,); `noise` by joint what happens to samples.
+    """
     names, nq = machine.joints, machine.body.model.nq
     width = len(COLUMNS)
     made = {column: np.empty((len(times), len(names))) for column in COLUMNS}
     for place, joint in enumerate(names):
         x, v, y, f = (rows[:, width * place + i] for i in range(width))
-        at = physical[joint]
+        at = _on_steps(physical[joint], grid)
         made["position"][:, place] = CubicHermiteSpline(grid, x, v)(at)
         made["velocity"][:, place] = np.interp(at, grid, v)
         made["effort"][:, place] = np.interp(at, grid, f)
         sensed = any(t.element.slot == "sensor" and t.element.kernel for t in machine.paths[joint].terms)
         output = np.interp(at, grid, y) if sensed else made["position"][:, place]
-        if seed is not None:
-            for sample in samplers(machine.paths[joint], seed + place):
-                output = sample(times, output)
+        for sample in noise[joint]:
+            output = sample(times, output)
         made["output"][:, place] = output
     rest = rows[:, width * len(names) :]
-    whole = np.column_stack([np.interp(times, grid, column) for column in rest.T])
+    whole = np.column_stack([np.interp(_on_steps(times, grid), grid, column) for column in rest.T])
     return JointTrajectory(times, names, **made, pose=whole[:, :nq], rate=whole[:, nq:])
+
+
+def _on_steps(times: Array, grid: Array) -> Array:
+    """Times (n,) with those that are a step's begin but for rounding put right on it."""
+    number = np.clip(np.rint((times - grid[0]) / (grid[1] - grid[0])).astype(int), 0, len(grid) - 1)
+    return np.where(np.abs(times - grid[number]) < ON_STEP * (grid[1] - grid[0]), grid[number], times)
 
 
 def run_steps(
@@ -199,7 +223,7 @@ def run_steps(
         np.array([one.position for one in places]), np.array([one.velocity for one in places]), begin, step,
         commands, forcings, vector_of(machine.paths, stepping.layout),
         start_states(machine.paths, machine.body.joints, stepping.layout, pose, rate, commands[0], forcings[0]),
-        np.empty((count, stepping.layout.pasts)), out,
+        np.empty((count, stepping.layout.pasts)), out, 0, False,
     )  # fmt: skip
     if done < count:
         raise InputError(f"the simulation diverges at t = {begin + done * step:.4g} s; check the parameters")

@@ -1,4 +1,8 @@
-"""The loop of a machine of several joints as source text: the joints' paths around MuJoCo's step."""
+"""The loop of a machine of several joints as source text: the joints' paths around MuJoCo's step.
+
+A run may go on where another ended: `first` is the number of its first step, and `states` and `past` are left as they are at the
+end. With `peek` the last row tells what is at its time, and the step from there is left to the next run.
+"""
 
 from rhythmid.body.path_source import COLUMNS, Layout, written
 from rhythmid.model import Model
@@ -26,26 +30,29 @@ def generate(paths: dict[str, Model]) -> tuple[Module, Layout]:
             "",
             '@njit("int64(intp, intp, float64[::1], float64[::1], float64[::1], float64[::1], int64[::1], int64[::1],"',
             '      "float64, float64, float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[:, ::1],"',
-            '      "float64[:, ::1])", cache=True, nogil=True, error_model="numpy")',
+            '      "float64[:, ::1], int64, boolean)", cache=True, nogil=True, error_model="numpy")',
             "def run(model, data, qpos, qvel, applied, damping, at_position, at_velocity, begin, h, command, forcing,",
-            "        parameters, states, past, out):",
+            "        parameters, states, past, out, first, peek):",
             *(f"    {line}" for line in writer.before),
-            "    for k in range(out.shape[0]):",
-            "        row = k",
+            "    for row in range(out.shape[0]):",
+            "        k = first + row",
             "        t = begin + k * h",
             *(f"        {line}" for line in writer.lines),
             "        for i in range(qpos.shape[0]):",
-            f"            out[k, {base} + i] = qpos[i]",
+            f"            out[row, {base} + i] = qpos[i]",
             "        for i in range(qvel.shape[0]):",
-            f"            out[k, {base} + qpos.shape[0] + i] = qvel[i]",
+            f"            out[row, {base} + qpos.shape[0] + i] = qvel[i]",
             f"            if not abs(qvel[i]) < {FASTEST}:",
-            "                return k",
+            "                return row",
             *(
-                f"        if not abs(applied[at_velocity[{number}]]) < {STRONGEST}:\n            return k"
+                f"        if not abs(applied[at_velocity[{number}]]) < {STRONGEST}:\n            return row"
                 for number in range(len(paths))
             ),
+            "        if peek and row + 1 == out.shape[0]:",
+            "            break",
             "        mj_step(model, data)",
             *(f"        {line}" for line in writer.after),
+            *(f"    states[{i}] = s{i}" for i in range(len(writer.states))),
             "    return out.shape[0]",
             "",
         ]
