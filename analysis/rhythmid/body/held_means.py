@@ -1,23 +1,29 @@
-"""Means of a held signal over the steps of an integration, the same whether they are asked for all at once or in parts."""
+"""Means of held signals over the steps of an integration, the same whether they are asked for all at once or in parts."""
 
-import numpy as np
-
-from rhythmid.body.body import Array
+from numba import njit
 
 
-def held_means(knots: Array, level: Array, edges: Array, before: float = 0.0) -> Array:
-    """Mean over each step of a signal that keeps `level` (k,) from its knot (k,) [s] on, and is `before` until the first.
-
-    `edges` (n + 1,) [s] are the begins of the steps and the last one's end. Shape (n,). Every step is computed from what
-    lies in it alone.
-    """
-    inside = knots[(knots > edges[0]) & (knots < edges[-1])]
-    points = np.union1d(edges, inside)
-    number = np.searchsorted(knots, points[:-1], side="right") - 1
-    value = np.where(number < 0, before, np.append(level, before)[number])
-    first = np.searchsorted(points, edges[:-1])
-    whole = (
-        np.diff(np.append(first, len(points) - 1)) == 1
-    )  # steps without a knot inside keep the level itself
-    mean = np.add.reduceat(value * np.diff(points), first) / np.diff(edges)
-    return np.where(whole, value[first], mean)
+@njit(
+    "void(float64[:, :], float64[:, :], float64[::1], float64[::1], float64[:, ::1])",
+    cache=True,
+    error_model="numpy",
+)
+def held_means(knots, level, edges, before, out):
+    """Mean over each step of signals that keep `level` (k, joints) from their knots (k, joints) [s] on, and are `before` (joints,) until
+    the first; `edges` (n + 1,) [s] are the steps' begins and the last one's end, `out` (n, joints)."""
+    count = knots.shape[0]
+    for j in range(out.shape[1]):
+        following = 0  # the first knot behind the step's begin
+        value = before[j]
+        for k in range(out.shape[0]):
+            while following < count and knots[following, j] <= edges[k]:
+                value = level[following, j]
+                following += 1
+            begin, total, bent = edges[k], 0.0, False
+            while following < count and knots[following, j] < edges[k + 1]:
+                total += value * (knots[following, j] - begin)
+                begin, value, bent = knots[following, j], level[following, j], True
+                following += 1
+            out[k, j] = (
+                (total + value * (edges[k + 1] - begin)) / (edges[k + 1] - edges[k]) if bent else value
+            )

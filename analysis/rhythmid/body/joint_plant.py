@@ -24,6 +24,7 @@ from rhythmid.body.simulate import (
     vector_of,
 )
 from rhythmid.errors import InputError
+from rhythmid.model import Model
 from rhythmid.simulation.simulate import samplers
 from rhythmid.simulation.transport import CommandPath, physical_times
 
@@ -76,15 +77,13 @@ class JointPlant:
         )
         self._parameters = vector_of(machine.paths, layout)
         self._past = np.empty((rows_of(machine.paths, step), layout.pasts))
-        self._paths = [CommandPath(model) for model in machine.paths.values()]
-        self._knots: list[Array] = [np.empty(0) for _ in places]
-        self._levels: list[Array] = [np.empty(0) for _ in places]
-        self._noise = {
-            joint: samplers(model, seed + place) for place, (joint, model) in enumerate(machine.paths.items())
-        }
+        self._late = [_Transport(model) for model in machine.paths.values()]
+        self._knots = np.empty((0, len(places)))  # when commands act at each joint
+        self._levels = np.empty((0, len(places)))
+        self._noise = [samplers(model, seed + place) for place, model in enumerate(machine.paths.values())]
         self._next = self._done = 0  # the next sample of the grid, and the next step
         self._rows = np.empty((0, len(COLUMNS) * len(places) + self._model.nq + self._model.nv))
-        self._latest = dict.fromkeys(machine.joints, -np.inf)
+        self._latest = np.full(len(places), -np.inf)  # when the newest measurements were taken
         self._newest = -1
 
     @property
@@ -109,9 +108,9 @@ class JointPlant:
             raise InputError(f"a command is not a finite number (at {int(stamp_ns[0])} ns)")
         self._newest = int(stamp_ns[-1])
         stamps = np.asarray(stamp_ns * 1e-9, dtype=float)
-        for place, path in enumerate(self._paths):
-            self._knots[place] = np.append(self._knots[place], path.times(stamps))
-            self._levels[place] = np.append(self._levels[place], command[:, place])
+        acting = np.column_stack([late.acting(stamps) for late in self._late])
+        self._knots = np.vstack([self._knots, acting])
+        self._levels = np.vstack([self._levels, command])
 
     def push(self, stamp_ns: int, command: Array) -> None:
         """A command (joints,) that holds from its stamp on."""
@@ -128,20 +127,14 @@ class JointPlant:
             return stamps, None
         times = (stamps * 1e-9).astype(np.float64)
         self._run(round((float(times[-1]) - self._begin) / self._step))
-        physical = {}
-        for joint, model in self._machine.paths.items():
-            physical[joint] = np.maximum(physical_times(model, times), self._latest[joint])
-            self._latest[joint] = float(physical[joint][-1])
-        begin = (
-            self._done + 1 - len(self._rows)
-        )  # of the rows that are kept; the last is that of the step to come
-        grid = self._begin + self._step * np.arange(begin, self._done + 2)
-        made = sampled(
-            self._machine, times, physical, grid, np.vstack([self._rows, self._rows[-1:]]), self._noise
-        )
+        physical = np.column_stack([late.physical(times) for late in self._late])
+        physical = np.maximum(physical, self._latest)
+        self._latest = physical[-1]
+        first = self._done + 1 - len(self._rows)
+        made = sampled(self._machine, times, physical, self._rows, first, self._begin, self._noise)
         self._next = int(last) + 1
-        kept = min(min(self._latest.values()), float(times[-1])) - 2.0 * self._step
-        self._rows = self._rows[max(int((kept - float(grid[0])) / self._step), 0) :]
+        kept = min(float(self._latest.min()), float(times[-1])) - 2.0 * self._step
+        self._rows = self._rows[max(int((kept - self._begin) / self._step) - first, 0) :]
         return stamps, made
 
     def states(self, until_ns: int) -> tuple[Stamps, dict[str, Array]]:
@@ -162,12 +155,8 @@ class JointPlant:
         """Steps up to the number `last`, whose begin is told and which is taken with the next run."""
         count = last + 1 - self._done
         edges = self._begin + self._step * np.arange(self._done, last + 2)
-        command = np.column_stack(
-            [
-                held_means(knots, level, edges, held)
-                for knots, level, held in zip(self._knots, self._levels, self.held)
-            ]
-        )
+        command = np.empty((count, len(self.held)))
+        held_means(self._knots, self._levels, edges, self.held, command)
         out = np.empty((count, self._rows.shape[1]))
         data, model = self._data, self._model
         done = self._stepping.run(
@@ -179,10 +168,29 @@ class JointPlant:
             raise InputError(f"the plant diverges at t = {at:.3f} s; check its parameters")
         rows = self._rows[:-1] if self._done or len(self._rows) else self._rows
         self._rows, self._done = np.vstack([rows, out]), last
-        for place, knots in enumerate(self._knots):
-            gone = int(np.searchsorted(knots, edges[-2], side="right")) - 1
+        if len(self._knots):
+            gone = (
+                int(np.sum(self._knots.max(axis=1) <= edges[-2])) - 1
+            )  # another one acts already, everywhere
             if gone > 0:
-                self._knots[place], self._levels[place] = knots[gone:], self._levels[place][gone:]
+                self._knots, self._levels = self._knots[gone:], self._levels[gone:]
+
+
+class _Transport:
+    """When commands act at a joint and its measurements are taken; nothing is computed where nothing delays."""
+
+    def __init__(self, model: Model) -> None:
+        self._model, self._path = model, CommandPath(model)
+        slots = [term.element.slot for term in model.terms if term.element.delay is not None]
+        self._command, self._measurement = "command" in slots, bool({"sensor", "timing"} & set(slots))
+
+    def acting(self, stamps: Array) -> Array:
+        """When commands with these stamps [s] act."""
+        return self._path.times(stamps) if self._command else stamps
+
+    def physical(self, stamps: Array) -> Array:
+        """When measurements with these stamps [s] are taken."""
+        return physical_times(self._model, stamps) if self._measurement else stamps
 
 
 def resting(machine: Machine, pose: Array) -> Array:

@@ -1,19 +1,20 @@
 """Runs of a machine of several joints."""
 
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline, PPoly
+from scipy.interpolate import PPoly
 
 from rhythmid.body.body import Array, Joint
 from rhythmid.body.held_means import held_means
 from rhythmid.body.machine import Machine
 from rhythmid.body.path_source import COLUMNS, Layout
+from rhythmid.body.samples import sample_columns, sample_joints
 from rhythmid.body.stepping_source import generate
 from rhythmid.errors import InputError
 from rhythmid.model import Model
@@ -22,7 +23,6 @@ from rhythmid.simulation.signal import FAR
 from rhythmid.simulation.simulate import delayed_command, physical_times, samplers
 
 Start = Mapping[str, float]
-ON_STEP = 1e-6  # of a step: a time that near to a step's begin is meant to be there
 AT_ONCE = 2e7  # numbers that a run may keep
 
 
@@ -102,7 +102,9 @@ def means(signal: PPoly | None, begin: float, step: float, count: int) -> Array:
         return np.zeros(count)
     edges = begin + step * np.arange(count + 1)
     if signal.x[-1] > FAR / 2:
-        return held_means(signal.x[:-1], signal.c[-1], edges)
+        found = np.empty((count, 1))
+        held_means(signal.x[:-1, None], signal.c[-1][:, None], edges, np.zeros(1), found)
+        return found[:, 0]
     first, last = float(signal.x[0]), float(signal.x[-1])
     inside = np.clip(edges, first, last)
     total = signal.antiderivative()(inside) + (edges - inside) * signal(inside)
@@ -138,12 +140,12 @@ def simulate(
     step = machine.body.step
     begin = begin_of(float(times[0]), min(float(one[0]) for one in physical.values()), step)
     count = math.ceil((float(times[-1]) - begin) / step - 1e-6) + 2
-    grid, rows = run_steps(machine, begin, count, command, forcing, start, worker)
-    noise = {
-        joint: [] if seed is None else samplers(model, seed + place)
-        for place, (joint, model) in enumerate(machine.paths.items())
-    }
-    return sampled(machine, times, physical, grid, rows, noise)
+    _, rows = run_steps(machine, begin, count, command, forcing, start, worker)
+    noise = [
+        [] if seed is None else samplers(model, seed + place)
+        for place, model in enumerate(machine.paths.values())
+    ]
+    return sampled(machine, times, np.column_stack(list(physical.values())), rows, 0, begin, noise)
 
 
 def begin_of(first: float, earliest: float, step: float) -> float:
@@ -154,38 +156,33 @@ def begin_of(first: float, earliest: float, step: float) -> float:
 def sampled(
     machine: Machine,
     times: Array,
-    physical: Mapping[str, Array],
-    grid: Array,
+    physical: Array,
     rows: Array,
-    noise: Mapping[str, list],
+    first: int,
+    begin: float,
+    noise: Sequence[list],
 ) -> JointTrajectory:
-    """What is measured at stamps `times` (n,) of a run with these times (m,) of steps and rows.
+    """What is measured at stamps `times` (n,) of a run that begins at `begin` [s].
 
-    `physical` has by joint when the measurements were taken, (n,); `noise` by joint what happens to samples.
+    `physical` (n, joints) tells when the measurements were taken, `rows` are of the steps from the number `first` on, and `noise` has for
+    each joint what happens to samples.
     """
     names, nq = machine.joints, machine.body.model.nq
-    width = len(COLUMNS)
-    made = {column: np.empty((len(times), len(names))) for column in COLUMNS}
+    made = np.empty((len(COLUMNS), len(times), len(names)))
+    rows, step = np.ascontiguousarray(rows), machine.body.step
+    sample_joints(rows, first, begin, step, np.ascontiguousarray(physical), made)
+    position, velocity, output, effort = made
     for place, joint in enumerate(names):
-        x, v, y, f = (rows[:, width * place + i] for i in range(width))
-        at = _on_steps(physical[joint], grid)
-        made["position"][:, place] = CubicHermiteSpline(grid, x, v)(at)
-        made["velocity"][:, place] = np.interp(at, grid, v)
-        made["effort"][:, place] = np.interp(at, grid, f)
-        sensed = any(t.element.slot == "sensor" and t.element.kernel for t in machine.paths[joint].terms)
-        output = np.interp(at, grid, y) if sensed else made["position"][:, place]
-        for sample in noise[joint]:
-            output = sample(times, output)
-        made["output"][:, place] = output
-    rest = rows[:, width * len(names) :]
-    whole = np.column_stack([np.interp(_on_steps(times, grid), grid, column) for column in rest.T])
-    return JointTrajectory(times, names, **made, pose=whole[:, :nq], rate=whole[:, nq:])
-
-
-def _on_steps(times: Array, grid: Array) -> Array:
-    """Times (n,) with those that are a step's begin but for rounding put right on it."""
-    number = np.clip(np.rint((times - grid[0]) / (grid[1] - grid[0])).astype(int), 0, len(grid) - 1)
-    return np.where(np.abs(times - grid[number]) < ON_STEP * (grid[1] - grid[0]), grid[number], times)
+        if not any(t.element.slot == "sensor" and t.element.kernel for t in machine.paths[joint].terms):
+            output[:, place] = position[:, place]
+        for sample in noise[place]:
+            output[:, place] = sample(times, output[:, place].copy())
+    width = len(COLUMNS) * len(names)
+    whole = np.empty((len(times), rows.shape[1] - width))
+    sample_columns(rows, width, first, begin, step, times, whole)
+    return JointTrajectory(
+        times, names, position, velocity, effort, output, pose=whole[:, :nq], rate=whole[:, nq:]
+    )
 
 
 def run_steps(
