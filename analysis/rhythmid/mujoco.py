@@ -65,7 +65,7 @@ class _Bound:
     joints: dict[str, Joint]
     control: list[int]
     layout: Layout
-    run: Callable[..., bool]
+    run: Callable[..., int]
     arguments: tuple[Any, ...]
     output: Array
 

@@ -7,6 +7,9 @@
 The loop is the usual one; `rhythmid.mujoco.apply` is its only new line.
 """
 
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's module has no types)
+
 import sys
 
 import mujoco
@@ -39,8 +42,9 @@ def positions(path: str, record: JointRecord, apply: bool) -> tuple[np.ndarray, 
     return times, found
 
 
-def series(channel: Channel) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values of a channel."""
+def series(channel: Channel | None) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values of a channel that was recorded."""
+    assert channel is not None
     return channel.time, channel.value
 
 
