@@ -48,7 +48,7 @@ def test_friction_that_was_concealed_in_a_knee_is_named_there(bags: Path):
     model, better = str(bags / "leg.yaml"), bags / "better.yaml"
     printed = called(
         "diagnose", str(bags / "rough"), "--model", model, "--signals", str(bags / "signals.yaml"), "--json", str(answer),
-        "--save-model", str(better),
+        "--save-model", str(better), "--report", str(bags / "report.html"),
     )  # fmt: skip
     found = json.loads(answer.read_text())
     assert found["verdict"] == "missing_physics"
@@ -59,6 +59,10 @@ def test_friction_that_was_concealed_in_a_knee_is_named_there(bags: Path):
     assert friction["parameters"]["force"]["value"] == pytest.approx(0.3, abs=0.02)
     assert friction["probability"] > 0.8 and friction["heldout_gain"] > 0.02
     assert found["joints"]["hip"]["verdict"] == "consistent"
+    page = (bags / "report.html").read_text()
+    assert "Missing physics: coulomb friction at knee" in page
+    assert page.count('class="slot faulty"') == 1 and "Parameters at knee" in page
+    assert "Effort at knee over time" in page and "hip: consistent" in page
     assert "knee" in printed and "coulomb_friction" in better.read_text()
 
 
@@ -96,8 +100,8 @@ def test_an_exported_leg_in_a_loop_of_mujocos_own_is_nearer_to_the_recording_wit
     [
         (["diagnose", "{bag}", "--model", "{leg}"], "needs --signals"),
         (
-            ["diagnose", "{bag}", "--model", "{leg}", "--signals", SIGNALS, "--report", "x.html"],
-            "--report is not made",
+            ["diagnose", "{bag}", "--model", "{leg}", "--signals", SIGNALS, "--sim", "{bag}"],
+            "--sim is not made",
         ),
         (
             ["diagnose", "{bag}", "--model", "{floating}", "--signals", "{signals}"],

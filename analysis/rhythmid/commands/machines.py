@@ -66,6 +66,7 @@ def diagnose_files(
     holdout: Sequence[Path],
     elements: Sequence[Path],
     json: Path | None,
+    report: Path | None,
     save_model: Path | None,
     budget: float | None,
     terminal: "Terminal",
@@ -84,6 +85,14 @@ def diagnose_files(
     show_diagnosis(answer.diagnosis, terminal.answer)
     if json is not None:
         write_json(json, answer.diagnosis.to_dict())
+    if report is not None:
+        from rhythmid.commands.options import command_line
+        from rhythmid.diagnose.joints.joint_present import present_machine
+        from rhythmid.report.page import write_page
+
+        source = f"{model.name} with {', '.join(bag.name for bag in bags)}"
+        write_page(report, present_machine(answer, machine, source, command_line()))
+        terminal.say(f"report: {report}")
     saved(answer.machine, save_model, terminal)
 
 
