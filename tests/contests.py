@@ -23,7 +23,7 @@ def predicted(
 
     Parameters
     ----------
-    score : log predictive density of all blocks; by default that of Gaussian errors of this size, of which a hundredth count.
+    score : log predictive density of all blocks; by default that of Gaussian errors of this size, of which a tenth count.
     mood : standard deviation with which a block's log density departs from the mean, no part of the score.
     seed : of these departures; by default they are of a size of their own for every mean square.
     """
@@ -32,7 +32,7 @@ def predicted(
     departures -= departures.mean()
     departures *= mood / departures.std(ddof=1)
     if score is None:
-        score = -0.5 * BLOCKS * float(np.log(mean_square))
+        score = -5.0 * BLOCKS * float(np.log(mean_square))
     blocks = np.full(BLOCKS, SAMPLES)
     return Prediction(score / BLOCKS + departures, mean_square * blocks, blocks)
 

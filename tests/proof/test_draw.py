@@ -98,6 +98,7 @@ def test_what_contains_or_equals_an_effect_leaves_the_catalogue_with_it(catalogu
     assert {"coulomb_friction", "stribeck_friction"} <= set(absent_with(catalogue, "coulomb_friction"))
     assert set(absent_with(catalogue, "clock_skew")) == {"clock_skew", "delay_drift"}
     assert "coulomb_friction" not in absent_with(catalogue, "stribeck_friction")
+    assert "constant_force" in absent_with(catalogue, "asymmetric_coulomb_friction")
 
 
 @pytest.mark.parametrize("design", ["axis", "joint", "decay", "motor"])

@@ -7,6 +7,7 @@ import pytest
 from axes import CATALOGUE, arm_model, axis, axis_model, frame, frame_model
 
 from rhythmid.diagnose.effort.held_out import HeldOut
+from rhythmid.diagnose.effort.reference import residual_with_map
 from rhythmid.diagnose.effort.remainder import remainder_of
 from rhythmid.diagnose.effort.search import EffortSearch, kin, search_effort
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -128,3 +129,14 @@ def test_effort_of_a_record_that_no_fit_has_seen_is_predicted(friction):
     unseen = HeldOut.of([axis(7, amplitude=0.5)], axis_model(), friction.balance)
     assert unseen.error(friction.chosen) < 0.06  # the noise is a twentieth of the effort
     assert unseen.error(friction.nominal) > 2.0 * unseen.error(friction.chosen)
+
+
+def test_a_free_map_predicts_held_out_records_as_it_predicts_its_own(friction):
+    found = friction
+    seen = found.balance
+    again = residual_with_map(seen, seen, found.nominal, found.reference)
+    np.testing.assert_allclose(again, found.reference.residual, atol=0.05 * size_of(seen))
+    unseen = HeldOut.of([axis(7)], axis_model(), seen)
+    mapped = residual_with_map(unseen.balance, seen, found.nominal, found.reference)
+    plain = unseen.residual(found.nominal)
+    assert np.sqrt(np.mean(mapped**2)) < 0.5 * np.sqrt(np.mean(plain**2))

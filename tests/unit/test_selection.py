@@ -1,5 +1,8 @@
 """Selection: effects are granted their places one after the other, and whatever speaks against others is told."""
 
+import math
+from dataclasses import replace
+
 import pytest
 from contests import contest, ends, predicted, supposed
 from hypothesis import given, settings
@@ -70,23 +73,35 @@ def test_predictions_that_are_the_same_are_equivalent():
     assert select(contest(NOMINAL, one, FRICTION)).chosen is FRICTION
 
 
-def test_a_rival_is_equivalent_within_standard_errors_or_but_for_a_small_share_of_what_it_leaves():
+def test_a_rival_is_equivalent_where_the_data_do_not_decide():
     best = supposed("a", predicted(0.1, 100.0, seed=1))
-    near = supposed("b", predicted(0.2, 99.0, mood=1.0, seed=2))
-    small = supposed("c", predicted(0.101, 50.0, seed=2))
-    large = supposed("d", predicted(0.3, 50.0, seed=2))
-    everything = {"position": predicted(1e-6, 200.0)}
-    much_is_left = contest(NOMINAL, best, near, small, large, maps=everything, practical=0.0)
-    assert equivalent(near, best, much_is_left) and equivalent(small, best, much_is_left)
-    assert not equivalent(large, best, much_is_left)
-    little_is_left = contest(NOMINAL, best, small, practical=0.0)
-    assert not equivalent(small, best, little_is_left)
+    near, far = supposed("b", predicted(0.2, 99.0, mood=1.0, seed=2)), supposed("d", predicted(0.101, 50.0))
+    every = contest(NOMINAL, best, near, far)
+    assert equivalent(near, best, every) and not equivalent(far, best, every)
 
 
-def test_what_a_law_gains_below_practical_size_does_not_set_it_above_a_simpler_one():
-    best, small = supposed("a", predicted(0.1, 100.0, seed=1)), supposed("c", predicted(0.101, 50.0, seed=2))
-    for practical, same in ((0.0, False), (1.0, True)):
-        assert equivalent(small, best, contest(NOMINAL, best, small, practical=practical)) == same
+@pytest.mark.parametrize(
+    ("left", "floor", "same"), [(0.101, 1e-6, True), (0.1005, 0.1, True), (0.2, 0.1, False)]
+)
+def test_a_special_case_is_equivalent_but_for_a_small_share_of_what_it_leaves_or_of_the_mismatch(
+    left, floor, same
+):
+    richer = supposed("stribeck", predicted(0.1, 100.0))
+    plain = supposed("friction", predicted(left, 50.0), richer={"friction": ("stribeck",)})
+    other = replace(plain, richer={})
+    maps = {"velocity": predicted(floor, 0.0)}
+    assert equivalent(plain, richer, contest(NOMINAL, plain, richer, maps=maps)) == same
+    assert not equivalent(other, richer, contest(NOMINAL, other, richer, maps=maps))
+
+
+def test_where_the_simplest_of_several_that_predict_alike_is_refused_another_is_granted():
+    best = supposed("a", predicted(0.1, 80.0, seed=1), free=9)
+    plain = supposed("b", predicted(0.1, 79.0, seed=1), shape={"within_bounds": math.inf})
+    lost = replace(plain, shape={"within_bounds": 0.0})
+    assert select(contest(NOMINAL, best, plain)).chosen is plain
+    assert select(contest(NOMINAL, best, lost)).chosen is best
+    small = supposed("b", predicted(0.999, 79.0, seed=1))  # as probable, and of no practical size
+    assert select(contest(NOMINAL, best, small)).chosen is best
 
 
 @settings(max_examples=40, deadline=None)

@@ -70,10 +70,10 @@ def test_a_line_that_does_not_go_on_in_held_out_data_is_no_unknown_physics(gain,
 
 @pytest.mark.parametrize(("left", "expected"), [(0.19, 1), (0.05, 2)])
 def test_a_further_effect_has_to_remove_more_than_a_small_part_of_what_can_still_be_explained(left, expected):
-    both = supposed("friction cubic", predicted(left, 400.0))
+    both = supposed("friction cubic", predicted(left, 2200.0))
     made = contest(
         NOMINAL,
-        friction(0.2, score=200.0),
+        friction(0.2, score=2000.0),
         both,
         maps={"position": predicted(1e-4, 100.0)},
     )
@@ -132,9 +132,9 @@ def test_an_effect_that_predicts_clearly_better_than_its_kin_is_named_alone():
 
 def test_kin_that_make_one_law_together_do_not_stand_together():
     # each explains nearly all; both together correct one another by a part of what is left
-    kin = [supposed(name, predicted(ms)) for name, ms in (("friction", 0.1), ("stribeck", 0.3))]
-    both = supposed("friction stribeck", predicted(0.097, predicted(0.1).score + 50.0))
-    made = contest(NOMINAL, *kin, both, maps={"velocity": predicted(0.08)})
+    kin = [supposed(name, predicted(ms)) for name, ms in (("friction", 0.05), ("stribeck", 0.6))]
+    both = supposed("friction stribeck", predicted(0.0485, predicted(0.05).score + 50.0))
+    made = contest(NOMINAL, *kin, both, maps={"velocity": predicted(0.04)})
     assert verdict(made) == NAMED
 
 
@@ -308,3 +308,20 @@ def test_every_verdict_but_consistent_and_missing_physics_has_a_reason_in_words(
     made = contest(NOMINAL, friction(0.6), maps={"velocity": predicted(1e-4)})
     assert decided(made)[1].reason
     assert decided(contest(NOMINAL), 0.8)[1].reason
+
+
+def test_a_longer_delay_does_not_keep_an_effect_beside_it_from_being_named():
+    late = supposed("input_delay.delay friction", predicted(0.01), "delay")
+    alone = supposed("input_delay.delay", predicted(0.5), "delay")
+    assert verdict(contest(NOMINAL, alone, late)) == ("missing_physics", ("friction",))
+
+
+@pytest.mark.parametrize(("margin", "expected"), [(30.0, "undecided"), (1000.0, "missing_physics")])
+def test_a_name_is_stated_only_where_the_records_tell_it_from_others_by_far(margin, expected):
+    # were two laws of the catalogue so near to one another, one that it lacks might be as near
+    score = 2000.0
+    near = supposed("stribeck", predicted(0.3, score - margin))
+    _, decision = decided(contest(NOMINAL, friction(0.2, score=score), near))
+    assert decision.verdict == expected and decision.named == ("friction",)
+    assert (decision.probability["friction"] >= 0.8) == (expected == "missing_physics")
+    assert "lacks" in decision.reason or expected == "missing_physics"

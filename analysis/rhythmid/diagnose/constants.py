@@ -36,7 +36,8 @@ MISMATCH = 1e-3
 # size of no practical matter, as a share of the motion (free run) or of the effort: a tenth of what real machines leave,
 # whose models end at 2 to 5 % (measured: axis 2.1, arm joints 1.5 to 4.8, pendulums 0.5 to 0.75 %)
 PRACTICAL = 0.003
-PRACTICAL_EFFORT = 0.01
+# and of the effort, of which what a machine leaves is a larger share
+PRACTICAL_EFFORT = 0.005
 # standard errors within which a simpler or related law predicts as well (A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413)
 EQUIVALENT = 2.0
 
@@ -53,6 +54,10 @@ EDGE = 1e-3
 # `ADEQUATE`, falling with its power `STEEPNESS` (fitted to sealed cases whose truth was in the catalogue or not: docs/proof.md)
 ADEQUATE = 0.1
 STEEPNESS = 1.5
+# chance that a law which the catalogue lacks would have shown, as a function of the log density by which the nearest other name
+# predicts worse: half at `ALIKE`, rising with its power `SHARPNESS` (fitted to the same cases)
+ALIKE = 5.0
+SHARPNESS = 0.5
 # effect that the records would not show, as a share of what was measured, from which they decide nothing: as large as what
 # the refitted model of a machine may leave and still be called identified
 BLIND = 0.2

@@ -2,8 +2,8 @@
 
 Blocks of the records are left out in turn. The parameters that the other blocks give follow from the one fit of all of them by
 Gauss-Newton steps (approximate cross-validation: K. R. Rad, A. Maleki, J. R. Stat. Soc. B 82 (2020) 965; R. Giordano et al.,
-AISTATS 2019); where a hypothesis is linear in its parameters that is exact. Predictive densities are Student's t, with the
-scale of the blocks that the fit saw, and are divided by the residual's integrated autocorrelation time, so that samples
+AISTATS 2019); where a hypothesis is linear in its parameters that is exact. Predictive densities are Student's t, with a scale
+that varies about that of the blocks which the fit saw (`varying_scale`), and are divided by the residual's integrated autocorrelation time, so that samples
 which repeat one another do not count twice. Hypotheses are compared by their differences in each block: the standard error of
 the sum says how much of it is the records' mood, and pseudo-BMA weights under the Bayesian bootstrap
 (Y. Yao, A. Vehtari, D. Simpson, A. Gelman, Bayesian Analysis 13 (2018) 917) turn them into probabilities.
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from rhythmid.diagnose.constants import (
     BLOCK_ODDS,
@@ -27,7 +28,8 @@ from rhythmid.diagnose.constants import (
     ROWS_OF_A_BLOCK,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
-from rhythmid.identify.student import autocorrelation_time, log_density, scale_of, weights_of
+from rhythmid.diagnose.varying_scale import block_densities
+from rhythmid.identify.student import autocorrelation_time, scale_of, weights_of
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -107,6 +109,11 @@ class Blocks:
         """Sums (b,) of values (n,) over each block."""
         return np.asarray(np.bincount(self.block, values, self.count), dtype=np.float64)
 
+    def split(self, values: Array) -> list[Array]:
+        """Values (n,) of each block, b arrays."""
+        ends = np.cumsum(np.bincount(self.block, minlength=self.count))
+        return np.split(values[np.argsort(self.block, kind="stable")], ends[:-1])
+
     def left_out(self, fold: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Rows (n,) that a fold leaves out, and those that its fit sees: the others but for the gaps, and for what no fit sees."""
         of_row = self.fold[self.block]
@@ -162,14 +169,13 @@ def prediction(
     `time` is the autocorrelation time in samples, the same for all hypotheses; `measured` (n,) are the errors in the unit of
     the measurement, where those that are scored are whitened.
     """
-    density = np.empty(len(found.error))
-    for spread in np.unique(found.scale):
-        rows = found.scale == spread
-        density[rows] = log_density(found.error[rows], float(spread))
-    density -= found.penalty * (blocks.fold[blocks.block] != UNSEEN)
+    seen = blocks.fold != UNSEEN
+    counts = blocks.sums(np.ones(len(found.error)))
+    density = block_densities(
+        blocks.split(found.error), blocks.sums(found.scale) / np.maximum(counts, 1.0), time, seen
+    )
     error = found.error if measured is None else measured
-    counts = blocks.sums(np.ones(len(density)))
-    return Prediction(blocks.sums(density) / time, blocks.sums(error**2), counts, blocks.fold == UNSEEN)
+    return Prediction(density - found.penalty * counts * seen / time, blocks.sums(error**2), counts, ~seen)
 
 
 def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[Prediction]:
@@ -200,6 +206,14 @@ def weight_for(first: Prediction, second: Prediction) -> float:
     return float(np.minimum(first.log_density - second.log_density, math.log(BLOCK_ODDS)).sum())
 
 
+def chance_better(first: Prediction, second: Prediction, least: float) -> float:
+    """Chance that the first predicts better than the second by more than the log density `least`, under the Bayesian bootstrap
+    of the blocks."""
+    gain = first.log_density - second.log_density
+    found = len(gain) * _resampled(len(gain)) @ gain - least
+    return float(np.mean(expit(found)))
+
+
 def gain_ahead(first: Prediction, second: Prediction) -> float:
     """By how many standard errors the first predicts better what no fit has seen; infinite where nothing is held out.
 
@@ -219,6 +233,11 @@ def _summed(gain: Array) -> tuple[float, float]:
     return float(gain.sum()), error
 
 
+def _resampled(count: int, seed: int = 0) -> Array:
+    """Weights (draws, count) of the Bayesian bootstrap of so many blocks; each draw sums to one."""
+    return np.random.default_rng(seed).dirichlet(np.ones(count), DRAWS)
+
+
 def probabilities(hypotheses: Sequence[Hypothesis], seed: int = 0) -> Array:
     """Probability (h,) of each hypothesis among these: pseudo-BMA weights under the Bayesian bootstrap of the blocks."""
     if not hypotheses:
@@ -226,8 +245,7 @@ def probabilities(hypotheses: Sequence[Hypothesis], seed: int = 0) -> Array:
     densities = np.array([one.prediction.log_density for one in hypotheses])
     prior = -EFFECT_PRIOR * np.array([len(one.elements) for one in hypotheses], dtype=float)
     count = densities.shape[1]
-    draws = np.random.default_rng(seed).dirichlet(np.ones(count), DRAWS)  # (draws, b)
-    scores = count * draws @ densities.T + prior
+    scores = count * _resampled(count, seed) @ densities.T + prior
     scores -= scores.max(axis=1, keepdims=True)
     each = np.exp(scores)
     return np.asarray((each / each.sum(axis=1, keepdims=True)).mean(axis=0), dtype=np.float64)

@@ -1,18 +1,21 @@
 """Probabilities of names: how much of the evidence is for hypotheses that hold them.
 
 Hypotheses with no more effects than the chosen one share the evidence, as pseudo-BMA weights. A name's probability is the
-share of those that hold it, times the chance that the catalogue holds the truth at all, given how much is left that something
-else explains, beside the part of the mismatch that the name explains.
+share of those that hold it, times the chance that the catalogue holds the truth at all. That falls with how much is left that
+something else explains, beside the part of the mismatch that the name explains; and with how little worse the nearest other name
+predicts. For the laws of the catalogue are a sample of all laws: where the records hardly tell two of them apart, they would
+not tell the chosen one from one that the catalogue lacks.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from rhythmid.diagnose.constants import ADEQUATE, STEEPNESS
+from rhythmid.diagnose.constants import ADEQUATE, ALIKE, SHARPNESS, STEEPNESS
 from rhythmid.diagnose.evidence import probabilities
 from rhythmid.diagnose.hypothesis import Hypothesis
-from rhythmid.diagnose.selection import Contest, Selection
+from rhythmid.diagnose.selection import Contest, Selection, equivalent
 
 
 def weights_of(contest: Contest, selection: Selection) -> dict[tuple[str, ...], float]:
@@ -29,6 +32,29 @@ def adequacy(explained: float) -> float:
     """
     left = min(max(1.0 - explained, 1e-9), 1.0)
     return float(1.0 / (1.0 + (left / ADEQUATE) ** STEEPNESS))
+
+
+def told_apart(margin: float) -> float:
+    """Chance that a name is not only the nearest to a law that the catalogue lacks, where the nearest other name predicts worse by
+    this log density: a logistic function of its logarithm."""
+    return float(1.0 / (1.0 + (ALIKE / max(margin, 1e-9)) ** SHARPNESS))
+
+
+def margin_over_others(label: str, contest: Contest, selection: Selection) -> float:
+    """By how much log density the chosen hypothesis predicts better than the best one without the effect of this label, or one
+    that is equivalent to it or contains it, and with no more effects."""
+    chosen = selection.chosen
+    name = dict(zip(chosen.elements, chosen.names))[label]
+    accepted = {name, *chosen.richer.get(name, ())}
+    others = [
+        one.prediction.score
+        for one in contest.hypotheses
+        if len(one.elements) <= len(chosen.elements)
+        and not accepted & set(one.names)
+        and (selection.sound(one) or not one.elements)
+        and not equivalent(one, chosen, contest)
+    ]
+    return chosen.prediction.score - max(others, default=-math.inf)
 
 
 def joint_probability(

@@ -122,8 +122,8 @@ def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
         free = False
     if free:
         yield _Way("free_run", FREE_RUN, list)
-    length = float(np.median([periods_long(one) for one in series]))
     shortest = LEAST_BLOCKS * max(one.period * one.block for one in series)
+    length = max(float(np.median([periods_long(one) for one in series])), shortest)
     while length >= shortest:
         yield _Way("windows", _words(length, LOSES if free else INTEGRATES), partial(cut_up, length=length))
         length /= SHORTER

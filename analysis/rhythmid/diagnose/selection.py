@@ -8,7 +8,7 @@ where no row of the table of rejections speaks against the best of them.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rhythmid.diagnose.constants import REST
+from rhythmid.diagnose.constants import MISMATCH, REST
 from rhythmid.diagnose.evidence import weight_for
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.rejections import Claim, Rejection, decisive, rejections_of
@@ -98,21 +98,20 @@ def select(contest: Contest) -> Selection:
                 sound.append(one)
         if not sound:
             continue
-        best = _simplest(sound, contest)
-        if any(row.hypothesis == best.elements for row in told):
+        close = [one for one in sound if one is sound[0] or equivalent(one, sound[0], contest)]
+        refused = {row.hypothesis for row in told}
+        granted = [one for one in close if one.elements not in refused]
+        if granted:
+            smaller = _simplest(granted)
+            grown.append(smaller)
+        else:
             # rounding decides nothing
             smaller = max(smaller, sound[0], key=lambda one: round(one.prediction.score, 6))
-        else:
-            grown.append(best)
-            smaller = best
     return Selection(grown[-1], tuple(grown), tuple(told))
 
 
-def _simplest(ranked: Sequence[Hypothesis], contest: Contest) -> Hypothesis:
-    """Of the hypotheses that the best one does not clearly beat, one that no other is a special case of, with the fewest free
-    parameters."""
-    best = ranked[0]
-    close = [best, *(one for one in ranked[1:] if equivalent(one, best, contest))]
+def _simplest(close: Sequence[Hypothesis]) -> Hypothesis:
+    """Of hypotheses that predict about as well, one that no other is a special case of, with the fewest free parameters."""
     plain = [one for one in close if not any(special_case(other, one) for other in close)]
     return min(plain or close, key=lambda one: (one.free, -_basic(one), -one.prediction.score, one.key))
 
@@ -129,11 +128,11 @@ def special_case(first: Hypothesis, second: Hypothesis) -> bool:
 
 
 def equivalent(other: Hypothesis, best: Hypothesis, contest: Contest) -> bool:
-    """Whether another hypothesis predicts as well as the better one: within standard errors, or but for a small share of what it
-    leaves, or for what is of no practical size."""
+    """Whether another hypothesis predicts as well as the better one: the data do not decide, or the better one is a richer law
+    that removes but a small share of what the other leaves or of the whole mismatch."""
+    if weight_for(best.prediction, other.prediction) <= decisive(1):
+        return True
     left = other.prediction.mean_square - contest.floor
-    practical = (contest.practical * contest.size) ** 2
+    whole = contest.nominal.prediction.mean_square - contest.floor
     removed = other.prediction.mean_square - best.prediction.mean_square
-    return weight_for(best.prediction, other.prediction) <= decisive(1) or removed < max(
-        REST * left, practical
-    )
+    return special_case(other, best) and removed < max(REST * left, MISMATCH * whole)

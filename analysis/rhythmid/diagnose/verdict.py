@@ -7,10 +7,18 @@ from dataclasses import dataclass
 from scipy.stats import t as student
 
 from rhythmid.diagnose.constants import BLIND, EQUIVALENT, EXPLAINED, FALSE_ALARM, MAINLY, STATED
-from rhythmid.diagnose.evidence import difference, gain_ahead
+from rhythmid.diagnose.evidence import chance_better, difference, gain_ahead
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, Verdict
-from rhythmid.diagnose.probability import adequacy, joint_probability, weights_of
+from rhythmid.diagnose.probability import (
+    adequacy,
+    joint_probability,
+    margin_over_others,
+    told_apart,
+    weights_of,
+)
+from rhythmid.diagnose.rejections import decisive
 from rhythmid.diagnose.selection import Contest, Selection, equivalent
+from rhythmid.simulation.transport import INPUT_DELAY
 
 
 @dataclass(frozen=True)
@@ -18,12 +26,14 @@ class Unexplained:
     """What the chosen hypothesis leaves and a free map predicts.
 
     `share` is that of the explainable mismatch; `goes_with` the quantity of the free map that predicts it best; `significant`
-    whether that is more than chance.
+    whether that is more than chance. `expected` is the largest share of all, significant or not, each times the chance that
+    it is real.
     """
 
     share: float
     significant: bool
     goes_with: str | None
+    expected: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -67,16 +77,21 @@ def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
         if len(one.elements) > len(chosen.elements) and one.kind == "effects"
     ]
     found: list[tuple[float, str]] = []
+    expected = 0.0
     for words, one, count in rivals:
         gain, error = difference(one, chosen.prediction)
         removed = chosen.prediction.mean_square - one.mean_square
+        expected = max(expected, removed * chance_better(one, chosen.prediction, decisive(count)))
         ahead = gain_ahead(one, chosen.prediction) >= -EQUIVALENT
         if removed > 0.0 and ahead and 0.0 < significance(one, count) * error < gain:
             found.append((removed, words))
-    if not found or whole <= 0.0:
+    if whole <= 0.0:
         return Unexplained(0.0, False, None)
+    expected = float(min(expected / whole, 1.0))
+    if not found:
+        return Unexplained(0.0, False, None, expected)
     removed, words = max(found)
-    return Unexplained(float(min(removed / whole, 1.0)), True, words)
+    return Unexplained(float(min(removed / whole, 1.0)), True, words, expected)
 
 
 def significance(prediction: Prediction, candidates: int) -> float:
@@ -136,8 +151,14 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     names = dict(zip(chosen.elements, chosen.names))
     if chosen.kind == "free_map":  # the map is no name
         labels = tuple(label for label in labels if label != chosen.elements[-1])
+    if chosen.kind == "delay" and len(labels) > 1:  # a delay beside effects is told with the delays
+        labels = tuple(label for label in labels if label != INPUT_DELAY)
     explained = 1.0 - left.share
-    sure = {label: adequacy(_own_share(shares[label], left.share)) for label in labels}
+    sure = {
+        label: adequacy(_own_share(shares[label], left.expected))
+        * told_apart(margin_over_others(label, contest, selection))
+        for label in labels
+    }
 
     def probability(some: Sequence[str]) -> float:
         held = joint_probability([names[label] for label in some], contest, chosen, weights)
@@ -172,7 +193,7 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
         return answer(
             "undecided", "a value that the nominal model holds fixed explains the records when it is free"
         )
-    if chosen.kind == "delay":
+    if chosen.kind == "delay" and (not stated or stated == (INPUT_DELAY,)):
         return answer("undecided", "a longer delay of the input than was given explains the records")
     if explained < MAINLY:
         return answer(
@@ -193,7 +214,12 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
             "unknown_physics",
             f"it is mainly this, but {100.0 * left.share:.0f} % of the mismatch goes with {left.goes_with}",
         )
-    return answer("undecided", "the evidence does not separate several explanations")
+    if groups or joint_probability([names[label] for label in labels], contest, chosen, weights) < STATED:
+        return answer("undecided", "the evidence does not separate several explanations")
+    return answer(
+        "undecided",
+        "the records hardly tell this law from others, so it may stand for one that the catalogue lacks",
+    )
 
 
 def _own_share(share: float, left: float) -> float:

@@ -22,6 +22,8 @@ from rhythmid.record.record import Record
 from rhythmid.simulation.generated_source import InputKind, OutputKind
 from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, spline
 
+ERASED = 0.02  # of a motion's power that a Hann window leaves, of 3/8 of a steady one, below which it has erased the motion
+LEAST_PART = 16  # samples in which a frequency can still be seen
 REACH = 2  # blocks on either side from which `of_block` takes differences
 REST_LENGTH = "linear_spring.rest_length"
 NO_SPRING = 1e-4  # of the inertia's own stiffness m ω², below which a spring sets no scale
@@ -157,8 +159,24 @@ def _extended(samples: Array, count: int) -> Array:
     return samples
 
 
+def moving_part(value: Array) -> Array:
+    """The samples (n,) without an end in which hardly anything moves any more.
+
+    A Hann window over the whole of a motion that dies out at once would leave nothing of it. The samples are halved until the
+    window leaves some of its power.
+    """
+    while len(value) >= 2 * LEAST_PART:
+        motion = value - value[len(value) // 2 :].mean()
+        power = np.sum(motion**2)
+        if power == 0.0 or np.sum((motion * np.hanning(len(motion))) ** 2) > ERASED * power:
+            break
+        value = value[: len(value) // 2]
+    return value
+
+
 def bandwidth(value: Array, period: float, share: float = 0.9999) -> float:
     """Frequency [Hz] below which `share` of the motion's power lies (its mean and trend left out)."""
+    value = moving_part(value)
     n = len(value)
     detrended = value - np.linspace(value[: max(1, n // 50)].mean(), value[-max(1, n // 50) :].mean(), n)
     length = fast_length(n)
@@ -289,7 +307,8 @@ def hold_out_tail(series: Sequence[Series], share: float = 0.2) -> tuple[list[Se
 
 def dominant_frequency(series: Series, finer: int = 1) -> float:
     """Frequency [Hz] of the strongest line of the motion, on a grid that is so many times finer than the record resolves."""
-    value = series.averaged - series.averaged.mean()
+    value = moving_part(series.averaged)
+    value = value - value.mean()
     length = fast_length(finer * len(value))
     power = np.abs(np.fft.rfft(value * np.hanning(len(value)), length)) ** 2
     power[0] = 0.0

@@ -109,9 +109,15 @@ def related(catalogue: Catalogue, first: str, second: str) -> bool:
     )  # fmt: skip
 
 
+# effects that, with others of the catalogue, make the same model: a friction that differs by direction is one that does not, and a
+# constant force
+SUMS = {"asymmetric_coulomb_friction": ("constant_force",)}
+
+
 def absent_with(catalogue: Catalogue, name: str) -> tuple[str, ...]:
-    """What must leave the catalogue so that `name` is unknown to it: itself, what is the same model, what contains it."""
-    gone = {name} | {twin for group in EQUIVALENT if name in group for twin in group}
+    """What must leave the catalogue so that `name` is unknown to it: itself, what is the same model or makes it one with others,
+    what contains it."""
+    gone = {name, *SUMS.get(name, ())} | {twin for group in EQUIVALENT if name in group for twin in group}
     gone |= {richer for one in tuple(gone) for richer in catalogue[one].special_case_of}
     return tuple(sorted(gone & set(catalogue)))
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.evidence import Blocks, Linearised, predict
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import size_of
+from rhythmid.identify.inverse_dynamics.estimate import linearise, size_of
 from rhythmid.identify.inverse_dynamics.free_map import FreeMap
 from rhythmid.identify.student import scale_of, weights_of
 
@@ -20,15 +20,18 @@ STRAIGHT = 3.0  # standard deviation of what is straight, the same: a line may c
 PASSES = 8  # of reweighted least squares
 
 
-def map_columns(balance: Balance, fitted: Fitted) -> tuple[Array, NDArray[np.bool_]]:
+def map_columns(
+    balance: Balance, fitted: Fitted, drawn_on: Balance | None = None
+) -> tuple[Array, NDArray[np.bool_]]:
     """Columns (n, q) of the free map at the rows, and which of them are bends (q,); its load is the effort that the model
-    predicts, never the measured one."""
-    free = FreeMap(list(balance.motions))
+    predicts, never the measured one. The map's pieces lie where the motions of `drawn_on` are, by default the balance's own."""
+    drawn_on = drawn_on or balance
+    free = FreeMap(list(drawn_on.motions))
     loads = balance.required(fitted.fit.model)
     made = [free.columns(motion, load) for motion, load in zip(balance.motions, loads, strict=True)]
     shift = balance.shift(fitted.fit.model) + fitted.fit.alignment
     columns = balance.rows(made, shift)
-    columns[:, -1] /= size_of(balance)  # a load counts as a share of the effort
+    columns[:, -1] /= size_of(drawn_on)  # a load counts as a share of the effort
     return columns, free.bends
 
 
@@ -55,6 +58,15 @@ def with_map(
         )
         residual, departure = residual + jacobian @ step, departure + step
     return Linearised(residual, jacobian, precision, departure)
+
+
+def residual_with_map(heldout: Balance, balance: Balance, fitted: Fitted, found: Linearised) -> Array:
+    """Predicted less recorded effort (n,) of held-out rows, by a fit with a free map that was `found` on a balance."""
+    residual, jacobian = linearise(heldout, fitted.fit.model, fitted.fit.names, fitted.fit.alignment)
+    own = jacobian[:, ~fitted.fit.at_limit]
+    step = found.departure[: own.shape[1]] - fitted.linearised.departure
+    mapped = map_columns(heldout, fitted, balance)[0] @ found.departure[own.shape[1] :]
+    return residual + own @ step + mapped
 
 
 def reference_of(

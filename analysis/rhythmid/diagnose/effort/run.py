@@ -10,6 +10,7 @@ from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.held_out import HeldOut
+from rhythmid.diagnose.effort.reference import residual_with_map
 from rhythmid.diagnose.effort.remainder import Remainder, remainder_of
 from rhythmid.diagnose.effort.search import GAP, MOST_EFFECTS, EffortSearch, search_effort
 from rhythmid.diagnose.evidence import (
@@ -57,12 +58,17 @@ class _Rows:
     blocks: Blocks
     heldout: HeldOut | None
 
-    def predicted(self, fitted: Fitted, with_map: Linearised | None = None) -> CrossValidated:
-        """Errors of prediction of a fit; a free map beside it predicts held-out records as the fit does."""
+    def predicted(
+        self, found: EffortSearch, fitted: Fitted, with_map: Linearised | None = None
+    ) -> CrossValidated:
+        """Errors of prediction of a fit, or of one `with_map`: a free map beside its parameters."""
         seen = with_map or fitted.linearised
         if self.heldout is None:
             return cross_validate(seen, self.blocks)
-        other = self.heldout.residual(fitted)
+        if with_map is None:
+            other = self.heldout.residual(fitted)
+        else:
+            other = residual_with_map(self.heldout.balance, found.balance, fitted, with_map)
         residual = np.concatenate([seen.residual, other])
         jacobian = np.vstack([seen.jacobian, np.zeros((len(other), seen.jacobian.shape[1]))])
         return cross_validate(Linearised(residual, jacobian, seen.precision, seen.departure), self.blocks)
@@ -108,9 +114,9 @@ def effort_run(
     case.tell("weighing the hypotheses on data that no fit has seen")
     rows = _rows(case, found, unseen)
     size = size_of(found.balance)
-    predicted = {one.elements: rows.predicted(one) for one in found.hypotheses}
+    predicted = {one.elements: rows.predicted(found, one) for one in found.hypotheses}
     mapped = {
-        "the motion and the load": rows.predicted(found.chosen, found.beyond),
+        "the motion and the load": rows.predicted(found, found.chosen, found.beyond),
     }
     every = [*predicted.values(), *mapped.values()]
     best = min(every, key=lambda one: float(np.sum(one.error**2)))

@@ -28,7 +28,7 @@ from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.reference import reference_of
 from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.diagnose.evidence import Blocks, Linearised, difference, predict, weight_for
-from rhythmid.diagnose.hypothesis import Prediction
+from rhythmid.diagnose.hypothesis import Kind, Prediction
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
@@ -178,8 +178,8 @@ class _Search:
             gain, error = difference(others[best], others[index])
             rest = others[index].mean_square - free.mean_square
             removed = others[index].mean_square - others[best].mean_square
-            practical = (PRACTICAL_EFFORT * size_of(self.balance)) ** 2
-            if gain < EQUIVALENT * error or removed < max(REST * rest, practical):
+            whole = float(np.mean(self.nominal.fit.residual**2)) - free.mean_square
+            if gain < EQUIVALENT * error or removed < max(REST * rest, MISMATCH * whole):
                 best = index
         return new[best] if self._worth(others[best], before, free, tried) else None
 
@@ -214,22 +214,25 @@ class _Search:
         ]
         base = parent
         for label in related:
-            reduced = self.without(base, label)
-            if reduced is None:
-                return []
-            base = reduced
+            base = self.without(base, label)
         return [base]
 
-    def without(self, fitted: Fitted, label: str) -> Fitted | None:
+    def without(self, fitted: Fitted, label: str) -> Fitted:
         """The hypothesis less one of its additions, fitted again; one that was fitted before is taken as it is."""
         rest = tuple(one for one in fitted.elements if one != label)
         known = next((f for f in self.found if set(f.elements) == set(rest)), None)
         if known is not None:
             return known
-        if fitted.fit.model.term(label) is None:
-            return None
-        model = fitted.fit.model.without(label)
-        priors = {name: prior for name, prior in fitted.priors.items() if not name.startswith(f"{label}.")}
+        model = fitted.fit.model
+        if model.term(label) is not None:
+            model = model.without(label)
+        elif label in model.parameters:  # a freed value is fixed again
+            model = model.with_parameters({label: self.nominal.fit.model.parameters[label]})
+        priors = {
+            name: prior
+            for name, prior in fitted.priors.items()
+            if name != label and not name.startswith(f"{label}.")
+        }
         return self._fit(rest, model, priors, self._aligned(rest), fitted.fit.alignment)
 
     def fitted(self, base: Fitted, one: Screened) -> Fitted | None:
@@ -247,7 +250,7 @@ class _Search:
             priors |= self._priors(model, label, start.element, alignment)
         if any(not math.isfinite(prior.std) or prior.std <= 0.0 for prior in priors.values()):
             return None
-        made = self._fit((*base.elements, label), model, priors, aligned, alignment, start.kind)
+        made = self._fit((*base.elements, label), model, priors, aligned, alignment)
         swallows = (
             start.element is not None
             and start.element.slot == "actuator"
@@ -279,12 +282,10 @@ class _Search:
         return found
 
     def _fit(
-        self, elements: tuple[str, ...], model: Model, priors: dict[str, Prior], aligned: Alignment, at: float,
-        kind: str = "effects",
-    ) -> Fitted:  # fmt: skip
+        self, elements: tuple[str, ...], model: Model, priors: dict[str, Prior], aligned: Alignment, at: float
+    ) -> Fitted:
         fit = fit_effort(self.balance, model, [n for n in model.free if n in priors], priors, aligned, at)
-        kinds = {"delay", "freed_value"} & {kind} or {"effects"}
-        return Fitted.of(elements, "nominal" if not elements else next(iter(kinds)), fit, priors)  # pyright: ignore[reportArgumentType]
+        return Fitted.of(elements, _kind_of(elements, model), fit, priors)
 
     def _aligned(self, elements: Sequence[str]) -> Alignment:
         usual = Alignment.of(self.balance)
@@ -306,6 +307,15 @@ class _Search:
         if terms[0] is None or terms[1] is None:
             return False
         return terms[1].element.name in terms[0].element.special_case_of
+
+
+def _kind_of(elements: Sequence[str], model: Model) -> Kind:
+    """What is supposed where the nominal model is given these elements."""
+    if not elements:
+        return "nominal"
+    if INPUT_DELAY in elements:
+        return "delay"
+    return "effects" if all(model.term(label) is not None for label in elements) else "freed_value"
 
 
 def _shortlist(screened: Sequence[Screened]) -> list[Screened]:

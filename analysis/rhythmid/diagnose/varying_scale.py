@@ -1,0 +1,57 @@
+"""Density of blocks of errors whose scale varies from block to block.
+
+What a model leaves is seldom as large in slow moves as in fast ones. Under one scale for all, a hypothesis that explains nearly
+everything in one record and half in another would be worth less there than one that explains nothing. So the scale of each block
+is unknown, log-normal about that of the blocks which the fit saw, and integrated out by Laplace's method
+(L. Tierney, J. B. Kadane, J. Am. Stat. Assoc. 81 (1986) 82).
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.identify.student import DEGREES, log_density, scale_of
+
+Array = NDArray[np.float64]
+INFORMATION = 2.0 * DEGREES / (DEGREES + 3.0)  # of one error of Student's t on the logarithm of its scale
+
+
+def block_densities(errors: Sequence[Array], scales: Array, time: float, seen: NDArray[np.bool_]) -> Array:
+    """Log densities (b,) of blocks of errors, divided by the autocorrelation time.
+
+    Parameters
+    ----------
+    errors : the errors of each block, b arrays.
+    scales : (b,) scale that the fit expects of each block.
+    time : autocorrelation time in samples.
+    seen : (b,) blocks from which is learnt how much scales vary; of the others no fit has seen anything.
+
+    Returns
+    -------
+    float64[b]
+        Log density of each block.
+    """
+    own = np.array(
+        [math.log(scale_of(one) / scale) if len(one) else 0.0 for one, scale in zip(errors, scales)]
+    )
+    information = INFORMATION * np.array([len(one) for one in errors]) / time
+    variance = _between(own[seen], information[seen])
+    share = (
+        variance * information / (1.0 + variance * information)
+    )  # that a block's own scale has in the estimate
+    shift = share * own
+    found = np.array(
+        [log_density(one, float(scale)).sum() for one, scale in zip(errors, scales * np.exp(shift))]
+    )
+    departure = shift**2 / (2.0 * variance) if variance > 0.0 else np.zeros(len(shift))
+    return found / time - departure - 0.5 * np.log1p(variance * information)
+
+
+def _between(own: Array, information: Array) -> float:
+    """Variance between blocks of the logarithm of their scales (b,), less what their estimates scatter by themselves."""
+    known = information > 0.0
+    if known.sum() < 2:
+        return 0.0
+    return float(max(np.mean(own[known] ** 2) - np.mean(1.0 / information[known]), 0.0))

@@ -1,0 +1,43 @@
+"""The frequency and the bandwidth of a motion that dies out early are those of the motion, not of what follows it."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rhythmid.identify.series import bandwidth, dominant_frequency, moving_part, prepare
+from rhythmid.record.record import Channel, Record
+
+RATE, FREQUENCY = 50.0, 2.7
+
+
+def decay(damping, duration=10.0, offset=0.02, noise=1e-4, seed=0):
+    """A released oscillator, at rest away from zero in the end, with noise."""
+    time = np.arange(int(duration * RATE)) / RATE
+    angle = 2 * np.pi * FREQUENCY * time
+    motion = np.exp(-damping * angle) * np.cos(angle * np.sqrt(1.0 - damping**2))
+    return offset + motion + noise * np.random.default_rng(seed).standard_normal(len(time))
+
+
+def series(value):
+    return prepare([Record("decay", Channel(np.arange(len(value)) / RATE, value, "m"))])[0]
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.005, 0.6), st.floats(5.0, 40.0), st.floats(-2.0, 2.0), st.integers(0, 50))
+def test_the_dominant_frequency_of_a_decay_is_the_oscillators(damping, duration, offset, seed):
+    found = dominant_frequency(series(decay(damping, duration, offset, seed=seed)))
+    assert 0.4 * FREQUENCY < found < 1.6 * FREQUENCY
+
+
+@pytest.mark.parametrize("damping", [0.02, 0.2, 0.6])
+def test_a_decay_is_not_averaged_away(damping):
+    assert series(decay(damping)).block <= 2
+
+
+def test_a_steady_motion_is_taken_as_it_is():
+    time = np.arange(1000) / RATE
+    value = np.sin(2 * np.pi * 1.3 * time)
+    assert len(moving_part(value)) == len(value)
+    assert bandwidth(value, 1 / RATE) < 2.0
+    assert len(moving_part(np.zeros(100))) == 100 and len(moving_part(np.ones(3))) == 3
