@@ -7,8 +7,9 @@ from textwrap import shorten
 
 from rhythmid.report.chart import opening
 
-COLUMN, ROW, LEFT, TOP = 130.0, 84.0, 70.0, 46.0  # pixels between joints, between chains, and of the margins
+COLUMN, ROW, LEFT, TOP = 130.0, 84.0, 110.0, 46.0  # pixels between joints, between chains, and of the margins
 RADIUS = 15.0
+ELBOW = 16.0  # from the edge of what carries a joint to where the line to it turns
 LETTERS = 18  # of a label under a joint
 
 
@@ -31,14 +32,15 @@ def robot_svg(joints: Sequence[DrawnJoint], alt: str) -> str:
     width, height = LEFT + COLUMN * columns + 20.0, TOP + ROW * rows
     middle = TOP + ROW * (rows - 1) / 2.0
     parts = [opening(width, height, alt)]
-    parts.append(f'<rect class="slot" x="6" y="{middle - 18:.0f}" width="44" height="36" rx="4"/>')
-    parts.append(f'<text class="faint" x="28" y="{middle + 4:.0f}" text-anchor="middle">base</text>')
     at = {name: (LEFT + COLUMN * (column + 0.4), TOP + ROW * row) for name, (column, row) in place.items()}
     for one in joints:
-        (x, y), (px, py) = at[one.name], at[one.parent] if one.parent else (50.0, middle)
-        parts.append(f'<path class="join" d="M{px:.0f} {py:.0f}L{x:.0f} {y:.0f}"/>')
+        (x, y), (px, py) = at[one.name], at[one.parent] if one.parent else (50.0 - RADIUS, middle)
+        turn = px + RADIUS + ELBOW
+        parts.append(f'<path class="join" fill="none" d="M{px:.0f} {py:.0f}H{turn:.0f}V{y:.0f}H{x:.0f}"/>')
     for one in joints:
         parts += _joint(one, *at[one.name])
+    parts.append(f'<rect class="slot" x="6" y="{middle - 18:.0f}" width="44" height="36" rx="4"/>')
+    parts.append(f'<text class="faint" x="28" y="{middle + 4:.0f}" text-anchor="middle">base</text>')
     return "".join([*parts, "</svg>"])
 
 
