@@ -36,11 +36,12 @@ def test_a_name_is_the_surer_the_worse_the_nearest_other_predicts(one, other):
     assert 0.0 <= told_apart(low) <= told_apart(high) <= 1.0
 
 
-def test_the_margin_is_over_the_best_other_name_and_not_over_what_contains_or_equals_the_chosen_one():
+def test_the_margin_is_over_the_best_other_name_and_not_over_kin_of_the_chosen_one():
     chosen = supposed("a", predicted(0.1, 500.0), richer={"a": ("wide",)})
     wide, same = supposed("wide", predicted(0.1, 499.0)), supposed("b", predicted(0.1, 499.5))
     other, pair = supposed("c", predicted(0.5, 100.0)), supposed("c d", predicted(0.3, 300.0))
-    made = contest(NOMINAL, chosen, wide, same, other, pair)
+    plain = supposed("e", predicted(0.4, 400.0), richer={"e": ("a",)})
+    made = contest(NOMINAL, chosen, wide, same, other, pair, plain)
     found = select(made)
     assert found.chosen is chosen and margin_over_others("a", made, found) == pytest.approx(400.0)
     alone = contest(NOMINAL, chosen)

@@ -41,8 +41,8 @@ def told_apart(margin: float) -> float:
 
 
 def margin_over_others(label: str, contest: Contest, selection: Selection) -> float:
-    """By how much log density the chosen hypothesis predicts better than the best one without the effect of this label, or one
-    that is equivalent to it or contains it, and with no more effects."""
+    """By how much log density the chosen hypothesis predicts better than the best one with no more effects that has neither the
+    effect of this label, nor one that is equivalent to it, contains it or is a special case of it: nested laws are always near."""
     chosen = selection.chosen
     name = dict(zip(chosen.elements, chosen.names))[label]
     accepted = {name, *chosen.richer.get(name, ())}
@@ -51,6 +51,7 @@ def margin_over_others(label: str, contest: Contest, selection: Selection) -> fl
         for one in contest.hypotheses
         if len(one.elements) <= len(chosen.elements)
         and not accepted & set(one.names)
+        and not any(name in richer for richer in one.richer.values())
         and (selection.sound(one) or not one.elements)
         and not equivalent(one, chosen, contest)
     ]
