@@ -194,7 +194,7 @@ def rehearsed(machine: Machine, experiment: JointExperiment) -> tuple[JointRecor
         made = perform(machine, experiment)
     except InputError:
         return None, dict.fromkeys(machine.joints, np.inf)
-    time = made.stamp_ns * 1e-9
+    time = (made.stamp_ns * 1e-9).astype(np.float64)
     joints, states = made.topics[f"{experiment.namespace}/joint_states"]
     _, command = made.topics[f"{experiment.namespace}/command"]
     records, units = {}, {}
