@@ -100,7 +100,7 @@ def test_a_measurement_delay_is_part_of_what_is_told(tmp_path: Path):
 
 
 def test_the_file_alone_has_the_controllers_delay_and_losses_as_near_as_mjcf_says_them(tmp_path: Path):
-    machine = plain_leg().with_values({"knee.input_delay.delay": 0.004})
+    machine = plain_leg().with_values({"knee.input_delay.delay": 0.002})
     model, data, asked = in_the_air(tmp_path, machine)
     whole, _ = loop(model, data, asked)
     plain = mujoco.MjModel.from_xml_path(str(tmp_path / "leg.xml"))
@@ -108,7 +108,8 @@ def test_the_file_alone_has_the_controllers_delay_and_losses_as_near_as_mjcf_say
     data = mujoco.MjData(plain)
     mujoco.mj_resetDataKeyframe(plain, data, 0)
     for k, command in enumerate(asked[:600]):
-        np.testing.assert_allclose(data.qpos[1:], whole[k], atol=0.03)  # begins with a command of 0
+        if k > 150:  # until then it feels that MuJoCo's delay begins with commands of 0
+            np.testing.assert_allclose(data.qpos[1:], whole[k], atol=0.005)
         data.ctrl[:] = command
         mujoco.mj_step(plain, data)
 
