@@ -8,6 +8,7 @@ from contests import contest, ends, predicted, supposed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rhythmid.diagnose.constants import APART
 from rhythmid.diagnose.selection import equivalent, select, special_case
 
 NOMINAL = supposed("", predicted(1.0))
@@ -86,12 +87,19 @@ def test_a_rival_is_equivalent_where_the_data_do_not_decide():
 def test_a_special_case_is_equivalent_but_for_a_small_share_of_what_it_leaves_or_of_the_mismatch(
     left, floor, same
 ):
-    richer = supposed("stribeck", predicted(0.1, 100.0))
+    richer = supposed("stribeck", predicted(0.1, 200.0))
     plain = supposed("friction", predicted(left, 50.0), richer={"friction": ("stribeck",)})
     other = replace(plain, richer={})
     maps = {"velocity": predicted(floor, 0.0)}
     assert equivalent(plain, richer, contest(NOMINAL, plain, richer, maps=maps)) == same
     assert not equivalent(other, richer, contest(NOMINAL, other, richer, maps=maps))
+
+
+def test_a_richer_law_that_is_not_told_apart_by_far_does_not_replace_the_one_that_it_contains():
+    for gain, same in ((0.5 * APART, True), (2.0 * APART, False)):
+        richer = supposed("stribeck", predicted(0.1, 50.0 + gain))
+        plain = supposed("friction", predicted(0.2, 50.0), richer={"friction": ("stribeck",)})
+        assert equivalent(plain, richer, contest(NOMINAL, plain, richer)) == same
 
 
 def test_where_the_simplest_of_several_that_predict_alike_is_refused_another_is_granted():

@@ -58,6 +58,8 @@ STEEPNESS = 1.5
 # predicts worse: half at `ALIKE`, rising with its power `SHARPNESS` (fitted to the same cases)
 ALIKE = 5.0
 SHARPNESS = 0.5
+# that log density where the chance is `STATED`: a richer law is named in the place of one that it contains from there on
+APART = ALIKE * (STATED / (1.0 - STATED)) ** (1.0 / SHARPNESS)
 # effect that the records would not show, as a share of what was measured, from which they decide nothing: as large as what
 # the refitted model of a machine may leave and still be called identified
 BLIND = 0.2

@@ -41,8 +41,8 @@ def told_apart(margin: float) -> float:
 
 
 def margin_over_others(label: str, contest: Contest, selection: Selection) -> float:
-    """By how much log density the chosen hypothesis predicts better than the best one with no more effects that has neither the
-    effect of this label, nor one that is equivalent to it, contains it or is a special case of it: nested laws are always near."""
+    """By how much log density the chosen hypothesis, or one with a richer law in its place, predicts better than the best one with
+    no more effects that has neither the effect of this label, nor one that is equivalent to it, contains it or is a special case of it: nested laws are always near."""
     chosen = selection.chosen
     name = dict(zip(chosen.elements, chosen.names))[label]
     accepted = {name, *chosen.richer.get(name, ())}
@@ -55,7 +55,12 @@ def margin_over_others(label: str, contest: Contest, selection: Selection) -> fl
         and (selection.sound(one) or not one.elements)
         and not equivalent(one, chosen, contest)
     ]
-    return chosen.prediction.score - max(others, default=-math.inf)
+    own = [
+        one.prediction.score
+        for one in contest.hypotheses
+        if len(one.elements) == len(chosen.elements) and accepted & set(one.names)
+    ]
+    return max(own) - max(others, default=-math.inf)
 
 
 def joint_probability(

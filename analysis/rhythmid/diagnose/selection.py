@@ -8,7 +8,7 @@ where no row of the table of rejections speaks against the best of them.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rhythmid.diagnose.constants import MISMATCH, REST
+from rhythmid.diagnose.constants import APART, MISMATCH, REST
 from rhythmid.diagnose.evidence import weight_for
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.rejections import Claim, Rejection, decisive, rejections_of
@@ -129,8 +129,9 @@ def special_case(first: Hypothesis, second: Hypothesis) -> bool:
 
 def equivalent(other: Hypothesis, best: Hypothesis, contest: Contest) -> bool:
     """Whether another hypothesis predicts as well as the better one: the data do not decide, or the better one is a richer law
-    that removes but a small share of what the other leaves or of the whole mismatch."""
-    if weight_for(best.prediction, other.prediction) <= decisive(1):
+    that is not told apart by far, or that removes but a small share of what the other leaves or of the whole mismatch."""
+    gain = weight_for(best.prediction, other.prediction)
+    if gain <= (APART if special_case(other, best) else decisive(1)):
         return True
     left = other.prediction.mean_square - contest.floor
     whole = contest.nominal.prediction.mean_square - contest.floor
