@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rhythmid import mujoco
     from rhythmid.batch.batch import Batch, batch
     from rhythmid.compare.compare import Comparison, compare
     from rhythmid.design.designer import Design, design
@@ -44,6 +45,7 @@ __all__ = [
     "identify",
     "load",
     "load_catalogue",
+    "mujoco",
     "paper_hopper",
     "simulate",
 ]
@@ -71,7 +73,8 @@ _PACKAGES = (
     "design",
     "diagnose",
     "identify",
-)  # that can be called: see callable_package.py
+    "mujoco",
+)  # all but the last can be called: see callable_package.py
 
 
 def __getattr__(name: str) -> Any:

@@ -27,7 +27,14 @@ app = typer.Typer(
 )
 COMMAND_GROUP = "rhythmid.commands"
 SEVERAL = ("--holdout", "--elements")  # options that may be followed by several values
-PARTS = ("begin", "examples", "machines", "options", "terminal")  # modules of `commands` that are no command
+PARTS = (
+    "begin",
+    "examples",
+    "joint_design",
+    "machines",
+    "options",
+    "terminal",
+)  # modules of `commands` that are no command
 
 
 def _version(show: bool) -> None:

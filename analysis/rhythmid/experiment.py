@@ -271,7 +271,8 @@ def _settled(word: str) -> str:
     return word
 
 
-def _of_topic(namespace: str) -> str:
+def of_topic(namespace: str) -> str:
+    """A namespace that topics may have; ValueError for any other."""
     if not re.fullmatch(r"(/[A-Za-z_]\w*)+", namespace, re.ASCII):
         raise ValueError(f"{namespace!r} is no namespace; write one like /hopper or /lab/hopper")
     return namespace
@@ -320,7 +321,7 @@ class _Document:
     ] = "limit_cycle"
     safety: Safety = Safety()
     record: Recording = Recording()
-    namespace: Annotated[str, AfterValidator(_of_topic)] = "/hopper"
+    namespace: Annotated[str, AfterValidator(of_topic)] = "/hopper"
     joint: str = "leg"
     elements: tuple[Path, ...] = ()
 

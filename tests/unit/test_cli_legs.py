@@ -1,6 +1,8 @@
 """The commands for machines of several joints, from simulation to diagnosis."""
 
 import json
+import subprocess
+import sys
 from importlib.resources import files
 from pathlib import Path
 
@@ -47,7 +49,7 @@ def test_friction_that_was_concealed_in_a_knee_is_named_there(bags: Path):
     model, better = str(bags / "leg.yaml"), bags / "better.yaml"
     printed = called(
         "diagnose", str(bags / "rough"), "--model", model, "--signals", str(bags / "signals.yaml"), "--json", str(answer),
-        "--save-model", str(better),
+        "--save-model", str(better), "--report", str(bags / "report.html"),
     )  # fmt: skip
     found = json.loads(answer.read_text())
     assert found["verdict"] == "missing_physics"
@@ -58,6 +60,10 @@ def test_friction_that_was_concealed_in_a_knee_is_named_there(bags: Path):
     assert friction["parameters"]["force"]["value"] == pytest.approx(0.3, abs=0.02)
     assert friction["probability"] > 0.8 and friction["heldout_gain"] > 0.02
     assert found["joints"]["hip"]["verdict"] == "consistent"
+    page = (bags / "report.html").read_text()
+    assert "Missing physics: coulomb friction at knee" in page
+    assert page.count('class="slot faulty"') == 1 and "Parameters at knee" in page
+    assert "Effort at knee over time" in page and "hip: consistent" in page
     assert "knee" in printed and "coulomb_friction" in better.read_text()
 
 
@@ -86,13 +92,28 @@ def test_a_leg_is_answered_in_a_batch_as_alone(bags: Path):
     assert "knee: coulomb friction" in (bags / "batch" / "answers" / f"{task.file}.html").read_text()
 
 
+def test_an_exported_leg_in_a_loop_of_mujocos_own_is_nearer_to_the_recording_with_its_paths_applied(
+    bags: Path,
+):
+    for name, model in (("before", "leg.yaml"), ("after", "rough.yaml")):
+        called("export", str(bags / model), "--to", "mujoco", "--out", str(bags / f"{name}.xml"))
+    arguments = [
+        *(str(bags / name) for name in ("before.xml", "after.xml", "rough")),
+        str(bags / "signals.yaml"),
+    ]
+    script = Path(__file__).parents[2] / "docs" / "examples" / "mujoco_loop.py"
+    printed = subprocess.run([sys.executable, script, *arguments], capture_output=True, text=True, check=True)
+    errors = {line.split(":")[0]: float(line.split()[2]) for line in printed.stdout.splitlines()}
+    assert errors["after, knee"] < 0.3 * errors["before, knee"] and errors["before, knee"] > 0.5
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (["diagnose", "{bag}", "--model", "{leg}"], "needs --signals"),
         (
-            ["diagnose", "{bag}", "--model", "{leg}", "--signals", SIGNALS, "--report", "x.html"],
-            "--report is not made",
+            ["diagnose", "{bag}", "--model", "{leg}", "--signals", SIGNALS, "--sim", "{bag}"],
+            "--sim is not made",
         ),
         (
             ["diagnose", "{bag}", "--model", "{floating}", "--signals", "{signals}"],
@@ -102,6 +123,8 @@ def test_a_leg_is_answered_in_a_batch_as_alone(bags: Path):
             ["identify", "{bag}", "--model", "{other}", "--signals", "{signals}"],
             "the joint 'leg' is not recorded",
         ),
+        (["export", "{leg}", "--to", "sdf", "--out", "{new}"], "is written as mujoco or urdf"),
+        (["export", "{leg}", "--to", "urdf", "--out", "{new}"], "a file that ends in .urdf"),
         (["simulate", "{leg}", "--experiment", "{wrong}", "--out", "{new}"], "the joint 'ankle' has no path"),
     ],
 )

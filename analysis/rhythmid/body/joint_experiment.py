@@ -1,37 +1,47 @@
 """An experiment with a machine of several joints, and its run without ROS.
 
+model: leg.yaml                  # for `rhythmid run`; `rhythmid simulate` names it
 duration: 20                     # s
 rate: 500                        # Hz, of commands and measurements
 seed: 0
 namespace: /leg
-start: {rail: 0.42}              # positions of joints; the others begin at the reference pose
+start: {rail: 0.42}              # positions of joints; the driven ones begin where their excitation does
+orthogonal: true                 # the joints' multisines share the lines out among them
 excitation:                      # by joint: a reference where a controller is in the path, else a force
   hip:  {offset: 0.6, limits: [-0.5, 1.5], type: multisine, …}
   knee: {offset: -1.2}           # held
+time: {mode: lockstep}           # of `rhythmid run`, with window and layout as in an experiment of one axis
+safety: {ramp: 0.5, command_timeout: 0.1, joints: {knee: {envelope: [-2.4, -0.3], max_speed: 15}}}
+record: {path: bag}
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, TypeAdapter
+from pydantic import AfterValidator, ConfigDict, TypeAdapter
 from pydantic import Field as Limits
 
 from rhythmid.body.machine import Machine
-from rhythmid.body.simulate import simulate
 from rhythmid.document import Node, read
 from rhythmid.errors import InputError
 from rhythmid.excitation.excitation import Excitation
 from rhythmid.excitation.sequence import build
-from rhythmid.simulation.signal import zero_order_hold
+from rhythmid.experiment import NodeSpec, of_topic
+from rhythmid.settings import Delay, TimeMode
 from rhythmid.validation import Number, Range, Whole, validated
+
+if TYPE_CHECKING:
+    from rhythmid.body.joint_plant import JointPlant
 
 Array = NDArray[np.float64]
 LONGEST = 10_000_000  # samples of a run
+AT_ONCE = 10_000  # samples of a run that are simulated together
+TOPICS = ("command", "joint_states")
 
 
 @dataclass(frozen=True)
@@ -42,11 +52,47 @@ class JointExcitation:
     limits: tuple[float, float] = (-math.inf, math.inf)
     excitation: Excitation | None = None
 
-    def __call__(self, time: Array) -> Array:
+    def __call__(self, time: Array, share: Array | float = 1.0) -> Array:
+        """Commands at times (n,) [s], with a share of the excitation."""
         value = np.full(len(time), self.offset)
         if self.excitation is not None:
-            value = value + self.excitation(time)
+            value = value + share * self.excitation(time)
         return np.clip(value, *self.limits)
+
+
+@dataclass(frozen=True)
+class JointWatch:
+    """What a joint's measurements must keep to in real time: a range of positions and a speed."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    envelope: Range = (-math.inf, math.inf)
+    max_speed: Annotated[float, Limits(ge=0)] = math.inf
+
+
+@dataclass(frozen=True)
+class JointSafety:
+    """Limits of a run: as of one axis, see `rhythmid.settings.Safety`, with those of a joint by its name.
+
+    Commands never leave the `limits` of a joint's excitation. A reference that nobody renews is held; a force fades to zero.
+    """
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    ramp: Annotated[Number, Limits(ge=0)] = 0.0
+    stale_after: Annotated[Number, Limits(ge=1e-3)] = 0.5
+    frozen_after: Annotated[Number, Limits(ge=0)] = 0.0
+    max_gap: Annotated[Number, Limits(ge=0)] = 0.0
+    command_timeout: Annotated[Number, Limits(ge=0)] = 0.1
+    joints: dict[str, JointWatch] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class JointRecording:
+    """Where and how a run is recorded."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    path: Path = Path("bag")
+    storage: Literal["mcap", "sqlite3"] = "mcap"
+    topics: tuple[str, ...] = (*TOPICS, "run")
 
 
 @dataclass(frozen=True)
@@ -59,11 +105,64 @@ class JointExperiment:
     start: Mapping[str, float] = field(default_factory=dict)
     seed: int = 0
     namespace: str = "/machine"
+    model: Path | None = None
+    time: TimeMode = TimeMode()
+    safety: JointSafety = JointSafety()
+    record: JointRecording = JointRecording()
+    path: Path = Path("experiment.yaml")
 
     @classmethod
     def load(cls, path: str | Path) -> "JointExperiment":
         """The experiment in a YAML file. Raises InputError naming the line and key of what is wrong."""
-        return _experiment(read(path), Path(path).resolve().parent)
+        return _experiment(read(path), Path(path).resolve())
+
+    input_delay = measurement_delay = Delay()  # none by nodes: the joints' paths have theirs
+
+    def with_record(self, **changes: Any) -> "JointExperiment":
+        """A copy that records otherwise."""
+        return replace(self, record=replace(self.record, **changes))
+
+    def nodes(self) -> list[NodeSpec]:
+        """The graph of this experiment: excitation, plant, recorder. Raises InputError where it names no model."""
+        from rhythmid.body.joint_graph import joint_nodes
+
+        return joint_nodes(self)
+
+    @property
+    def count(self) -> int:
+        """Number of samples of every topic. Raises InputError where these are too few or too many."""
+        count = round(self.duration * self.rate)
+        if not 1 < count <= LONGEST:
+            raise InputError(f"a run has 2 to {LONGEST} samples, not {count}")
+        return count
+
+    @property
+    def period_ns(self) -> int:
+        """Sample period [ns]."""
+        return round(1e9 / self.rate)
+
+    def asked(self, machine: Machine) -> Array:
+        """Commands (n, joints), in the order of the machine's joints, faded in and out about the offsets. Raises InputError for a joint
+        that has no path."""
+        for joint in self.excitation:
+            if joint not in machine.joints:
+                raise InputError(
+                    f"excitation: the joint {joint!r} has no path; the model's are {', '.join(machine.joints)}"
+                )
+        time = np.arange(self.count, dtype=np.int64) * self.period_ns * np.float64(1e-9)
+        end, ramp = self.count * self.period_ns * 1e-9, self.safety.ramp
+        share = np.clip(np.minimum(time, end - time) / ramp, 0.0, 1.0) if ramp > 0.0 else 1.0
+        return np.column_stack(
+            [self.excitation.get(joint, JointExcitation())(time, share) for joint in machine.joints]
+        )
+
+    def plant(self, machine: Machine) -> "JointPlant":
+        """The machine at the experiment's start."""
+        from rhythmid.body.joint_plant import JointPlant  # the compiler behind it is slow to load
+
+        first = dict(zip(machine.joints, self.asked(machine)[0].tolist()))
+        driven = {joint: value for joint, value in first.items() if machine.controlled(joint)}
+        return JointPlant(machine, self.period_ns, self.seed, {**driven, **self.start})
 
 
 @dataclass(frozen=True)
@@ -75,34 +174,28 @@ class JointMessages:
 
 
 def perform(machine: Machine, experiment: JointExperiment) -> JointMessages:
-    """Run an experiment. Raises InputError for a joint that has no path, a run that is too long or that diverges."""
-    for joint in experiment.excitation:
-        if joint not in machine.joints:
-            raise InputError(
-                f"excitation: the joint {joint!r} has no path; the model's are {', '.join(machine.joints)}"
-            )
-    count = round(experiment.duration * experiment.rate)
-    if not 1 < count <= LONGEST:
-        raise InputError(f"a run has 2 to {LONGEST} samples, not {count}")
-    stamps = np.round(np.arange(count) * 1e9 / experiment.rate).astype(np.int64)
-    time = (stamps * 1e-9).astype(np.float64)
-    asked = {joint: experiment.excitation.get(joint, JointExcitation())(time) for joint in machine.joints}
-    command = {joint: zero_order_hold(time, values) for joint, values in asked.items()}
-    start = {**{joint: float(values[0]) for joint, values in asked.items()}, **experiment.start}
-    run = simulate(machine, time, command, start=start, seed=experiment.seed)
-    whole = np.column_stack([asked[joint] for joint in machine.joints])
-    states: dict[str, Array] = {"position": run.output, "velocity": run.velocity, "effort": run.effort}
-    joints = machine.joints
-    if (base := machine.body.joints.get(machine.body.base)) is not None:
-        joints = (*joints, base.name)
-        further = run.pose[:, base.position], run.rate[:, base.velocity], np.zeros(count)
-        states = {name: np.column_stack([one, more]) for (name, one), more in zip(states.items(), further)}
-    controlled = any(t.element.acts == "feedback" for model in machine.paths.values() for t in model.terms)
+    """Run an experiment: what the graph's run in lockstep carries, sample by sample and stamp by stamp.
+
+    Raises InputError for a joint that has no path, a run that is too long or that diverges.
+    """
+    asked, plant = experiment.asked(machine), experiment.plant(machine)
+    stamps = np.arange(experiment.count, dtype=np.int64) * experiment.period_ns
+    parts: list[dict[str, Array]] = []
+    for first in range(0, len(stamps), AT_ONCE):
+        chosen = slice(first, first + AT_ONCE)
+        plant.push_many(stamps[chosen], asked[chosen])
+        parts.append(plant.states(int(stamps[chosen][-1]))[1])
+    states = {name: np.vstack([part[name] for part in parts]) for name in parts[0]}
     topics = {
-        f"{experiment.namespace}/command": (machine.joints, {"position" if controlled else "effort": whole}),
-        f"{experiment.namespace}/joint_states": (joints, states),
+        f"{experiment.namespace}/command": (machine.joints, {command_field(machine): asked}),
+        f"{experiment.namespace}/joint_states": (plant.measured, states),
     }
     return JointMessages(stamps, topics)
+
+
+def command_field(machine: Machine) -> str:
+    """The field of a command's message: references are positions, forces efforts."""
+    return "position" if any(machine.controlled(joint) for joint in machine.joints) else "effort"
 
 
 @dataclass(frozen=True)
@@ -114,39 +207,68 @@ class _Excitation:
 
 
 @dataclass(frozen=True)
+class _Time:
+    """How a run goes, as it is written."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    mode: Literal["lockstep", "realtime"] = "lockstep"
+    window: Annotated[Whole, Limits(ge=1, le=100)] = 100
+    layout: Literal["composed", "processes"] = "composed"
+
+
+@dataclass(frozen=True)
 class _Experiment:
     """An experiment as it is written."""
 
     __pydantic_config__ = ConfigDict(extra="forbid")
     duration: Annotated[Number, Limits(ge=1e-6, le=1e6)]
     excitation: dict[str, dict[str, Any]]
+    model: str | None = None
     rate: Annotated[Number, Limits(ge=1.0, le=1e5)] = 1000.0
     start: dict[str, Number] = field(default_factory=dict)
     seed: Annotated[Whole, Limits(ge=0, le=2**31 - 1)] = 0
-    namespace: str = "/machine"
+    namespace: Annotated[str, AfterValidator(of_topic)] = "/machine"
+    orthogonal: bool = False
+    time: _Time = _Time()
+    safety: JointSafety = JointSafety()
+    record: JointRecording = JointRecording()
 
 
 _WRITTEN: TypeAdapter[_Experiment] = TypeAdapter(_Experiment)
 _ABOUT: TypeAdapter[_Excitation] = TypeAdapter(_Excitation)
 
 
-def _experiment(document: Node, folder: Path) -> JointExperiment:
+def _experiment(document: Node, path: Path) -> JointExperiment:
     given = validated(document, _WRITTEN)
+    entries = document.at("excitation").mapping()
+    shared = [j for j, node in entries.items() if given.orthogonal and _kind(node) == "multisine"]
     excitation = {
-        joint: _excitation(node, folder) for joint, node in document.at("excitation").mapping().items()
+        joint: _excitation(node, path.parent, (shared.index(joint), len(shared)) if joint in shared else None)
+        for joint, node in entries.items()
     }
-    name = "/" + given.namespace.strip("/")
-    return JointExperiment(given.duration, given.rate, excitation, given.start, given.seed, name)
+    model = None if given.model is None else path.parent / given.model
+    if model is not None and not model.is_file():
+        document.at("model").fail(f"no such file: {model}")
+    time = TimeMode(given.time.mode, round(given.rate), given.time.window, given.time.layout)
+    return JointExperiment(
+        given.duration, given.rate, excitation, given.start, given.seed, given.namespace, model, time, given.safety,
+        given.record, path,
+    )  # fmt: skip
 
 
-def _excitation(node: Node, folder: Path) -> JointExcitation:
+def _kind(node: Node) -> Any:
+    return node.mapping().get("type", replace(node, value=None)).value
+
+
+def _excitation(node: Node, folder: Path, part: tuple[int, int] | None) -> JointExcitation:
     keys = node.mapping()
     own = {name: one for name, one in keys.items() if name in ("offset", "limits")}
     about = validated(replace(node, value=own), _ABOUT)
-    spec = {name: one for name, one in keys.items() if name not in own}
-    if not spec:
+    plain = {name: one.plain for name, one in keys.items() if name not in own}
+    if not plain:
         return JointExcitation(about.offset, about.limits)
-    plain = {name: one.plain for name, one in spec.items()}
+    if part is not None:
+        plain = {"part": list(part), **plain}
     try:
         return JointExcitation(about.offset, about.limits, build(plain, folder))
     except InputError as error:

@@ -5,6 +5,7 @@ from pathlib import Path
 import llvmlite.binding
 import mujoco
 from numba import njit, types
+from numba.extending import intrinsic
 
 
 def _library() -> Path:
@@ -16,6 +17,17 @@ llvmlite.binding.load_library_permanently(str(_library()))
 _ON_MODEL_AND_DATA = types.void(types.intp, types.intp)
 mj_step = types.ExternalFunction("mj_step", _ON_MODEL_AND_DATA)
 mj_inverse = types.ExternalFunction("mj_inverse", _ON_MODEL_AND_DATA)
+
+
+@intrinsic
+def numbers_at(_, address):
+    """The pointer to float64 numbers at an address."""
+    signature = types.CPointer(types.float64)(address)
+
+    def made(context, builder, one, arguments):
+        return builder.inttoptr(arguments[0], context.get_value_type(one.return_type))
+
+    return signature, made
 
 
 @njit(

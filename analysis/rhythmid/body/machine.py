@@ -70,6 +70,10 @@ class Machine:
         """The joints that have a path, in the file's order."""
         return tuple(self.paths)
 
+    def controlled(self, joint: str) -> bool:
+        """Whether a joint's command is a position reference for a controller in its path."""
+        return any(term.element.name == "position_control" for term in self.paths[joint].terms)
+
     @cached_property
     def parameters(self) -> dict[str, Value]:
         """All parameters: "joint.element.parameter", and "body.link.mass" and "body.joint.armature" of those that the file
@@ -194,6 +198,7 @@ def _machine(document: Node, folder: Path, catalogue: Catalogue) -> Machine:
             node.fail(f"{body.path.name} has no such joint; it has {', '.join(body.joints)}")
         if name == body.base:
             node.fail("is the joint of the base, which nothing drives; leave it out here")
+    body = body.with_losses(name for name in body.joints if name not in given)
     free = keys[BODY].mapping().get("free")
     inertial = {} if free is None else _free(free, body)
     changed = {n: v.value for n, v in inertial.items() if v.value != body.parameters[n]}

@@ -4,7 +4,7 @@ E. Todorov, T. Erez, Y. Tassa, MuJoCo: a physics engine for model-based control,
 """
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -86,6 +86,14 @@ class MujocoBody(Body):
         off = off if contacts else off | mj.mjtDisableBit.mjDSBL_CONTACT
         model.opt.disableflags |= int(off)
         return cls(path, model, joints, float(model.opt.timestep), base, contacts, passive)
+
+    def with_losses(self, joints: Iterable[str]) -> "MujocoBody":
+        """A copy in which these joints, which have no path, lose again what the file says: a rail on which the base slides."""
+        model = copy.copy(self.model)
+        for name in joints:
+            dof, known = self.joints[name].velocity, self.passive[name]
+            model.dof_damping[dof], model.dof_frictionloss[dof] = known.damping, known.friction
+        return replace(self, model=model)
 
     def worker(self) -> tuple[Any, Any]:
         """A model and the data of a run, for one thread."""
@@ -172,7 +180,7 @@ class MujocoBody(Body):
     ) -> Array:
         """Forces (n, nv) for one link of this mass, principal moments of inertia, centre and axes, the others without any."""
         model, data = self.worker()
-        for one in (model.body_mass, model.body_inertia, model.jnt_stiffness):
+        for one in (model.body_mass, model.body_inertia, model.jnt_stiffness, model.dof_damping):
             one[:] = 0.0
         model.dof_armature[:] = 1.0  # MuJoCo factors the inertia matrix in any case
         model.body_mass[link], model.body_inertia[link] = mass, inertia

@@ -7,10 +7,14 @@ from numba import njit
 
 @njit("float64(float64[:, ::1], int64, int64, float64)", cache=True, error_model="numpy")
 def earlier(past, column, now, steps):
-    """Value `steps` before row `now` of a column, between rows on a straight line; before the first row it was as there."""
+    """Value `steps` before step `now` of a column, between steps on a straight line; before the first it was as there.
+
+    The rows go round: row k % n holds step k, so that n - 1 steps back are known.
+    """
     at = max(now - max(steps, 0.0), 0.0)
-    row = math.floor(at)
-    if row >= now:
-        return past[now, column]
-    share = at - row
-    return past[row, column] + share * (past[row + 1, column] - past[row, column])
+    step, rows = math.floor(at), past.shape[0]
+    if step >= now:
+        return past[now % rows, column]
+    share = at - step
+    before, after = past[step % rows, column], past[(step + 1) % rows, column]
+    return before + share * (after - before)

@@ -1,18 +1,21 @@
 """Runs of a machine of several joints."""
 
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline, PPoly
+from scipy.interpolate import PPoly
 
-from rhythmid.body.body import Array
+from rhythmid.body.body import Array, Joint
+from rhythmid.body.held_means import held_means
 from rhythmid.body.machine import Machine
-from rhythmid.body.stepping_source import COLUMNS, Layout, generate
+from rhythmid.body.path_source import COLUMNS, Layout
+from rhythmid.body.samples import sample_columns, sample_joints
+from rhythmid.body.stepping_source import generate
 from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.simulation.machine_code import load_run
@@ -98,16 +101,11 @@ def means(signal: PPoly | None, begin: float, step: float, count: int) -> Array:
     if signal is None:
         return np.zeros(count)
     edges = begin + step * np.arange(count + 1)
-    first = float(signal.x[0])
-    if (
-        signal.x[-1] > FAR / 2
-    ):  # held: its knots' impulse, whose antiderivative has no use for a last piece without an end
-        knots, level = signal.x[:-1], signal.c[-1]
-        impulse = np.concatenate([[0.0], np.cumsum(level[:-1] * np.diff(knots))])
-        piece = np.clip(np.searchsorted(knots, edges, side="right") - 1, 0, len(level) - 1)
-        total = np.where(edges < first, 0.0, impulse[piece] + level[piece] * (edges - knots[piece]))
-        return np.diff(total) / step
-    last = float(signal.x[-1])
+    if signal.x[-1] > FAR / 2:
+        found = np.empty((count, 1))
+        held_means(signal.x[:-1, None], signal.c[-1][:, None], edges, np.zeros(1), found)
+        return found[:, 0]
+    first, last = float(signal.x[0]), float(signal.x[-1])
     inside = np.clip(edges, first, last)
     total = signal.antiderivative()(inside) + (edges - inside) * signal(inside)
     return np.diff(total) / step
@@ -140,27 +138,51 @@ def simulate(
         raise InputError("simulation times must increase")
     physical = {joint: physical_times(model, times) for joint, model in machine.paths.items()}
     step = machine.body.step
-    begin = min(float(times[0]), *(float(one[0]) for one in physical.values()))
+    begin = begin_of(float(times[0]), min(float(one[0]) for one in physical.values()), step)
     count = math.ceil((float(times[-1]) - begin) / step - 1e-6) + 2
-    grid, rows = run_steps(machine, begin, count, command, forcing, start, worker)
+    _, rows = run_steps(machine, begin, count, command, forcing, start, worker)
+    noise = [
+        [] if seed is None else samplers(model, seed + place)
+        for place, model in enumerate(machine.paths.values())
+    ]
+    return sampled(machine, times, np.column_stack(list(physical.values())), rows, 0, begin, noise)
+
+
+def begin_of(first: float, earliest: float, step: float) -> float:
+    """Where a run begins [s]: whole steps before its first stamp, when the oldest of the first measurements is taken or before."""
+    return first - step * max(math.ceil((first - earliest) / step - 1e-6), 0)
+
+
+def sampled(
+    machine: Machine,
+    times: Array,
+    physical: Array,
+    rows: Array,
+    first: int,
+    begin: float,
+    noise: Sequence[list],
+) -> JointTrajectory:
+    """What is measured at stamps `times` (n,) of a run that begins at `begin` [s].
+
+    `physical` (n, joints) tells when the measurements were taken, `rows` are of the steps from the number `first` on, and `noise` has for
+    each joint what happens to samples.
+    """
     names, nq = machine.joints, machine.body.model.nq
-    width = len(COLUMNS)
-    made = {column: np.empty((len(times), len(names))) for column in COLUMNS}
+    made = np.empty((len(COLUMNS), len(times), len(names)))
+    rows, step = np.ascontiguousarray(rows), machine.body.step
+    sample_joints(rows, first, begin, step, np.ascontiguousarray(physical), made)
+    position, velocity, output, effort = made
     for place, joint in enumerate(names):
-        x, v, y, f = (rows[:, width * place + i] for i in range(width))
-        at = physical[joint]
-        made["position"][:, place] = CubicHermiteSpline(grid, x, v)(at)
-        made["velocity"][:, place] = np.interp(at, grid, v)
-        made["effort"][:, place] = np.interp(at, grid, f)
-        sensed = any(t.element.slot == "sensor" and t.element.kernel for t in machine.paths[joint].terms)
-        output = np.interp(at, grid, y) if sensed else made["position"][:, place]
-        if seed is not None:
-            for sample in samplers(machine.paths[joint], seed + place):
-                output = sample(times, output)
-        made["output"][:, place] = output
-    rest = rows[:, width * len(names) :]
-    whole = np.column_stack([np.interp(times, grid, column) for column in rest.T])
-    return JointTrajectory(times, names, **made, pose=whole[:, :nq], rate=whole[:, nq:])
+        if not any(t.element.slot == "sensor" and t.element.kernel for t in machine.paths[joint].terms):
+            output[:, place] = position[:, place]
+        for sample in noise[place]:
+            output[:, place] = sample(times, output[:, place].copy())
+    width = len(COLUMNS) * len(names)
+    whole = np.empty((len(times), rows.shape[1] - width))
+    sample_columns(rows, width, first, begin, step, times, whole)
+    return JointTrajectory(
+        times, names, position, velocity, effort, output, pose=whole[:, :nq], rate=whole[:, nq:]
+    )
 
 
 def run_steps(
@@ -196,18 +218,18 @@ def run_steps(
     done = stepping.run(
         model._address, data._address, data.qpos, data.qvel, data.qfrc_applied, model.dof_damping,
         np.array([one.position for one in places]), np.array([one.velocity for one in places]), begin, step,
-        commands, forcings, vector_of(machine, stepping.layout),
-        start_states(machine, stepping.layout, pose, rate, commands[0], forcings[0]),
-        np.empty((count, stepping.layout.pasts)), out,
+        commands, forcings, vector_of(machine.paths, stepping.layout),
+        start_states(machine.paths, machine.body.joints, stepping.layout, pose, rate, commands[0], forcings[0]),
+        np.empty((count, stepping.layout.pasts)), out, 0, False,
     )  # fmt: skip
     if done < count:
         raise InputError(f"the simulation diverges at t = {begin + done * step:.4g} s; check the parameters")
     return begin + step * np.arange(count, dtype=np.float64), out
 
 
-def vector_of(machine: Machine, layout: Layout) -> Array:
-    """Parameter vector of a machine with this structure."""
-    known = {joint: model.parameters for joint, model in machine.paths.items()}
+def vector_of(paths: Mapping[str, Model], layout: Layout) -> Array:
+    """Parameter vector of paths with this structure."""
+    known = {joint: model.parameters for joint, model in paths.items()}
     return np.array(
         [
             known[joint][name].value if name in known[joint] else default
@@ -218,12 +240,18 @@ def vector_of(machine: Machine, layout: Layout) -> Array:
 
 
 def start_states(
-    machine: Machine, layout: Layout, pose: Array, rate: Array, command: NDArray, forcing: NDArray
+    paths: Mapping[str, Model],
+    joints: Mapping[str, Joint],
+    layout: Layout,
+    pose: Array,
+    rate: Array,
+    command: NDArray,
+    forcing: NDArray,
 ) -> Array:
     """The elements' own states at the start, as they would be there after a while."""
     found: dict[tuple[str, str], float] = {}
-    for place, (joint, model) in enumerate(machine.paths.items()):
-        own = machine.body.joints[joint]
+    for place, (joint, model) in enumerate(paths.items()):
+        own = joints[joint]
         x, v = float(pose[own.position]), float(rate[own.velocity])
         asked = float(command[place])
         for term in model.terms:

@@ -1,166 +1,21 @@
-"""The loop of a machine of several joints as source text: element kernels around MuJoCo's step.
+"""The loop of a machine of several joints as source text: the joints' paths around MuJoCo's step.
 
-At the begin of a step every joint's path gives a force along it, which the step holds. Damping and friction, forces F(x, v) that
-oppose the motion, are coupled by their secant: with D = (F(x, 0) - F(x, v)) / v >= 0 the step takes F(x, 0) as force and D as the
-joint's damping, which MuJoCo integrates implicitly in the new velocity. So they stay stable however strong they are. Elements with
-states take one explicit step with their rates at its begin.
+A run may go on where another ended: `first` is the number of its first step, and `states` and `past` are left as they are at the
+end. With `peek` the last row tells what is at its time, and the step from there is left to the next run.
 """
 
-from dataclasses import dataclass, field
-
-from rhythmid.elements.element import ELAPSED, STEP
-from rhythmid.errors import InputError
-from rhythmid.model import INERTIA, Model, Term
-from rhythmid.simulation.kernel_source import kernel_module
+from rhythmid.body.path_source import COLUMNS, Layout, written
+from rhythmid.model import Model
 from rhythmid.simulation.machine_code import Module
 
-REST = 1e-9  # [rad/s or m/s] below which the secant is taken at this speed
 # [rad/s or m/s] beyond which a run has diverged: no joint turns at 100 000 revolutions a minute
 FASTEST = 1e4
 STRONGEST = 1e7  # [N or N*m] along a joint, the same: MuJoCo is not asked to go on
-COLUMNS = ("position", "velocity", "output", "effort")  # of each joint in a row of the result
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Where everything stands: `parameters[i]` is (joint, name, value where the path lacks it) of the parameter vector's entry i;
-    `states` are (joint, "element.state"); `pasts` signals whose past is kept."""
-
-    parameters: tuple[tuple[str, str, float | None], ...]
-    states: tuple[tuple[str, str], ...]
-    pasts: int
-
-
-@dataclass
-class _Writer:
-    """Collects parameters, states and lines while walking along the joints' paths."""
-
-    parameters: dict[tuple[str, str], float | None] = field(default_factory=dict)
-    states: list[tuple[str, str]] = field(default_factory=list)
-    memories: set[int] = field(default_factory=set)
-    lines: list[str] = field(default_factory=list)
-    pasts: int = 0
-    joint: str = ""
-
-    def parameter(self, name: str, default: float | None = None) -> str:
-        if name in (STEP, ELAPSED):  # a memory has had a whole step since it was last asked
-            return "h"
-        known = self.parameters.setdefault((self.joint, name), default)
-        if known is None or default is None:
-            self.parameters[self.joint, name] = None
-        return f"p{list(self.parameters).index((self.joint, name))}"
-
-    def call(self, term: Term, arguments: list[str], result: str) -> None:
-        """Evaluate an element at the begin of the step; its states' rates are kept for the end."""
-        element = term.element
-        values = [self.parameter(f"{term.label}.{one.name}") for one in element.parameters]
-        values += [self.parameter(source, default) for source, default in element.borrows.values()]
-        first = len(self.states)
-        for state in element.own:
-            if state in element.memories:
-                self.memories.add(len(self.states))
-            self.states.append((self.joint, f"{term.label}.{state}"))
-        own = [f"s{first + i}" for i in range(len(element.own))]
-        rates = [f"d{first + i}" for i in range(len(element.own))]
-        past = [
-            self.past(term, value)
-            for name, value in zip(element.leading, arguments)
-            if name in element.history
-        ]
-        call = f"{element.name}({', '.join([*arguments, *values, *own, *past])})"
-        self.lines.append(f"{', '.join([result, *rates])} = {call}")
-
-    def past(self, term: Term, value: str) -> str:
-        """What a signal was before the element's dead time, between the steps on a straight line."""
-        delay = self.parameter(f"{term.label}.{term.element.dead_time}")
-        m, self.pasts = self.pasts, self.pasts + 1
-        self.lines += [f"past[k, {m}] = {value}", f"past{m} = earlier(past, {m}, k, {delay} / h)"]
-        return f"past{m}"
-
-
-def _joint(writer: _Writer, number: int, joint: str, model: Model) -> None:
-    """Lines for one joint: from its command to the force and the damping that the body is given."""
-    writer.joint = joint
-    kernels = [term for term in model.terms if term.element.kernel is not None]
-    lines = writer.lines
-    lines += [f"x = qpos[at_position[{number}]]", f"v = qvel[at_velocity[{number}]]"]
-    lines.append(f"f = command[k, {number}]")
-    seen = ["x", "v"]
-    command = [term for term in kernels if term.element.slot == "command"]
-    for term in (one for one in command if one.element.acts == "observation"):
-        writer.call(term, [*seen, "t"], "seen, speed")
-        seen = ["seen", "speed"]
-    command = [one for one in command if one.element.acts != "observation"]
-    for term in sorted(command, key=lambda one: one.element.acts == "feedback"):
-        writer.call(term, ["f", *seen, "t"] if term.element.acts == "feedback" else ["f", "t"], "f")
-    lines.append(f"f = f + forcing[k, {number}]")
-    force = [term for term in kernels if term.element.slot == "force"]
-    for term in (one for one in force if one.element.acts == "drive"):
-        writer.call(term, ["t"], "part")
-        lines.append("f = f + part")
-    for term in (one for one in kernels if one.element.slot == "actuator"):
-        motion = ["x", "v"] if term.element.acts == "transducer" else []
-        writer.call(term, ["f", *motion, "t"], "f")
-    _forces(writer, number, force)
-    lines.append("y = x")
-    for term in (one for one in kernels if one.element.slot == "sensor"):
-        writer.call(term, ["y", "t"], "y")
-    first = number * len(COLUMNS)
-    lines += [f"out[k, {first + i}] = {name}" for i, name in enumerate(("x", "v", "y", "f"))]
-
-
-def _forces(writer: _Writer, number: int, force: list[Term]) -> None:
-    """Forces along the joint, those without a memory of their own by their secant."""
-    lines = writer.lines
-    whole = any(term.element.acts in ("modifier", "transmission") for term in force)
-    plain = [one for one in force if one.element.acts in ("leg", "body")]
-    lines += ["total = 0.0", "resting = 0.0", "rate = v"]
-    lines += [f"if abs(rate) < {REST}:", f"    rate = {REST}"]
-    for term in plain:
-        if term.element.own or term.element.history or whole:
-            writer.call(term, ["x", "v", "t", "f"], "part")
-            lines += ["total = total + part", "resting = resting + part"]
-        else:
-            writer.call(term, ["x", "rate", "t", "f"], "part")
-            lines.append("total = total + part")
-            writer.call(term, ["x", "0.0", "t", "f"], "part")
-            lines.append("resting = resting + part")
-    for term in (one for one in force if one.element.acts == "transmission"):
-        writer.call(term, ["total", "x", "v", "t", "f"], "part")
-        lines += ["total = total + part", "resting = resting + part"]
-    for term in (one for one in force if one.element.acts == "modifier"):
-        writer.call(term, ["total", "x", "v", "t", "f"], "total")
-        lines.append("resting = total")
-    lines += [
-        "secant = (resting - total) / rate",
-        "if secant > 0.0:",
-        f"    damping[at_velocity[{number}]] = secant",
-        "    total = resting",
-        "else:",
-        f"    damping[at_velocity[{number}]] = 0.0",
-        f"applied[at_velocity[{number}]] = f + total",
-    ]
 
 
 def generate(paths: dict[str, Model]) -> tuple[Module, Layout]:
     """The module for these paths, and the layout of its arrays. Raises InputError for a base's motion as an input."""
-    writer = _Writer()
-    for number, (joint, model) in enumerate(paths.items()):
-        if room := [term for term in model.terms if term.against == "room"]:
-            raise InputError(f"{joint}: {room[0].label} acts against the room, which a joint does not know")
-        writer.joint = joint
-        writer.parameter(INERTIA)
-        _joint(writer, number, joint, model)
-    kernels = {
-        term.element.name: kernel_module(term.element)
-        for model in paths.values()
-        for term in model.terms
-        if term.element.kernel is not None
-    }
-    states = range(len(writer.states))
-    before = [f"p{i} = parameters[{i}]" for i in range(len(writer.parameters))]
-    before += [f"s{i} = states[{i}]" for i in states]
-    after = [f"s{i} = d{i}" if i in writer.memories else f"s{i} = s{i} + h * d{i}" for i in states]
+    writer, kernels = written(paths)
     base = len(paths) * len(COLUMNS)
     text = "\n".join(
         [
@@ -175,32 +30,31 @@ def generate(paths: dict[str, Model]) -> tuple[Module, Layout]:
             "",
             '@njit("int64(intp, intp, float64[::1], float64[::1], float64[::1], float64[::1], int64[::1], int64[::1],"',
             '      "float64, float64, float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[:, ::1],"',
-            '      "float64[:, ::1])", cache=True, nogil=True, error_model="numpy")',
+            '      "float64[:, ::1], int64, boolean)", cache=True, nogil=True, error_model="numpy")',
             "def run(model, data, qpos, qvel, applied, damping, at_position, at_velocity, begin, h, command, forcing,",
-            "        parameters, states, past, out):",
-            *(f"    {line}" for line in before),
-            "    for k in range(out.shape[0]):",
+            "        parameters, states, past, out, first, peek):",
+            *(f"    {line}" for line in writer.before),
+            "    for row in range(out.shape[0]):",
+            "        k = first + row",
             "        t = begin + k * h",
             *(f"        {line}" for line in writer.lines),
             "        for i in range(qpos.shape[0]):",
-            f"            out[k, {base} + i] = qpos[i]",
+            f"            out[row, {base} + i] = qpos[i]",
             "        for i in range(qvel.shape[0]):",
-            f"            out[k, {base} + qpos.shape[0] + i] = qvel[i]",
+            f"            out[row, {base} + qpos.shape[0] + i] = qvel[i]",
             f"            if not abs(qvel[i]) < {FASTEST}:",
-            "                return k",
+            "                return row",
             *(
-                f"        if not abs(applied[at_velocity[{number}]]) < {STRONGEST}:\n            return k"
+                f"        if not abs(applied[at_velocity[{number}]]) < {STRONGEST}:\n            return row"
                 for number in range(len(paths))
             ),
+            "        if peek and row + 1 == out.shape[0]:",
+            "            break",
             "        mj_step(model, data)",
-            *(f"        {line}" for line in after),
+            *(f"        {line}" for line in writer.after),
+            *(f"    states[{i}] = s{i}" for i in range(len(writer.states))),
             "    return out.shape[0]",
             "",
         ]
     )
-    layout = Layout(
-        tuple((joint, name, default) for (joint, name), default in writer.parameters.items()),
-        tuple(writer.states),
-        writer.pasts,
-    )
-    return Module(text, tuple(kernels.values())), layout
+    return Module(text, tuple(kernels.values())), writer.layout

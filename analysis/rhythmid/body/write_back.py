@@ -1,84 +1,173 @@
 """A machine back into the body's own format: MJCF or URDF with the identified values in place.
 
-MJCF has masses, rotors' inertias, viscous damping and dry friction (a soft constraint there, a smooth law here); URDF has masses and the
-two losses. What a file cannot express is told by name.
+MJCF has masses, rotors' inertias, viscous damping, dry friction (a soft constraint there, a smooth law here), and an actuator for each
+path with the controller's gains, a lag and a delay; URDF has masses and the two losses. What a file cannot express is told by name. The
+MJCF holds the paths themselves, too: `rhythmid.mujoco.apply` makes them act in a loop of the user's own.
 """
 
+import os
 import xml.etree.ElementTree as tree
 from pathlib import Path
-from typing import Any
 
+from rhythmid.body.embedded import NAME, text_of
+from rhythmid.body.live_source import generate_live, numbers_of, rows_of
 from rhythmid.body.machine import Machine
 from rhythmid.body.mujoco_body import FIXED, mujoco
 from rhythmid.errors import InputError
+from rhythmid.export import mujoco as mjcf
+from rhythmid.export.from_model import joint_of
+from rhythmid.export.joint import Joint
 from rhythmid.output import write_text
 
 MJCF, URDF = ".xml", ".urdf"
 LOSSES = ("viscous_damper", "coulomb_friction")
+KEPT = (
+    "name",
+    "class",
+    "group",
+    "forcerange",
+    "forcelimited",
+)  # of an actuator; its class's other words are overridden
+PLAIN = {"ctrllimited": "false", "dyntype": "none", "gaintype": "fixed", "biastype": "none", "gear": "1"}
+WRITTEN = {"ipos": "pos", "iquat": "quat", "inertia": "diaginertia"}  # of an inertial
+IN_PLACE = frozenset(
+    (
+        "inertia", "damping", "friction", "position_gain", "velocity_gain", "command_delay", "command_lag", "gain", "actuator_lag",
+        "actuator_delay", "effort_limit", "constant_force",
+    )
+)  # fmt: skip
 
 
 def save_machine(machine: Machine, path: Path) -> tuple[str, ...]:
-    """Write a machine as its suffix says: .yaml, .xml (MJCF) or .urdf. Returns the elements that the file cannot express.
+    """Write a machine as its suffix says: .yaml, .xml (MJCF) or .urdf. Returns in words what the file cannot express.
 
     Raises InputError where a body that is no URDF is to become one, or the place is not writable.
     """
     if path.suffix == MJCF:
-        write_text(path, mjcf_of(machine))
-    elif path.suffix == URDF:
+        write_text(path, mjcf_of(machine, path.parent))
+        return tuple(f"{joint}: {line}" for joint in machine.joints for line in unexpressed(machine, joint))
+    if path.suffix == URDF:
         write_text(path, urdf_of(machine))
-    else:
-        machine.save(path)
-        return ()
-    return tuple(
+        own = (f"{one}.armature" for one in machine.joints if machine.body.parameters[f"{one}.armature"])
+        return tuple(f"not expressed: {one}" for one in (*own, *_beyond_losses(machine)))
+    machine.save(path)
+    return ()
+
+
+def _beyond_losses(machine: Machine) -> list[str]:
+    return [
         f"{joint}.{term.label}"
         for joint, model in machine.paths.items()
         for term in model.terms
         if term.label not in LOSSES
-    )
+    ]
+
+
+def unexpressed(machine: Machine, joint: str) -> tuple[str, ...]:
+    """What MJCF cannot express of a joint's path, or only nearly."""
+    described = _described(machine, joint)
+    return described.inexpressible(IN_PLACE & mjcf.expressed(described))
+
+
+def _described(machine: Machine, joint: str) -> Joint:
+    return joint_of(machine.paths[joint], "joint")  # the name is the file's, whatever letters it has
 
 
 def losses_of(machine: Machine, joint: str) -> tuple[float, float]:
     """Viscous damping and dry friction of a joint's path."""
-    terms = {term.label: term for term in machine.paths[joint].terms}
-    damping, friction = (terms.get(name) for name in LOSSES)
-    return (
-        0.0 if damping is None else damping.values["damping"].value,
-        0.0 if friction is None else friction.values["force"].value,
-    )
+    described = _described(machine, joint)
+    return described.damping, described.friction
 
 
-def mjcf_of(machine: Machine) -> str:
-    """The body's file with the machine's values, as MJCF."""
+def mjcf_of(machine: Machine, folder: Path) -> str:
+    """The body's file with the machine's values, as MJCF that stands in `folder`."""
     mj = mujoco()
     spec = mj.MjSpec.from_file(str(machine.body.path))
     model = machine.body.model
     for link, number in machine.body.links.items():
         body = spec.body(link)
-        body.explicitinertial = True
+        body.explicitinertial, body.fullinertia = True, [float("nan")] * 6
         body.mass = float(model.body_mass[number])
         body.ipos, body.iquat = model.body_ipos[number], model.body_iquat[number]
         body.inertia = model.body_inertia[number]
-    for name, one in machine.body.joints.items():
-        joint = spec.joint(name)
-        joint.armature = float(model.dof_armature[one.velocity])
-        if name in machine.paths:
-            damping, friction = losses_of(machine, name)
-            _set(joint, "damping", damping)
-            joint.frictionloss = friction
     if machine.body.base == FIXED:
         floating = [one for one in spec.joints if one.type == mj.mjtJoint.mjJNT_FREE]
         for one in (*floating, *(spec.keys if floating else ())):
             spec.delete(one)
+    folders = {"meshdir": [*spec.meshes, *spec.hfields], "texturedir": spec.textures}
+    for kind in (one for one, files in folders.items() if files):  # relative to the file that is written
+        known = machine.body.path.resolve().parent / getattr(spec, kind)
+        setattr(spec, kind, os.path.relpath(known, folder.resolve()))
+    step = min(float(spec.option.timestep), machine.body.step)
     spec.compile()
-    return str(spec.to_xml())
+    root = tree.fromstring(spec.to_xml())
+    _values(root, machine)
+    if not machine.body.contacts:
+        _section(_section(root, "option"), "flag").set("contact", "disable")
+    _actuators(root, machine, step)
+    _embed(root, machine, step)
+    tree.indent(root)
+    return tree.tostring(root, encoding="unicode") + "\n"
 
 
-def _set(joint: Any, name: str, value: float) -> None:
-    """Set a coefficient that newer versions of MuJoCo hold as the first of a polynomial's."""
-    if hasattr(getattr(joint, name), "__len__"):
-        getattr(joint, name)[0] = value
-    else:
-        setattr(joint, name, value)
+def _values(root: tree.Element, machine: Machine) -> None:
+    """Inertials and joints with all digits of the machine's values; MuJoCo itself writes fewer."""
+    model, body = machine.body.model, machine.body
+    world = _section(root, "worldbody")
+    for link in (one for one in world.iter("body") if one.get("name") in body.links):
+        number, own = body.links[str(link.get("name"))], _section(link, "inertial")
+        own.attrib.clear()
+        own.set("mass", repr(float(model.body_mass[number])))
+        for name in ("ipos", "iquat", "inertia"):
+            values = getattr(model, f"body_{name}")[number]
+            own.set(WRITTEN[name], " ".join(repr(float(value)) for value in values))
+    for joint in (one for one in world.iter("joint") if one.get("name") in body.joints):
+        name = str(joint.get("name"))
+        joint.set("armature", repr(float(model.dof_armature[body.joints[name].velocity])))
+        if name in machine.paths:
+            for word, value in zip(("damping", "frictionloss"), losses_of(machine, name)):
+                joint.set(word, repr(value))
+
+
+def _section(root: tree.Element, name: str) -> tree.Element:
+    found = root.find(name)
+    return tree.SubElement(root, name) if found is None else found
+
+
+def _actuators(root: tree.Element, machine: Machine, step: float) -> None:
+    """One actuator for each path: the joint's first one, or a new one. Further ones of the joint stay in `ctrl`, without effect."""
+    section = _section(root, "actuator")
+    for joint in machine.joints:
+        described = _described(machine, joint)
+        own = [one for one in section if one.get("joint") == joint]
+        if not own:
+            own = [tree.SubElement(section, "general", name=joint)]
+        for idle in own[1:]:
+            _become(idle, {"joint": joint, "gainprm": "0"})
+        _become(own[0], {**mjcf.actuator(described, step), "joint": joint})
+        for line in unexpressed(machine, joint):
+            section.append(tree.Comment(f" {joint}: {line} ".replace("--", "-")))
+
+
+def _become(actuator: tree.Element, attributes: dict[str, str]) -> None:
+    """A general actuator with these attributes, and of its own what every actuator has."""
+    kept = {name: value for name, value in actuator.attrib.items() if name in KEPT}
+    attributes = {name: value for name, value in attributes.items() if name != "name"}
+    actuator.tag = "general"
+    actuator.attrib.clear()
+    actuator.attrib.update({**kept, **PLAIN, **attributes})
+
+
+def _embed(root: tree.Element, machine: Machine, step: float) -> None:
+    """The paths as a text of the file, with room for what lasts from step to step."""
+    _, layout = generate_live(machine.paths)
+    size = _section(root, "size")
+    needed = numbers_of(layout, rows_of(machine.paths, step))
+    size.set("nuserdata", str(max(needed, int(size.get("nuserdata", "0")))))
+    custom = _section(root, "custom")
+    for one in [one for one in custom if one.get("name") == NAME]:
+        custom.remove(one)
+    tree.SubElement(custom, "text", name=NAME, data=text_of(machine.paths))
 
 
 def urdf_of(machine: Machine) -> str:

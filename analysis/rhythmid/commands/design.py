@@ -5,12 +5,15 @@ from typing import Annotated, cast
 
 import typer
 
+from rhythmid.commands import joint_design, machines
 from rhythmid.commands.options import Elements, JsonFile, Quiet
 from rhythmid.commands.terminal import Terminal
+from rhythmid.errors import InputError
 from rhythmid.output import require_new, write_json
 
 EXAMPLES = (
     "rhythmid design model.yaml --duration 60 --band 0 7 --max-effort 0.02 --envelope 0.13 0.17 --noise-std 1e-5 --output plan",
+    "rhythmid design leg.yaml --duration 20 --band 0.2 5 --max-effort 25 --noise-std 0.05 --output plan",
 )
 
 
@@ -23,22 +26,25 @@ def design(
     max_effort: Annotated[
         float, typer.Option("--max-effort", help="Largest effort of the command in N (or the model's unit).")
     ],
-    envelope: Annotated[
-        tuple[float, float],
-        typer.Option(
-            "--envelope", help="Lowest and highest position that may be measured, in m (or the model's unit)."
-        ),
-    ],
     noise_std: Annotated[
         float,
         typer.Option(
-            "--noise-std", help="Standard deviation of a measured sample's noise in m (or the model's unit)."
+            "--noise-std",
+            help="Standard deviation of a measured sample's noise in m (or the model's unit); of several joints that of a force in N*m.",
         ),
     ],
     output: Annotated[
         Path,
         typer.Option("--output", help="Folder to write: samples, model, experiment, figure, prediction."),
     ],
+    envelope: Annotated[
+        tuple[float, float] | None,
+        typer.Option(
+            "--envelope",
+            help="Lowest and highest position that may be measured, in m (or the model's unit); of several joints that of one whose "
+            "file states no range, about its reference pose.",
+        ),
+    ] = None,
     kind: Annotated[
         str,
         typer.Option(
@@ -102,6 +108,15 @@ def design(
     quiet: Quiet = False,
 ) -> None:
     """Design an experiment: the signal to play, as large as the machine bears, and every parameter's predicted uncertainty."""
+    if machines.is_machine(model):
+        machines.refuse(
+            forcing=forcing, delays=delays, max_distortion=max_distortion, shifts=shifts, period=period, spacing=spacing,
+        )  # fmt: skip
+        limits = (duration, band, max_effort, noise_std, rate, envelope, seed)
+        joint_design.design_files(model, limits, output, elements or (), json, Terminal(quiet, json))
+        return
+    if envelope is None:
+        raise InputError("--envelope: say which positions may be measured, lowest and highest")
     from rhythmid.design.design_folder import save_design
     from rhythmid.design.designer import design as make
     from rhythmid.design.requirements import Kind, Requirements

@@ -82,7 +82,7 @@ def diagnose(
             "--holdout, --budget and --save-model belong to a model: give --model NOMINAL.yaml too"
         )
     if model is not None and machines.is_machine(model):
-        machines.refuse(sim=sim, report=report)
+        machines.refuse(sim=sim)
         machines.diagnose_files(
             bags,
             model,
@@ -90,6 +90,7 @@ def diagnose(
             holdout or (),
             elements or (),
             json,
+            report,
             save_model,
             budget,
             Terminal(quiet, json),

@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
+from rhythmid.commands import machines
 from rhythmid.commands.options import Elements
+from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new
 
 
@@ -32,6 +34,9 @@ def export(
     from rhythmid.output import write_text
 
     require_new(out)
+    if machines.is_machine(model):
+        machines.export_file(model, to, out, elements or (), Terminal(quiet=False))
+        return
     described = joint_of(Model.load(model, load_catalogue(tuple(elements or ()))), joint)
     text = exported([described], to, model.name)
     if out is None:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from rhythmid.identify.joints.joint_identification import MachineIdentification
     from rhythmid.record.joint_record import JointRecord
 
+SUFFIXES = {"mujoco": ".xml", "urdf": ".urdf"}
+APPLIED = "rhythmid.mujoco.apply(model, data) before each mj_step makes all of it act: docs/legs.md"
 UNDRAWN = "{} is not made for a machine of several joints; --json has all of the answer"
 
 
@@ -64,6 +66,7 @@ def diagnose_files(
     holdout: Sequence[Path],
     elements: Sequence[Path],
     json: Path | None,
+    report: Path | None,
     save_model: Path | None,
     budget: float | None,
     terminal: "Terminal",
@@ -82,6 +85,14 @@ def diagnose_files(
     show_diagnosis(answer.diagnosis, terminal.answer)
     if json is not None:
         write_json(json, answer.diagnosis.to_dict())
+    if report is not None:
+        from rhythmid.commands.options import command_line
+        from rhythmid.diagnose.joints.joint_present import present_machine
+        from rhythmid.report.page import write_page
+
+        source = f"{model.name} with {', '.join(bag.name for bag in bags)}"
+        write_page(report, present_machine(answer, machine, source, command_line()))
+        terminal.say(f"report: {report}")
     saved(answer.machine, save_model, terminal)
 
 
@@ -131,7 +142,23 @@ def saved(machine: "Machine", path: Path | None, terminal: "Terminal") -> None:
     from rhythmid.body.write_back import save_machine
 
     if left := save_machine(machine, path):
-        terminal.say(f"{path}: cannot express {', '.join(left)}; a .yaml can")
+        terminal.say(f"{path}: {'; '.join(left)}")
+        terminal.say(APPLIED if path.suffix == ".xml" else "a .yaml holds all of it")
+
+
+def export_file(
+    model: Path, to: str, out: Path | None, elements: Sequence[Path], terminal: "Terminal"
+) -> None:
+    """Write the machine of several joints in a model file as MJCF or URDF. Raises InputError for another target."""
+    from rhythmid.body.machine import Machine
+    from rhythmid.elements.catalogue import load_catalogue
+
+    if to not in SUFFIXES:
+        raise InputError(f"--to {to}: a machine of several joints is written as {' or '.join(SUFFIXES)}")
+    if out is None or out.suffix != SUFFIXES[to]:
+        raise InputError(f"--out: name a file that ends in {SUFFIXES[to]}")
+    saved(Machine.load(model, load_catalogue(elements)), out, terminal)
+    terminal.say(f"{out}: {to}")
 
 
 def identify_files(

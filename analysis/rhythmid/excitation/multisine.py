@@ -18,7 +18,8 @@ class Multisine(Excitation):
 
     Lines are given outright (`lines`, with optional relative `weights` and `phases` [rad]), or chosen from `band`:
     all of them, the odd ones (even distortion then shows on even lines), or with a `pumping` frequency one residue class
-    (k mod P) = `residue`, so that every sideband of a line falls on a class of its own. `rms` [N] sets the size.
+    (k mod P) = `residue`, so that every sideband of a line falls on a class of its own. `rms` [N] sets the size. Of the chosen lines
+    `part` [i, n] leaves the i-th and every n-th after it: n such signals are orthogonal over a period.
     """
 
     type: Literal["multisine"] = "multisine"
@@ -29,6 +30,7 @@ class Multisine(Excitation):
     select: Literal["all", "odd", "residue"] = "odd"
     pumping: Annotated[float, Field(gt=0)] = 1.0
     residue: Annotated[int, Field(ge=0)] = 1
+    part: tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=1)]] = (0, 1)
     lines: tuple[Annotated[int, Field(ge=1)], ...] = ()
     weights: tuple[float, ...] = ()
     phases: tuple[float, ...] = ()
@@ -55,13 +57,14 @@ class Multisine(Excitation):
         low, high = sorted(self.band)
         k = np.arange(max(1, math.ceil(low * self.period - 1e-9)), math.floor(high * self.period + 1e-9) + 1)
         if self.select == "odd":
-            return k[k % 2 == 1]
+            k = k[k % 2 == 1]
         if self.select == "residue":
             classes = self.pumping * self.period
             if abs(classes - round(classes)) > 1e-6:
                 raise InputError("multisine: with select residue the period must hold whole pumping periods")
-            return k[k % round(classes) == self.residue % round(classes)]
-        return k
+            k = k[k % round(classes) == self.residue % round(classes)]
+        first, step = self.part
+        return k[first % step :: step]
 
     @property
     def duration(self) -> float:

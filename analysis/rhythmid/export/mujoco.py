@@ -32,7 +32,7 @@ def text(joints: Sequence[Joint], source: str) -> str:
     world, actuators, sensors = (add(root, name) for name in ("worldbody", "actuator", "sensor"))
     for joint in joints:
         _body(world, joint)
-        add(actuators, "general", **_actuator(joint))
+        add(actuators, "general", **actuator(joint))
         add(
             sensors,
             "jointpos",
@@ -56,7 +56,7 @@ def _body(world: tree.Element, joint: Joint) -> None:
             body,
             "frictionloss is a soft constraint: at rest it creeps, where the identified friction holds or turns smoothly",
         )
-    for line in joint.inexpressible(_expressed(joint)):
+    for line in joint.inexpressible(expressed(joint)):
         comment(body, line)
     attributes = {
         "name": joint.name,
@@ -78,7 +78,7 @@ def _polynomial(linear: float, *higher: float) -> str:
     return vector((linear, *higher)) if any(higher) else number(linear)
 
 
-def _expressed(joint: Joint) -> frozenset[str]:
+def expressed(joint: Joint) -> frozenset[str]:
     """What MJCF can say of this joint: an actuator has one low-pass and one delay, both before its control law."""
     inside = {"actuator_lag", "actuator_delay"} if joint.control != "force" else set()
     lags = {"actuator_lag"} if joint.command_lag else set()
@@ -86,10 +86,11 @@ def _expressed(joint: Joint) -> frozenset[str]:
     return EXPRESSED - inside - lags - constant
 
 
-def _actuator(joint: Joint) -> dict[str, str]:
-    expressed = _expressed(joint)
+def actuator(joint: Joint, step: float = TIMESTEP) -> dict[str, str]:
+    """Attributes of the `general` actuator of a joint, in a model with this time step [s]."""
+    words = expressed(joint)
     attributes = {"name": joint.name, "joint": joint.name}
-    bias = joint.constant_force if "constant_force" in expressed else 0.0
+    bias = joint.constant_force if "constant_force" in words else 0.0
     gain, position, velocity = joint.gain, 0.0, 0.0
     if joint.control == "position":
         gain, position = joint.gain * joint.position_gain, -joint.gain * joint.position_gain
@@ -99,18 +100,18 @@ def _actuator(joint: Joint) -> dict[str, str]:
     attributes |= {"gaintype": "fixed", "gainprm": number(gain)}
     if bias or position or velocity:
         attributes |= {"biastype": "affine", "biasprm": vector((bias, position, velocity))}
-    lag = joint.command_lag or (joint.actuator_lag if "actuator_lag" in expressed else 0.0)
+    lag = joint.command_lag or (joint.actuator_lag if "actuator_lag" in words else 0.0)
     if lag:
         attributes |= {"dyntype": "filterexact", "dynprm": number(lag)}
     if joint.effort_limit < math.inf:
         attributes |= {"forcerange": vector((-joint.effort_limit, joint.effort_limit))}
-    dead_time = joint.actuator_delay if "actuator_delay" in expressed else 0.0
-    return attributes | _delay(joint.command_delay + dead_time)
+    dead_time = joint.actuator_delay if "actuator_delay" in words else 0.0
+    return attributes | _delay(joint.command_delay + dead_time, step)
 
 
-def _delay(delay: float) -> dict[str, str]:
+def _delay(delay: float, step: float = TIMESTEP) -> dict[str, str]:
     """A delay and the number of samples that it keeps; none of a joint without one."""
     if not delay:
         return {}
-    samples = math.ceil(round(delay / TIMESTEP, 9)) + 1
+    samples = math.ceil(round(delay / step, 9)) + 1
     return {"delay": number(delay), "nsample": str(samples), "interp": "linear"}

@@ -22,6 +22,8 @@ setup(
         "console_scripts": [
             "plant = rhythmid_nodes.plant:main",
             "excitation = rhythmid_nodes.excitation:main",
+            "joint_plant = rhythmid_nodes.joint_plant:main",
+            "joint_excitation = rhythmid_nodes.joint_excitation:main",
             "delay_injector = rhythmid_nodes.delay_injector:main",
             "recorder = rhythmid_nodes.recorder:main",
             "command_guard = rhythmid_nodes.command_guard:main",

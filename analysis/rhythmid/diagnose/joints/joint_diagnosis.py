@@ -20,6 +20,7 @@ from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.joints.joint_motion import JointBalances
+from rhythmid.identify.joints.joint_order import check_order
 from rhythmid.identify.joints.reference_delay import reference_delay
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
@@ -57,6 +58,7 @@ def diagnose_machine(
     known, spent = catalogue or load_catalogue(), Budget(budget)
     nominal, links = machine, {}
     balances = JointBalances.of(machine, records)
+    check_order(balances)
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
     found, refused = _searched(balances, unseen, machine.joints, known, tell, spent)
     for _ in range(MOST_LINKS):

@@ -21,6 +21,7 @@ from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit, fit_effort, size_of
 from rhythmid.identify.joints.base_parameters import InertialEstimate, estimate_inertia
 from rhythmid.identify.joints.joint_motion import JointBalances
+from rhythmid.identify.joints.joint_order import check_order
 from rhythmid.identify.joints.output_error import Knowledge, free_runs, refine
 from rhythmid.identify.joints.reference_delay import reference_delay
 from rhythmid.model import INERTIA, Model
@@ -89,12 +90,13 @@ def identify_machine(
     """Identify the free parameters of a machine, the armature of every joint, and its links' inertias.
 
     With `free`, and where references are known, free runs refine the paths. Without `holdout` the last fifth of each record is held
-    out of them. Raises InputError for records that hold too little, or lack a joint.
+    out of them. Raises InputError for records that hold too little, lack a joint, or have them in another order.
     """
     if not records:
         raise InputError("no record is given; name at least one bag or table")
     seen, unseen = (records, holdout) if holdout else _split(records)
     balances = JointBalances.of(machine, seen)
+    check_order(balances)
     fits: dict[str, tuple[Balance, EffortFit]] = {}
     found: dict[str, JointEstimate] = {}
     correlations: dict[str, float] = {}

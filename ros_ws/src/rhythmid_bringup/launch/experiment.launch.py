@@ -50,7 +50,7 @@ def graph(context: LaunchContext) -> list[Node | LifecycleTransition]:
     experiment = load(path, Path(bag) if bag else None)
     nodes: list[Node | LifecycleTransition] = []
     for spec in experiment.nodes():
-        leads = spec.executable == "excitation"
+        leads = spec.name == "excitation"
         nodes.append(
             LifecycleNode(
                 package=spec.package,

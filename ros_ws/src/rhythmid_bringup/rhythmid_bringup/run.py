@@ -13,6 +13,8 @@ from pathlib import Path
 
 from rich.console import Console
 
+from rhythmid.body.joint_experiment import JointExperiment
+from rhythmid.body.joint_graph import describes_joints
 from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment
 from rhythmid.output import require_new, require_writable
@@ -27,9 +29,17 @@ REPLACEABLE = ("plant", "command_delay", "measurement_delay")  # the others driv
 console = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
-def load(path: Path, out: Path | None) -> Experiment:
+Runnable = Experiment | JointExperiment
+
+
+def experiment_in(path: Path) -> Runnable:
+    """The experiment in a file, of one axis or of several joints."""
+    return JointExperiment.load(path) if describes_joints(path) else Experiment.load(path)
+
+
+def load(path: Path, out: Path | None) -> Runnable:
     """The experiment with its bag's absolute path. Raises InputError when the bag's place is taken or not writable."""
-    experiment = Experiment.load(path)
+    experiment = experiment_in(path)
     bag = (out or experiment.record.path).absolute()
     if os.path.lexists(bag):
         raise InputError(f"{bag}: exists already and is not overwritten; choose another path or remove it")
@@ -109,12 +119,12 @@ def mend(bag: Path) -> None:
 
 def run_alone(path: Path, out: Path | None, name: str) -> int:
     """Become one node of the experiment; without supervisor the excitation starts by itself."""
-    experiment = load(path, out) if name == "recorder" else Experiment.load(path)
+    experiment = load(path, out) if name == "recorder" else experiment_in(path)
     specs = {spec.name: spec for spec in experiment.nodes()}
     if name not in specs:
         raise InputError(f"no node {name!r} in the graph; it has {', '.join(specs)}")
     folder = Path(tempfile.mkdtemp(prefix="rhythmid-"))
-    extra = {"unattended": True} if specs[name].executable == "excitation" else {}
+    extra = {"unattended": True} if name == "excitation" else {}
     line = command(specs[name], ros_arguments(specs[name], experiment.namespace, folder, extra))
     os.execve(line[0], line, run_environment(os.environ, None, folder))
 

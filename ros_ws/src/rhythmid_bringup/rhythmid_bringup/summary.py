@@ -6,13 +6,16 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from rhythmid.body.joint_experiment import JointExperiment
 from rhythmid.experiment import Experiment
 from rhythmid.record.punctuality import punctuality_notes
 
 from .supervisor import Observed, Outcome
 
 
-def show(console: Console, experiment: Experiment, observed: Observed, outcome: Outcome) -> None:
+def show(
+    console: Console, experiment: Experiment | JointExperiment, observed: Observed, outcome: Outcome
+) -> None:
     """Print the summary of a run."""
     if observed.figures:
         table = Table(box=None, show_header=False, pad_edge=False)

@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from rhythmid.body.joint_experiment import JointExperiment
 from rhythmid.experiment import Delay, Experiment
 from rhythmid_nodes.lifecycle import ACTIVE
 
@@ -58,7 +59,7 @@ class Supervisor:
 
     def __init__(
         self,
-        experiment: Experiment,
+        experiment: Experiment | JointExperiment,
         folder: Path,
         environment: dict[str, str],
         console: Console,

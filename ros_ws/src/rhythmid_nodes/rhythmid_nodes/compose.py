@@ -17,6 +17,8 @@ from pathlib import Path
 from .command_guard import CommandGuard
 from .delay_injector import DelayInjector
 from .excitation import ExcitationNode
+from .joint_excitation import JointExcitationNode
+from .joint_plant import JointPlantNode
 from .node import GraphNode, serve
 from .plant import PlantNode
 from .recorder import Recorder
@@ -24,6 +26,8 @@ from .recorder import Recorder
 EXECUTABLES: dict[str, Callable[..., GraphNode]] = {
     "plant": PlantNode,
     "excitation": ExcitationNode,
+    "joint_plant": JointPlantNode,
+    "joint_excitation": JointExcitationNode,
     "delay_injector": DelayInjector,
     "recorder": Recorder,
     "command_guard": CommandGuard,

@@ -63,14 +63,17 @@ PARAMETERS = (
 
 
 class ExcitationNode(GraphNode):
-    """Plays a precomputed command, sample k at start + k periods."""
+    """Plays a precomputed command, sample k at start + k periods.
 
-    def __init__(self, **options: Any) -> None:
-        super().__init__("excitation", PARAMETERS, **options)
+    A machine of several joints has other commands and measurements, see `joint_excitation`; all else is the same.
+    """
+
+    def __init__(self, parameters: tuple[Parameter, ...] = PARAMETERS, **options: Any) -> None:
+        super().__init__("excitation", parameters, **options)
 
     def configure(self) -> None:
         self._effort = self._command()
-        self._watch = Watch(limits(self.values))
+        self._watch: Any = self._judge()
         self._state = "idle"  # idle -> running (-> ramping) -> finished | stopped
         self._sent = 0
         self._lateness = Lateness(self.period_ns)  # of the commands sent, against their stamps
@@ -81,8 +84,7 @@ class ExcitationNode(GraphNode):
         self._grid: Grid | None = None
         self._neighbours: set[str] = set()
         self._lock = threading.Lock()  # measurements and services come on another thread than ticks
-        self._reader = JointStateReader(self.values["joint"])
-        self._output = self._commander()
+        self._output: Any = self._commander()
         self._authority = Authority(self, self._output.publisher.topic, self._on_intrusion)
         self._run = self.create_publisher(String, "run", latched())
         self.create_service(Trigger, "~/start", self._on_start)
@@ -120,6 +122,11 @@ class ExcitationNode(GraphNode):
     def fading(self) -> bool:
         return not self.lockstep and self._state in ("running", "ramping")
 
+    def _judge(self) -> Any:
+        """What reads measurements and judges them."""
+        self._reader: Any = JointStateReader(self.values["joint"])
+        return Watch(limits(self.values))
+
     def _command(self) -> NDArray[np.float64]:
         """u(t) [N] on the grid, faded and clamped: the same numbers as in a run without ROS."""
         values = self.values
@@ -139,7 +146,7 @@ class ExcitationNode(GraphNode):
         safety = Safety(max_effort=values["max_effort"], ramp=values["ramp"])
         return ramped(excitation, safety, grid, count * self.period_ns * 1e-9)
 
-    def _commander(self) -> Commander:
+    def _commander(self) -> Any:
         values = self.values
         if self.lockstep and values["command_type"] != STAMPED:
             raise InputError(
@@ -261,12 +268,19 @@ class ExcitationNode(GraphNode):
 
     # Playing
 
-    def _value(self, index: int) -> float:
+    def _value(self, index: int) -> Any:
         """u of sample `index`; faded out when asked to stop, zero after."""
-        effort = float(self._effort[index])
+        return float(self._effort[index]) * self._share(index)
+
+    def _share(self, index: int) -> float:
+        """How much of sample `index` is played."""
         if self._fade_from is None:
-            return effort
-        return effort * max(0.0, 1.0 - (index + 1 - self._fade_from) / max(1, self._fade_length))
+            return 1.0
+        return max(0.0, 1.0 - (index + 1 - self._fade_from) / max(1, self._fade_length))
+
+    def _nothing(self) -> Any:
+        """The last command of a run: zero effort."""
+        return 0.0
 
     def _send(self) -> None:
         """Send sample `_sent`, the next one."""
@@ -296,8 +310,8 @@ class ExcitationNode(GraphNode):
             ) // self.period_ns  # after an overrun samples are left out
             faded = self._fade_from is not None and self._sent - self._fade_from >= self._fade_length
             if faded or self._sent >= len(self._effort):
-                # whoever holds the last command holds zero from now on
-                self._output.send(stamp_ns, 0.0)
+                # whoever holds the last command holds nothing else from now on
+                self._output.send(stamp_ns, self._nothing())
                 self._end()
                 return
             self._send()
@@ -312,7 +326,7 @@ class ExcitationNode(GraphNode):
     def _halt(self, stamp_ns: int, reason: str) -> None:
         """Stop at once, without fading, with a last command of zero."""
         if not self.lockstep:
-            self._output.send(stamp_ns, 0.0)
+            self._output.send(stamp_ns, self._nothing())
         self._enter("stopped", reason)
         self.get_logger().error(f"excitation stopped: {reason}")
 

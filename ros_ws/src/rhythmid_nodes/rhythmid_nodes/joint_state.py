@@ -17,9 +17,9 @@ from rhythmid.record.messages import Messages
 
 from .sample import Sample
 
-_FIELDS = ("position", "velocity", "effort")
-_CDR = 4  # encapsulation header; CDR aligns relative to its end
-_LITTLE_ENDIAN = b"\x00\x01"
+FIELDS = ("position", "velocity", "effort")
+CDR = 4  # encapsulation header; CDR aligns relative to its end
+LITTLE_ENDIAN = b"\x00\x01"
 _stamp = struct.Struct("<iI")
 _count = struct.Struct("<I")
 _double = struct.Struct("<d")
@@ -27,19 +27,24 @@ _double = struct.Struct("<d")
 
 def stamp_of(data: bytes) -> int:
     """Header stamp [ns] of a serialized message whose first field is a std_msgs/Header."""
-    seconds, nanoseconds = _stamp.unpack_from(data, _CDR)
+    seconds, nanoseconds = _stamp.unpack_from(data, CDR)
     return seconds * 1_000_000_000 + nanoseconds
+
+
+def pack_stamp(buffer: bytearray, stamp_ns: int) -> None:
+    """Give a serialized message another header stamp [ns], in place."""
+    _stamp.pack_into(buffer, CDR, *divmod(stamp_ns, 1_000_000_000))
 
 
 def restamped(data: bytes, stamp_ns: int) -> bytes:
     """The same message with another header stamp [ns]."""
     changed = bytearray(data)
-    _stamp.pack_into(changed, _CDR, *divmod(stamp_ns, 1_000_000_000))
+    pack_stamp(changed, stamp_ns)
     return bytes(changed)
 
 
 def _aligned(offset: int, size: int) -> int:
-    return offset + (_CDR - offset) % size
+    return offset + (CDR - offset) % size
 
 
 def _skip_string(data: bytes, offset: int) -> tuple[bytes, int]:
@@ -49,9 +54,9 @@ def _skip_string(data: bytes, offset: int) -> tuple[bytes, int]:
     return data[start : start + length - 1], start + length
 
 
-def _layout(data: bytes) -> tuple[list[bytes], list[tuple[int, int]]]:
+def layout(data: bytes) -> tuple[list[bytes], list[tuple[int, int]]]:
     """Joint names, and (offset, count) of the position, velocity and effort arrays."""
-    _, offset = _skip_string(data, _CDR + 8)
+    _, offset = _skip_string(data, CDR + 8)
     offset = _aligned(offset, 4)
     (joints,) = _count.unpack_from(data, offset)
     offset += 4
@@ -79,9 +84,9 @@ class JointStateReader:
 
     def read(self, data: bytes) -> Sample | None:
         """The joint's sample, or None if the message does not name the joint."""
-        if data[:2] != _LITTLE_ENDIAN:
+        if data[:2] != LITTLE_ENDIAN:
             return self._read_slowly(data)
-        names, arrays = _layout(data)
+        names, arrays = layout(data)
         if self._name not in names:
             return None
         index = names.index(self._name)
@@ -112,12 +117,12 @@ class JointStateWriter:
         # padding what the memory held: strict readers refuse the first, and equal messages differ by the second
         columns: dict[str, Any] = {field: np.zeros(1) for field in fields}
         self._buffer = bytearray(Messages(np.zeros(1, dtype=np.int64), **columns).serialised(joint).tobytes())
-        _, arrays = _layout(bytes(self._buffer))
-        self._offsets = [arrays[_FIELDS.index(field)][0] for field in fields]
+        _, arrays = layout(bytes(self._buffer))
+        self._offsets = [arrays[FIELDS.index(field)][0] for field in fields]
 
     def write(self, stamp_ns: int, *values: float) -> bytes:
         """A message with header stamp [ns] and one value per field, in the order the fields were named."""
-        _stamp.pack_into(self._buffer, _CDR, *divmod(stamp_ns, 1_000_000_000))
+        pack_stamp(self._buffer, stamp_ns)
         for offset, value in zip(self._offsets, values, strict=True):
             _double.pack_into(self._buffer, offset, value)
         return bytes(self._buffer)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
 from rhythmid.elements.catalogue import load_catalogue
@@ -26,7 +27,6 @@ from .lockstep import Acknowledger, Credit, block
 from .node import CATCH_UP, COUNT, JOINT, PRIORITY, RATE, TIME_MODE, WINDOW, GraphNode, lapse_notice, run
 from .parameters import Parameter
 from .qos import stream, subscribe_informed
-from .sample import Sample
 
 _LARGE = 1e12
 PARAMETERS = (
@@ -57,29 +57,26 @@ PARAMETERS = (
 
 
 class PlantNode(GraphNode):
-    """A thin shell: messages in and out, clock or lockstep; `rhythmid.simulation.plant.Plant` does the rest."""
+    """A thin shell: messages in and out, clock or lockstep; `rhythmid.simulation.plant.Plant` does the rest.
 
-    def __init__(self, **options: Any) -> None:
-        super().__init__("plant", PARAMETERS, **options)
+    A machine of several joints has another plant, other channels and another command, see `joint_plant`; all else is the same.
+    """
+
+    def __init__(self, parameters: tuple[Parameter, ...] = PARAMETERS, **options: Any) -> None:
+        super().__init__("plant", parameters, **options)
 
     def configure(self) -> None:
-        self._plant = self._build()
-        self._reader = JointStateReader(self.values["joint"])
-        self._state_writer = JointStateWriter(self.values["joint"], "position", "velocity", "effort")
-        self._forcing_writer = JointStateWriter(self.values["joint"], "effort")
+        self._plant: Any = self._build()
         profile = stream(self.lockstep)
-        self._states = self.create_publisher(JointState, "plant/joint_states", profile)
-        self._forcing = self.create_publisher(JointState, "forcing", profile)
+        self._open(profile)
         self._authority = Authority(self, "command", self.trip)
-        self._hold = CommandHold(self.values["command_timeout"], self.values["command_ramp"], self.period_ns)
-        self._limits = EffortLimits(size=self.values["max_effort"])
         self._commands = self._clamped = self._other_joint = self._samples = 0
         self._newest_ns = -1
         self._grid: Grid | None = None
         if self.lockstep:
             self._block = block(self.values["window"])
             self._block_stamps: list[int] = []
-            self._block_efforts: list[float] = []
+            self._block_efforts: list[Any] = []
             self._count = self.values["count"]
             if self._count == 0:
                 raise InputError("parameter count = 0: in lockstep the number of samples must be known")
@@ -100,14 +97,26 @@ class PlantNode(GraphNode):
             self._next_ns = 0  # time since the origin of the first tick after that
             self._transport = Lateness(self.period_ns)  # by which commands acted later than they were stamped
             self._done_ns = 0  # time since the origin up to which the plant has been integrated
-            self._arrived: deque[tuple[int, int, float]] = deque()
+            self._arrived: deque[tuple[int, int, Any]] = deque()
             subscribe_informed(self, JointState, "command", self._on_realtime, profile)
             self._grid = Grid(
                 self._wall, self.period_ns, self._tick, self.values["priority"], self.values["catch_up"]
             )
             self.workers.append(self._grid)
 
-    def _build(self) -> Plant:
+    def _open(self, profile: QoSProfile) -> None:
+        """Readers and writers of messages, their topics, and what becomes of commands."""
+        self._reader: Any = JointStateReader(self.values["joint"])
+        self._state_writer: Any = JointStateWriter(self.values["joint"], "position", "velocity", "effort")
+        self._forcing_writer = JointStateWriter(self.values["joint"], "effort")
+        self._states = self.create_publisher(JointState, "plant/joint_states", profile)
+        self._forcing = self.create_publisher(JointState, "forcing", profile)
+        self._hold: Any = CommandHold(
+            self.values["command_timeout"], self.values["command_ramp"], self.period_ns
+        )
+        self._limits = EffortLimits(size=self.values["max_effort"])
+
+    def _build(self) -> Any:
         values = self.values
         if not values["model"]:
             raise InputError("parameter model is missing: name a model YAML file")
@@ -161,7 +170,7 @@ class PlantNode(GraphNode):
             found.append(f"no subscriber of {self._states.topic}")
         return found
 
-    def _accepted(self, data: bytes, about: dict[str, Any]) -> Sample | None:
+    def _accepted(self, data: bytes, about: dict[str, Any]) -> Any:
         """The command in a message, clamped; None if it is not to be obeyed."""
         if self.tripped or not self._authority.admits(about):
             return None
@@ -169,6 +178,10 @@ class PlantNode(GraphNode):
         if sample is None:
             self._other_joint += 1
             return None
+        return self._within_limits(sample)
+
+    def _within_limits(self, sample: Any) -> Any:
+        """The command in a sample, clamped; None, and the node trips, where it is no number."""
         if not math.isfinite(sample.effort):
             self.trip(f"a command of {sample.effort} on {self._authority.topic}")
             return None
@@ -198,7 +211,7 @@ class PlantNode(GraphNode):
         sample = self._accepted(data, about)
         if sample is None:
             if self._other_joint:
-                raise InputError(f"a command does not name the joint {self.values['joint']!r}")
+                raise InputError(f"a command does not name {self._named()}")
             return
         self._block_stamps.append(sample.stamp_ns)
         self._block_efforts.append(sample.effort)
@@ -212,6 +225,9 @@ class PlantNode(GraphNode):
             self._block_efforts.clear()
             self._ack.taken(self._commands)
             self._advance_lockstep()
+
+    def _named(self) -> str:
+        return f"the joint {self.values['joint']!r}"
 
     def _advance_lockstep(self) -> None:
         last = min(self._credit.limit, self._count) - 1
@@ -248,9 +264,14 @@ class PlantNode(GraphNode):
         self._next_ns = self._done_ns + self.period_ns
 
     def _drop_command(self, stamp_ns: int) -> None:
-        """Zero effort from a time since the origin on."""
-        self._push(max(stamp_ns, self._newest_ns + 1), 0.0)
-        self._hold.renew(self._newest_ns, 0.0)
+        """What is left without a command, from a time since the origin on."""
+        left = self._nothing()
+        self._push(max(stamp_ns, self._newest_ns + 1), left)
+        self._hold.renew(self._newest_ns, left)
+
+    def _nothing(self) -> Any:
+        """The command that stands for none: zero effort."""
+        return 0.0
 
     def _fade_until(self, stamp_ns: int) -> None:
         """The steps of a command that was not renewed, up to a time since the origin."""
@@ -258,7 +279,7 @@ class PlantNode(GraphNode):
             self._push(step_ns, effort)
         self._tell_lapse()
 
-    def _push(self, stamp_ns: int, effort: float) -> None:
+    def _push(self, stamp_ns: int, effort: Any) -> None:
         self._plant.push(stamp_ns, effort)
         self._newest_ns = stamp_ns
 

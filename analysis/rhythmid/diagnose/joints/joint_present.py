@@ -1,0 +1,73 @@
+"""A diagnosis of several joints as a report."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from rhythmid.body.machine import Machine
+from rhythmid.body.mujoco_body import MujocoBody
+from rhythmid.diagnose.joints.joint_case import JointResult
+from rhythmid.diagnose.joints.joint_diagnosis import MachineAnswer
+from rhythmid.report.joints import JointCurves, joints_page
+from rhythmid.report.page import Page
+from rhythmid.report.quantity import pretty_name
+from rhythmid.report.robot_figure import DrawnJoint
+
+
+def present_machine(answer: MachineAnswer, nominal: Machine, source: str, command: str) -> Page:
+    """The page of an answer; `source` names model and records, `command` the command line."""
+    result = answer.diagnosis.to_dict()
+    models = {"Nominal machine": nominal.to_yaml(), "Augmented machine": answer.machine.to_yaml()}
+    return joints_page(result, source, _robot(answer, nominal.body), _curves(answer.results, nominal), command, models)  # fmt: skip
+
+
+def _robot(answer: MachineAnswer, body: MujocoBody) -> list[DrawnJoint]:
+    found = answer.diagnosis
+    faults: dict[str, str] = {}
+    for one in found.missing:
+        name = f"mass of {one.link}" if one.link else pretty_name(one.element)
+        faults[one.joint] = f"{faults[one.joint]}, {name}" if one.joint in faults else name
+    unnamed = {**dict.fromkeys(found.undecided, "undecided"), **dict.fromkeys(found.unknown, "unknown")}
+    parents = parents_of(body)
+    return [
+        DrawnJoint(
+            name,
+            parents[name],
+            joint.rotational,
+            faults.get(name) or unnamed.get(name, ""),
+            name not in faults,
+        )
+        for name, joint in body.joints.items()
+    ]
+
+
+def parents_of(body: MujocoBody) -> dict[str, str | None]:
+    """Of each joint the one that carries it; none of one at the base."""
+    model, found = body.model, {}
+    last: dict[int, str] = {}  # the last joint of each link
+    for number in range(model.njnt):
+        name, link = model.joint(number).name, int(model.jnt_bodyid[number])
+        if name not in body.joints:
+            continue
+        above, before = link, last.get(link)
+        while before is None and above:
+            above = int(model.body_parentid[above])
+            before = last.get(above)
+        found[name] = before
+        last[link] = name
+    return found
+
+
+def _curves(results: Mapping[str, JointResult], machine: Machine) -> dict[str, JointCurves]:
+    found = {}
+    for joint, one in results.items():
+        balance = one.result.applicability.balance
+        if balance is None:
+            continue
+        first = len(balance.places[0])  # the rows of the first motion
+        time = balance.motions[0].time[np.asarray(balance.places[0], dtype=int)]
+        measured = balance.measured[:first]
+        nominal, augmented = (fit.fit.residual[:first] for fit in (one.result.nominal, one.result.chosen))
+        unit = "N*m" if machine.body.joints[joint].rotational else "N"
+        found[joint] = JointCurves(time, measured, measured + nominal, measured + augmented, unit)
+    return found

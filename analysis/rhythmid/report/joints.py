@@ -1,0 +1,147 @@
+"""The report of a machine of several joints: the robot with its faulty joints, a table for all joints, and for each joint what was measured
+and predicted."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.report.blocks import (
+    Block,
+    Bullets,
+    Drawing,
+    Equation,
+    Fold,
+    Paragraph,
+    Section,
+    Table,
+    Tiles,
+    drawing,
+)
+from rhythmid.report.chart import Chart, Curve
+from rhythmid.report.page import Page, Tone
+from rhythmid.report.quantity import NONE, number, percent, plain, pretty_name, sentence, with_unit
+from rhythmid.report.robot_figure import DrawnJoint, robot_svg
+from rhythmid.report.sections import reproduce_section
+
+Array = NDArray[np.float64]
+VERDICTS: dict[str, tuple[str, Tone]] = {
+    "consistent": ("Nothing is missing", "good"),
+    "missing_physics": ("Missing physics", "found"),
+    "unknown_physics": ("Something unknown is missing", "open"),
+    "undecided": ("Undecided", "open"),
+}
+SHOWN = 3.0  # [s] of a record that are drawn
+
+
+@dataclass(frozen=True, eq=False)
+class JointCurves:
+    """A joint's effort over time (n,) [s], in `unit`: as measured, as the refitted nominal path predicts it, and with the named effects."""
+
+    time: Array
+    measured: Array
+    nominal: Array
+    augmented: Array
+    unit: str
+
+
+def joints_page(
+    result: Mapping[str, Any], source: str, robot: Sequence[DrawnJoint], curves: Mapping[str, JointCurves],
+    command: str, models: Mapping[str, str],
+) -> Page:  # fmt: skip
+    """The report of a diagnosis of several joints; `result` is what `--json` writes."""
+    verdict, tone = VERDICTS[result["verdict"]]
+    named = ", ".join(f"{pretty_name(one['element'])} at {one['joint']}" for one in result["missing"])
+    if named:
+        verdict = f"{verdict}: {named}"
+    return Page(
+        title=f"rhythmid diagnosis: {verdict}",
+        kicker=f"Diagnosis of {source}",
+        verdict=verdict,
+        words=str(result["summary"]),
+        tone=tone,
+        tiles=Tiles(()),
+        sections=(
+            Section("Where", (_robot(robot), _table(result))),
+            *([Section("What is missing", tuple(_missing(result)))] if result["missing"] else []),
+            Section("Measured and predicted", tuple(_efforts(result, curves))),
+            Section("The next experiment", (Paragraph(sentence(plain(result["next_experiment"])), "lead"),)),
+            *_remarks(result),
+            reproduce_section(command, models),
+        ),
+    )
+
+
+def _robot(robot: Sequence[DrawnJoint]) -> Block:
+    faulty = [f"{one.name} ({one.fault})" for one in robot if one.fault]
+    alt = f"The robot's joints; marked: {', '.join(faulty) or 'none'}"
+    words = "Circles turn, squares slide. Marked joints lack physics: ! has a name, ? has none."
+    return Drawing("The robot", robot_svg(robot, alt), words, wide=True)
+
+
+def _table(result: Mapping[str, Any]) -> Table:
+    rows, marked = [], []
+    for place, (joint, one) in enumerate(result["joints"].items()):
+        missing = [pretty_name(m["element"]) for m in result["missing"] if m["joint"] == joint]
+        errors = [one["fit"][name]["heldout_nrmse"] for name in ("refitted_nominal", "augmented")]
+        rest = one["remainder"]
+        left = f"{percent(rest['share'])} of the mismatch" if rest["significant"] else "noise"
+        shown = [NONE if error is None else percent(error) for error in errors]
+        rows.append((joint, one["verdict"].replace("_", " "), ", ".join(missing) or NONE, *shown, left))
+        if one["verdict"] != "consistent":
+            marked.append(place)
+    for joint, why in result["not_judged"].items():
+        rows.append((joint, "not judged", why, NONE, NONE, NONE))
+    columns = ("joint", "verdict", "missing", "error, nominal", "error, augmented", "left")
+    caption = "All joints; errors of the effort on data that no fit has seen, as a share of it"
+    return Table(caption, columns, tuple(rows), tuple(marked))
+
+
+def _missing(result: Mapping[str, Any]) -> list[Block]:
+    blocks: list[Block] = []
+    for one in result["missing"]:
+        where = f"{one['joint']}, slot {one['slot']}: {pretty_name(one['element'])}"
+        blocks.append(
+            Paragraph(
+                f"{where}. Probability {number(one['probability'], 2)}; {percent(one['share'])} of the joint's mismatch."
+            )
+        )
+        blocks.append(Equation(one["equation"]))
+        rows = []
+        for name, value in one["parameters"].items():
+            std = NONE if value["std"] is None else number(value["std"], 2)
+            rows.append((name, with_unit(number(value["value"], 4), value["unit"]), std))
+        blocks.append(
+            Table(f"Parameters at {one['joint']}", ("parameter", "value", "standard deviation"), tuple(rows))
+        )
+    return blocks
+
+
+def _efforts(result: Mapping[str, Any], curves: Mapping[str, JointCurves]) -> list[Block]:
+    blocks: list[Block] = []
+    for joint, one in curves.items():
+        part = one.time <= one.time[0] + SHOWN
+        time = one.time[part]
+        chart = Chart(
+            f"Effort at {joint} over time, measured and predicted",
+            "time [s]",
+            f"effort [{one.unit}]",
+            (
+                Curve(time, one.measured[part], "measured", "measured"),
+                Curve(time, one.nominal[part], "nominal", "before", dashed=True),
+                Curve(time, one.augmented[part], "with the named effects", "after"),
+            ),
+        )
+        shown = drawing(
+            joint, chart, "Filtered as the evidence is; the nominal path is refitted.",
+        )  # fmt: skip
+        faulty = result["joints"][joint]["verdict"] != "consistent"
+        blocks.append(shown if faulty else Fold(f"{joint}: consistent", (shown,)))
+    return blocks
+
+
+def _remarks(result: Mapping[str, Any]) -> list[Section]:
+    lines = [*result["assumptions"], *result["notes"]]
+    return [Section("Assumptions and notes", (Bullets(tuple(map(sentence, lines))),))] if lines else []
