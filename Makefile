@@ -9,7 +9,7 @@ UPLOT    := analysis/rhythmid/report/vendor/uplot
 UPLOT_VERSION := 1.6.32
 
 .DEFAULT_GOAL := help
-.PHONY: help install test graphs computing lint format demo docs picture benchmark naming docker dist vendor lock clean
+.PHONY: help install test lint format demo docs picture benchmark naming docker dist vendor lock clean
 
 help: ## Show this list
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -38,17 +38,11 @@ $(VENV)/.warm: $(VENV)/.packages
 	@touch $@
 
 test: lint ## Run the linters and all tests
-	@# graphs wait more than they work; what only computes runs beside them, at a lower priority
-	$(MAKE) --no-print-directory --jobs=2 --output-sync graphs computing
-	@# what asserts about real time has the machine to itself
-	$(BIN)/python -m pytest -m alone tests/ros
-
-graphs:
-	$(BIN)/python -m pytest -m "not alone" tests/ros
-
-computing: # folders with the longest files first, so that neither worker ends long after the other
-	nice -n 10 $(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder \
+	@# folders with the longest files first, so that neither worker ends long after the other
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder \
 		tests/proof tests/browser tests/faults tests/unit
+	@# what runs in real time has the machine to itself
+	$(BIN)/python -m pytest tests/ros
 
 lint: $(VENV)/.packages ## Run ruff and pyright
 	$(BIN)/ruff check .

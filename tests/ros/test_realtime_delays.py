@@ -15,7 +15,7 @@ MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_
 DELAYS = {"input": 0.040, "measurement": 0.050}
 CLOSE = 0.3  # ms
 SWEEP = 20.0  # s
-pytestmark = [pytest.mark.alone, pytest.mark.timeout(240)]
+pytestmark = pytest.mark.timeout(240)
 
 
 @contextmanager

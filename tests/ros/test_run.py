@@ -166,7 +166,6 @@ def test_lockstep_follows_a_delay_profile_as_the_run_without_ros_does(rhythmid, 
     assert [row.position for row in rows["joint_states"]] == expected["joint_states"].position.tolist()
 
 
-@pytest.mark.alone
 def test_real_time_loses_nothing_and_reports_its_lateness(rhythmid, tmp_path):
     path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"})
     done = rhythmid("run", path)

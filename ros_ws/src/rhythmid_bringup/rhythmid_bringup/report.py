@@ -7,7 +7,6 @@ from pathlib import Path
 
 from rhythmid.commands.options import command_line
 from rhythmid.errors import InputError
-from rhythmid.experiment import Experiment
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.report.blocks import Bullets, Paragraph, Section, Table
@@ -18,9 +17,9 @@ from rhythmid.report.recording import recording_page
 from .supervisor import Observed, Outcome
 
 
-def write_report(path: Path, experiment: Experiment, observed: Observed, outcome: Outcome) -> None:
-    """Write the page. Raises InputError where its place is not writable, or the run left nothing to read."""
-    write_page(path, run_page(experiment.record.path, observed, outcome))
+def write_report(path: Path, bag: Path, observed: Observed, outcome: Outcome) -> None:
+    """Write the page of a run that left this bag. Raises InputError where its place is not writable, or the run left nothing to read."""
+    write_page(path, run_page(bag, observed, outcome))
 
 
 def run_page(bag: Path, observed: Observed, outcome: Outcome) -> Page:

@@ -94,7 +94,7 @@ def run_graph(
     mend(experiment.record.path)
     show(console, experiment, supervisor.observed, outcome)
     if report is not None:
-        write_report(report, experiment, supervisor.observed, outcome)
+        write_report(report, experiment.record.path, supervisor.observed, outcome)
         console.print(f"report: {report}")
     if outcome.code == 1:
         console.print(f"parameters and logs of the nodes: {folder}")
