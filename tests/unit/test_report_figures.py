@@ -123,7 +123,10 @@ def test_the_evidence_says_which_hypotheses_are_chosen_and_which_rejected() -> N
         b for b in hypotheses_section(findings(told)).blocks if getattr(b, "title", "").endswith("hypotheses")
     ]
     assert "Coulomb friction: predicts worse by 0" in chart.svg
-    assert "not believed: the effect has become the limit of another one" in chart.svg
+    assert (
+        "not believed: only a limit of its parameters is identifiable, where it is another effect"
+        in chart.svg
+    )
     assert [label for _, label in chart.legend] == ["chosen", "not believed, see below", "less likely"]
     alone = findings(
         result("consistent") | {"hypotheses": [hypothesis("nominal", 0.0, 1.0, [])], "rejections": []}

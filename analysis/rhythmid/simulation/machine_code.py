@@ -20,6 +20,7 @@ from numba.core.errors import NumbaError
 from rhythmid.errors import InputError
 
 _LOCK = threading.Lock()
+COLOUR = re.compile(r"\x1b\[[0-9;]*m")  # the compiler writes in colours where it can
 OURS = {
     "rhs",
     "run",
@@ -95,7 +96,7 @@ def _complaint(text: str, complaint: str) -> str:
     """One line of the compiler's page of complaint, with the elements that it mentions."""
     kernels = set(re.findall(r"^def (\w+)\(", text, re.MULTILINE)) - OURS
     named = sorted(one for one in kernels if len(kernels) == 1 or re.search(rf"\b{one}\(", complaint))
-    lines = [line.strip() for line in complaint.splitlines()]
+    lines = [line.strip() for line in COLOUR.sub("", complaint).splitlines()]
     lines = [
         line
         for line in lines
