@@ -23,6 +23,7 @@ import mujoco
 import numpy as np
 import rclpy
 from geometry_msgs.msg import WrenchStamped
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
@@ -176,7 +177,11 @@ def main() -> None:
     log = robot.given("log", "")  # file for the times [ns] at which commands acted: the truth of the delay
     with suppress(KeyboardInterrupt):
         while robot.context.ok():
-            robot.live()
+            try:
+                robot.live()
+            except RCLError:  # the robot is switched off between two messages
+                if robot.context.ok():
+                    raise
             time.sleep(0.5e-9 * PERIOD_NS)
     if log:
         np.save(log, np.array(robot.acted))

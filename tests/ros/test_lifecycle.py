@@ -26,6 +26,7 @@ from rhythmid_nodes.plant import PlantNode
 from rhythmid_nodes.recorder import Recorder
 
 MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"
+LEG = MODEL.parent / "legs" / "leg_experiment.yaml"
 CONSTANT = {"type": "profile", "points": [[0.0, 0.5]], "length": 60.0}
 EXCITATION = {"max_effort": 1.0, "excitation": json.dumps(CONSTANT), "stale_after": 0.0}
 pytestmark = pytest.mark.timeout(120)
@@ -64,24 +65,27 @@ def parameters(name, folder):
         "delay_injector": {},
         "recorder": {"path": str(folder / "bag"), "topics": ["joint_states"]},
         "command_guard": {"max_effort": 1.0},
+        "joint_plant": {"experiment": str(LEG)},
+        "joint_excitation": {"experiment": str(LEG)},
     }[name]
 
 
 @pytest.mark.parametrize("name", EXECUTABLES)
 def test_every_node_goes_through_its_states_by_the_standard_services(graph, tmp_path, name):
     node = graph.add(EXECUTABLES[name], autostart=False, **parameters(name, tmp_path))
-    assert state(graph, name) == "unconfigured" and node.obstacles is not None
+    called = node.get_name()
+    assert state(graph, called) == "unconfigured" and node.obstacles is not None
     before = len(node._entities())
     for _ in range(1 if name == "recorder" else 2):  # a bag is not written twice
-        assert not change(graph, name, "activate")  # no transition of this state, and the node lives
-        assert change(graph, name, "configure") and state(graph, name) == "inactive"
-        assert change(graph, name, "activate") and state(graph, name) == "active"
-        assert change(graph, name, "deactivate") and state(graph, name) == "inactive"
-        assert change(graph, name, "activate") and state(graph, name) == "active"
-        assert change(graph, name, "deactivate")
-        assert change(graph, name, "cleanup") and state(graph, name) == "unconfigured"
+        assert not change(graph, called, "activate")  # no transition of this state, and the node lives
+        assert change(graph, called, "configure") and state(graph, called) == "inactive"
+        assert change(graph, called, "activate") and state(graph, called) == "active"
+        assert change(graph, called, "deactivate") and state(graph, called) == "inactive"
+        assert change(graph, called, "activate") and state(graph, called) == "active"
+        assert change(graph, called, "deactivate")
+        assert change(graph, called, "cleanup") and state(graph, called) == "unconfigured"
         assert len(node._entities()) == before
-    assert change(graph, name, "shutdown") and state(graph, name) == "finalized" and node.done
+    assert change(graph, called, "shutdown") and state(graph, called) == "finalized" and node.done
     assert node.failure is None
 
 

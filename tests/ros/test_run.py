@@ -239,7 +239,8 @@ def test_stopped_by_the_user_it_leaves_a_valid_bag(started, tmp_path, layout, nu
     assert code == 0 and "stopped by the user" in said
     rows, states = content(tmp_path / "experiment_bag")
     assert states[-1]["state"] == "stopped" and rows["excitation"][-1].effort == 0.0
-    assert np.all(np.diff([row.stamp_ns for row in rows["forcing"]]) == 1_000_000)
+    steps = np.diff([row.stamp_ns for row in rows["forcing"]])
+    assert np.all((steps > 0) & (steps % 1_000_000 == 0))  # after a stall the newest sample follows
     assert children and not any(Path(f"/proc/{pid}").exists() for pid in children.values())
 
 

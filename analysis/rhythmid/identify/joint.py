@@ -25,12 +25,13 @@ from rhythmid.identify.harmonic_likelihood import (
 from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
 from rhythmid.identify.series import Series, dominant_frequency, prepare
-from rhythmid.ltp.pumping import Pumping, pumping_of
+from rhythmid.ltp.pumping import Pumping, active_pumping, pumping_of
 from rhythmid.model import Model
 from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
+PERIODS = 2.0  # of the forcing that a stretch covers at least, as `pumping_of` asks for
 STUCK = 0.5  # unexplained share (rms) of the response to the command, beyond which a fit is no answer
 POOR_MOTION = 0.2  # the same of the whole motion: what leaves more than a fifth of it is not identified
 CYCLE_HARMONICS = 24  # that are projected out where the limit cycle is not to be used
@@ -311,8 +312,16 @@ def step_of(series: Sequence[Series]) -> float:
 
 
 def _stretches(records: Sequence[Record]) -> tuple[Record, ...]:
-    """The records, cut where commands are missing."""
-    return tuple(stretch for record in records for stretch in cut_at_gaps(record).stretches)
+    """The records, cut where commands are missing. Stretches over less than two periods of the forcing, which do not tell its
+    phase, are left out where a longer one is there."""
+    found: list[Record] = []
+    for record in records:
+        stretches, pumping = cut_at_gaps(record).stretches, active_pumping(record)
+        least = PERIODS / pumping.frequency if pumping is not None and len(stretches) > 1 else 0.0
+        found += [one for one in stretches if one.duration > least] or [
+            max(stretches, key=lambda s: s.duration)
+        ]
+    return tuple(found)
 
 
 def _series(records: Sequence[Record], delay: float) -> list[Series]:
