@@ -16,7 +16,7 @@ os.environ.setdefault(
     "OMP_NUM_THREADS", "1"
 )  # before numpy: every worker has a core, and threads would wait for each other
 
-settings.register_profile("rhythmid", deadline=None, derandomize=True, database=None, max_examples=25)
+settings.register_profile("rhythmid", deadline=None, derandomize=True, database=None, max_examples=40)
 settings.load_profile("rhythmid")
 
 Command = Callable[..., subprocess.CompletedProcess[str]]

@@ -1,4 +1,4 @@
-"""The short form of the concealed proof: nine sealed cases, diagnosed from their bags, then opened.
+"""The short form of the concealed proof: ten sealed cases, diagnosed from their bags, then opened.
 
 Rates are measured by campaigns (`rhythmid proof`, docs/proof.md); these cases show that what a campaign does is done, and
 that what it found of them still holds: of machines whose diagnosis takes seconds, clean ones with one effect, cluttered ones
@@ -13,7 +13,7 @@ from rhythmid.proof.campaign import Campaign, Task, begin, carry_out, scores_in
 from rhythmid.proof.card import markdown
 from rhythmid.proof.score import Score
 
-SINGLES = [Task(60403, "single", 0, design) for design in ("servo", "pendulum", "axis", "joint")]
+SINGLES = [Task(60403, "single", 0, design) for design in ("hopper", "servo", "pendulum", "axis", "joint")]
 NULLS = [Task(60402, "null", 0, design, cluttered=True) for design in ("pendulum", "motor", "servo")]
 LEFT_OUT = [Task(60405, "left-out", index, "axis", cluttered=True) for index in (0, 1)]
 

@@ -101,7 +101,7 @@ def test_what_contains_or_equals_an_effect_leaves_the_catalogue_with_it(catalogu
     assert "constant_force" in absent_with(catalogue, "asymmetric_coulomb_friction")
 
 
-@pytest.mark.parametrize("design", ["axis", "decay"])  # sized by the effort, by the motion
+@pytest.mark.parametrize("design", ["axis", "joint", "decay", "motor"])
 def test_the_same_seed_draws_the_same_case(design, catalogue):
     assert draw_case(6, "single", 0, catalogue, design) == draw_case(6, "single", 0, catalogue, design)
 

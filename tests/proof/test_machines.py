@@ -19,18 +19,23 @@ from rhythmid.model import Model
 NAMED: dict[str, Callable[[], Twin]] = {
     "axis under a controller, sticking and slipping, driven by its motor's effort": twins.axis,
     "joint driven by a current, velocity measured": twins.joint,
+    "pendulum driven through large swings": twins.pendulum,
+    "servo of which only command and motion are known": twins.servo,
     "free decay without any input": twins.decay,
 }
+# named before the effort was scored by inverse dynamics: the position, integrated from the speed, drifts along the gravity
+UNNAMED: dict[str, Callable[[], Twin]] = {
+    "joint driven by a current, velocity measured, with a heavy link": lambda: twins.joint(0.0, weight=0.5),
+}
+NOT_YET = pytest.mark.xfail(
+    strict=True, reason="gravity is not seen in the effort where only the speed is recorded"
+)
 NULLS: dict[str, Callable[[], Twin]] = {
     "joint": lambda: twins.joint(friction=0.0),
     "rig on a shaken base": lambda: twins.rig(cubic=0.0),
     "film at 30 Hz": lambda: twins.camera(""),
 }
 SLOW: dict[str, Callable[[], Twin]] = {
-    "pendulum driven through large swings": twins.pendulum,
-    "servo of which only command and motion are known": twins.servo,
-    # not named: the position, integrated from the speed, drifts along the gravity
-    "joint driven by a current, velocity measured, with a heavy link": lambda: twins.joint(0.0, weight=0.5),
     "axis in closed loop from its reference": lambda: twins.axis(known="reference"),
     "pendulum, free decay": lambda: twins.pendulum(driven=False),
     "rig, base displacement": twins.rig,
@@ -57,9 +62,9 @@ def examined(twin: Twin) -> Answer:
     return answer
 
 
-@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("name", [*NAMED, *(pytest.param(name, marks=NOT_YET) for name in UNNAMED)])
 def test_the_missing_effect_is_named_and_measured(name):
-    twin = NAMED[name]()
+    twin = (NAMED | UNNAMED)[name]()
     result = examined(twin).diagnosis
     assert result.verdict == "missing_physics"
     assert [effect.element for effect in result.missing] == [twin.lacks]

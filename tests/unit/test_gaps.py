@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rhythmid.identify.joint import _stretches
+from rhythmid.identify.joint import stretches_of
 from rhythmid.identify.series import prepare, record_of
 from rhythmid.record.gaps import LEAST_SAMPLES, PAST, cut_at_gaps
 from rhythmid.record.interpolation import interpolation_errors
@@ -163,5 +163,5 @@ def test_of_a_forced_record_no_stretch_is_kept_that_does_not_tell_the_forcings_p
     given_ = replace(record(slow(0), without((0.5, 1.0), (10.0, 10.5))), forcing=forcing)
     kept = without((0.5, 1.0), (10.0, 10.5))
     given_ = replace(given_, forcing=Channel(TIME[kept], forcing.value[kept], "N"))
-    durations = [one.duration for one in _stretches([given_])]
+    durations = [one.duration for one in stretches_of([given_])]
     assert len(durations) == 2 and min(durations) > 2.0

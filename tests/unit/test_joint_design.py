@@ -74,6 +74,26 @@ def test_a_design_is_written_as_an_experiment_that_can_be_played_and_signals_for
 
 
 @pytest.mark.parametrize(
+    "option",
+    [
+        ["--kind", "comb"],
+        ["--harmonics", "5"],
+        ["--longest-delay", "0.1"],
+        ["--spacing", "0"],
+        ["--forcing", "1", "1"],
+    ],
+)
+def test_an_option_for_one_axis_alone_is_refused(tmp_path: Path, option: list[str]):
+    model = fixed_leg(tmp_path)
+    limits = ["--duration", "4", "--band", "0.5", "5", "--max-effort", "25", "--noise-std", "0.1"]
+    done = CliRunner().invoke(
+        app, ["design", str(model), *limits, *option, "--output", str(tmp_path / "plan")]
+    )
+    assert isinstance(done.exception, InputError) and option[0] in str(done.exception)
+    assert not (tmp_path / "plan").exists()
+
+
+@pytest.mark.parametrize(
     ("change", "said"),
     [
         ({"max_effort": 0.01}, "stays at"),

@@ -1,7 +1,7 @@
 """`rhythmid design`: a signal to play, and what it will tell, before the run."""
 
 from pathlib import Path
-from typing import Annotated, cast
+from typing import Annotated
 
 import typer
 
@@ -46,18 +46,20 @@ def design(
         ),
     ] = None,
     kind: Annotated[
-        str,
+        str | None,
         typer.Option(
-            "--kind", help="multisine (interleaved, least crest factor) or comb (time-shifted chirps)."
+            "--kind",
+            help="multisine (interleaved, least crest factor) or comb (time-shifted chirps); multisine by default.",
         ),
-    ] = "multisine",
+    ] = None,
     rate: Annotated[int, typer.Option("--rate", help="Rate of command and measurement in Hz.")] = 1000,
     harmonics: Annotated[
-        int,
+        int | None,
         typer.Option(
-            "--harmonics", help="Sidebands on either side of a line whose responses are kept apart."
+            "--harmonics",
+            help="Sidebands on either side of a line whose responses are kept apart; 3 by default.",
         ),
-    ] = 3,
+    ] = None,
     forcing: Annotated[
         tuple[float, float] | None,
         typer.Option(
@@ -72,11 +74,12 @@ def design(
         ),
     ] = None,
     longest_delay: Annotated[
-        float,
+        float | None,
         typer.Option(
-            "--longest-delay", help="Longest that either delay may be, in s; longer ones may alias."
+            "--longest-delay",
+            help="Longest that either delay may be, in s; longer ones may alias; 0.3 by default.",
         ),
-    ] = 0.3,
+    ] = None,
     max_distortion: Annotated[
         float | None,
         typer.Option(
@@ -108,18 +111,22 @@ def design(
     quiet: Quiet = False,
 ) -> None:
     """Design an experiment: the signal to play, as large as the machine bears, and every parameter's predicted uncertainty."""
+    of_one_axis = {
+        "kind": kind, "harmonics": harmonics, "longest_delay": longest_delay, "max_distortion": max_distortion, "shifts": shifts,
+        "period": period, "spacing": spacing,
+    }  # fmt: skip
     if machines.is_machine(model):
-        machines.refuse(
-            forcing=forcing, delays=delays, max_distortion=max_distortion, shifts=shifts, period=period, spacing=spacing,
-        )  # fmt: skip
-        limits = (duration, band, max_effort, noise_std, rate, envelope, seed)
-        joint_design.design_files(model, limits, output, elements or (), json, Terminal(quiet, json))
+        machines.refuse(forcing=forcing, delays=delays, **of_one_axis)
+        from rhythmid.design.joint_design import JointRequirements
+
+        of_joints = JointRequirements(duration, band, max_effort, noise_std, rate, envelope, seed)
+        joint_design.design_files(model, of_joints, output, elements or (), json, Terminal(quiet, json))
         return
     if envelope is None:
         raise InputError("--envelope: say which positions may be measured, lowest and highest")
     from rhythmid.design.design_folder import save_design
     from rhythmid.design.designer import design as make
-    from rhythmid.design.requirements import Kind, Requirements
+    from rhythmid.design.requirements import Requirements
     from rhythmid.elements.catalogue import load_catalogue
     from rhythmid.model import Model
     from rhythmid.progress_bar import progress
@@ -130,9 +137,9 @@ def design(
     catalogue = load_catalogue(elements or ())
     known = Model.load(model, catalogue)
     wanted = Requirements.of(
-        known, duration, band, max_effort, envelope, noise_std, kind=cast(Kind, kind), rate=rate, harmonics=harmonics,
-        forcing=None if forcing is None else Forcing(*forcing), delays=delays, longest_delay=longest_delay,
-        max_distortion=max_distortion, shifts=shifts, period=period, spacing=spacing, seed=seed,
+        known, duration, band, max_effort, envelope, noise_std, rate=rate, delays=delays, seed=seed,
+        forcing=None if forcing is None else Forcing(*forcing),
+        **{name: value for name, value in of_one_axis.items() if value is not None},
     )  # fmt: skip
     with progress(terminal.progress, log=False) as tell:
         found = make(known, wanted, catalogue, tell)

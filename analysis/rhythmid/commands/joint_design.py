@@ -11,26 +11,27 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from rhythmid.commands.terminal import Terminal
-    from rhythmid.design.joint_design import JointDesign
-
-Limits = tuple[
-    float, tuple[float, float], float, float, int, tuple[float, float] | None, int
-]  # of JointRequirements
+    from rhythmid.design.joint_design import JointDesign, JointRequirements
 
 
 def design_files(
-    model: Path, limits: Limits, output: Path, elements: Sequence[Path], json: Path | None, terminal: "Terminal"
-) -> None:  # fmt: skip
+    model: Path,
+    wanted: "JointRequirements",
+    output: Path,
+    elements: Sequence[Path],
+    json: Path | None,
+    terminal: "Terminal",
+) -> None:
     """Design references for the machine in a model file, write them, print and write the prediction."""
     from rhythmid.body.machine import Machine
-    from rhythmid.design.joint_design import JointRequirements, design_joints, save_joint_design
+    from rhythmid.design.joint_design import design_joints, save_joint_design
     from rhythmid.elements.catalogue import load_catalogue
     from rhythmid.progress_bar import progress
 
     require_new(output, json)
     machine = Machine.load(model, load_catalogue(elements))
     with progress(terminal.progress, log=False) as tell:
-        found = design_joints(machine, JointRequirements(*limits), tell)
+        found = design_joints(machine, wanted, tell)
     save_joint_design(found, machine, model, output)
     show(found, terminal.answer)
     if json is not None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = {"mujoco": ".xml", "urdf": ".urdf"}
 APPLIED = "rhythmid.mujoco.apply(model, data) before each mj_step makes all of it act: docs/legs.md"
-UNDRAWN = "{} is not made for a machine of several joints; --json has all of the answer"
+OF_ONE_AXIS = "{} is for a machine of one axis; leave it out"
 
 
 def is_machine(model: Path | None) -> bool:
@@ -55,8 +55,8 @@ def _signals(bags: Sequence[Path], signals: Path | None) -> Path:
 def refuse(**given: object) -> None:
     """Raise InputError for options that have no meaning for several joints."""
     for name, value in given.items():
-        if value:
-            raise InputError(UNDRAWN.format(f"--{name.replace('_', '-')}"))
+        if value is not None and value is not False:
+            raise InputError(OF_ONE_AXIS.format(f"--{name.replace('_', '-')}"))
 
 
 def diagnose_files(

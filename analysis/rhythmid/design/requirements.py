@@ -93,23 +93,11 @@ class Requirements:
         Parameters
         ----------
         model
-            The machine, which says forcing and delays where they are not given.
-        duration
-            Length of the run [s].
-        band
-            Lowest and highest frequency of the command [Hz].
-        max_effort
-            Largest |u| [N].
-        envelope
-            Lowest and highest measured position [m].
-        noise_std
-            Standard deviation of a single measured sample [m].
-        forcing
-            On the robot.
+            The machine.
+        duration, band, max_effort, envelope, noise_std, forcing, further
+            The attributes of these names.
         delays
-            Of command and measurement [s].
-        further
-            The other attributes of `Requirements`.
+            Of command and measurement, as expected [s].
         """
         late = transport_delays(model) if delays is None else delays
         return cls(

@@ -41,8 +41,11 @@ def told_apart(margin: float) -> float:
 
 
 def margin_over_others(label: str, contest: Contest, selection: Selection) -> float:
-    """By how much log density the chosen hypothesis, or one with a richer law in its place, predicts better than the best one with
-    no more effects that has neither the effect of this label, nor one that is equivalent to it, contains it or is a special case of it: nested laws are always near."""
+    """By how much log density the chosen hypothesis, or one with a richer law in its place, predicts better than the best rival.
+
+    Rivals have no more effects, and neither the effect of this label nor one that contains it or is a special case of it: nested
+    laws are always near. What is equivalent is listed with the name.
+    """
     chosen = selection.chosen
     name = dict(zip(chosen.elements, chosen.names))[label]
     accepted = {name, *chosen.richer.get(name, ())}

@@ -128,12 +128,18 @@ def special_case(first: Hypothesis, second: Hypothesis) -> bool:
 
 
 def equivalent(other: Hypothesis, best: Hypothesis, contest: Contest) -> bool:
-    """Whether another hypothesis predicts as well as the better one: the data do not decide, or the better one is a richer law
-    that is not told apart by far, or that removes but a small share of what the other leaves or of the whole mismatch."""
-    gain = weight_for(best.prediction, other.prediction)
-    if gain <= (APART if special_case(other, best) else decisive(1)):
-        return True
-    left = other.prediction.mean_square - contest.floor
-    whole = contest.nominal.prediction.mean_square - contest.floor
-    removed = other.prediction.mean_square - best.prediction.mean_square
-    return special_case(other, best) and removed < max(REST * left, MISMATCH * whole)
+    """Whether another hypothesis predicts as well as the better one: the data do not decide, or the better one is a richer law that
+    does not replace it."""
+    if special_case(other, best):
+        whole = contest.nominal.prediction.mean_square - contest.floor
+        return not replaces(best.prediction, other.prediction, contest.floor, whole)
+    return weight_for(best.prediction, other.prediction) <= decisive(1)
+
+
+def replaces(richer: Prediction, plain: Prediction, floor: float, whole: float) -> bool:
+    """Whether a richer law is named in the place of one that it contains: it is told apart by far, and removes more than a small
+    share of what the other leaves above the `floor` and of the `whole` mismatch, both mean squared errors."""
+    removed = plain.mean_square - richer.mean_square
+    return weight_for(richer, plain) > APART and removed >= max(
+        REST * (plain.mean_square - floor), MISMATCH * whole
+    )

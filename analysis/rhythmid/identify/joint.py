@@ -263,7 +263,7 @@ def best_fit(records: Record | Sequence[Record], model: Model) -> JointFit:
         raise InputError("nothing to identify from: give at least one record")
     model, pumping = prepared_model(with_declared(model, given), given)
     starts = _start(model, given, pumping)
-    given = _stretches(given)
+    given = stretches_of(given)
     best: JointFit | None = None
     for start in starts:
         late = sum(max(start.value(name), 0.0) for name in DELAYS if name in start.parameters)
@@ -293,7 +293,7 @@ def fit_from(model: Model, records: Record | Sequence[Record], cycle: bool = Tru
     """
     given = (records,) if isinstance(records, Record) else tuple(records)
     ready, pumping = prepared_model(with_declared(model, given), given)
-    given = _stretches(given)
+    given = stretches_of(given)
     late = sum(max(ready.value(name), 0.0) for name in DELAYS if name in ready.parameters)
     series = _series(given, late)
     if not cycle and pumping is not None:
@@ -311,7 +311,7 @@ def step_of(series: Sequence[Series]) -> float:
     return share * min(one.period * one.block for one in series)
 
 
-def _stretches(records: Sequence[Record]) -> tuple[Record, ...]:
+def stretches_of(records: Sequence[Record]) -> tuple[Record, ...]:
     """The records, cut where commands are missing. Stretches over less than two periods of the forcing, which do not tell its
     phase, are left out where a longer one is there."""
     found: list[Record] = []

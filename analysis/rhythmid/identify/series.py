@@ -22,7 +22,7 @@ from rhythmid.record.record import Record
 from rhythmid.simulation.generated_source import InputKind, OutputKind
 from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, spline
 
-ERASED = 0.02  # of a motion's power that a Hann window leaves, of 3/8 of a steady one, below which it has erased the motion
+ERASED = 0.02  # share of a motion's power that a Hann window leaves (of a steady one 3/8), below which the motion is gone
 LEAST_PART = 16  # samples in which a frequency can still be seen
 REACH = 2  # blocks on either side from which `of_block` takes differences
 REST_LENGTH = "linear_spring.rest_length"

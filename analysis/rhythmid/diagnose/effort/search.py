@@ -12,7 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rhythmid.diagnose.case import Budget
-from rhythmid.diagnose.constants import EQUIVALENT, MISMATCH, PRACTICAL_EFFORT, REST
+from rhythmid.diagnose.constants import MISMATCH, PRACTICAL_EFFORT, REST
 from rhythmid.diagnose.effort.candidate import (
     INPUT_DELAY,
     Screened,
@@ -27,9 +27,10 @@ from rhythmid.diagnose.effort.candidate import (
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.reference import reference_of
 from rhythmid.diagnose.effort.scales import scales_of
-from rhythmid.diagnose.evidence import Blocks, Linearised, difference, predict, weight_for
+from rhythmid.diagnose.evidence import Blocks, Linearised, predict, weight_for
 from rhythmid.diagnose.hypothesis import Kind, Prediction
 from rhythmid.diagnose.rejections import decisive
+from rhythmid.diagnose.selection import replaces
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -171,15 +172,13 @@ class _Search:
         *others, before, free = made
         order = sorted(range(len(new)), key=lambda index: -others[index].score)
         best = order[0]
-        # of forms of one thing the simplest that predicts as well stands for all of them
-        for index in order[1:]:
-            if not self._simpler(new[index], new[best]):
-                continue
-            gain, error = difference(others[best], others[index])
-            rest = others[index].mean_square - free.mean_square
-            removed = others[index].mean_square - others[best].mean_square
-            whole = float(np.mean(self.nominal.fit.residual**2)) - free.mean_square
-            if gain < EQUIVALENT * error or removed < max(REST * rest, MISMATCH * whole):
+        whole = float(np.mean(self.nominal.fit.residual**2)) - free.mean_square
+        for index in order[
+            1:
+        ]:  # of forms of one thing the simplest that is not replaced stands for all of them
+            if self._simpler(new[index], new[best]) and not replaces(
+                others[best], others[index], free.mean_square, whole
+            ):
                 best = index
         return new[best] if self._worth(others[best], before, free, tried) else None
 
