@@ -113,7 +113,7 @@ def test_an_exported_leg_in_a_loop_of_mujocos_own_is_nearer_to_the_recording_wit
         (["diagnose", "{bag}", "--model", "{leg}"], "needs --signals"),
         (
             ["diagnose", "{bag}", "--model", "{leg}", "--signals", SIGNALS, "--sim", "{bag}"],
-            "--sim is not made",
+            "--sim is for a machine of one axis",
         ),
         (
             ["diagnose", "{bag}", "--model", "{floating}", "--signals", "{signals}"],
