@@ -11,6 +11,7 @@ from rhythmid.identify.inverse_dynamics.applicability import applicable
 from rhythmid.identify.inverse_dynamics.balance import Balance, stuck
 from rhythmid.identify.inverse_dynamics.estimate import FARTHEST, fit_effort, size_of
 from rhythmid.record.record import Channel
+from rhythmid.simulation.effect import effect_along
 
 FRICTION = {"force": 0.3, "transition": 0.02}
 
@@ -128,6 +129,39 @@ def test_a_gain_of_the_actuator_is_inverted_exactly():
     model = axis_model("actuator: [{actuator_gain: {gain: {value: 3.0, unit: '1', fixed: true}}}]")
     balance = Balance.of([axis()], axis_model())
     np.testing.assert_allclose(3.0 * balance.predicted(model), balance.predicted(axis_model()), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "relative", "tolerance"),
+    [
+        ("actuator_nonlinearity", {"coefficient": 0.01}, 1e-5),
+        ("actuator_nonlinearity", {"coefficient": -0.5}, 1e-5),
+        ("actuator_deadband", {"threshold": 0.2}, 0.05),  # nothing comes out of what is within
+        ("backlash", {"width": 0.2}, 0.05),
+        ("actuator_lag", {"time_constant": 0.005}, 1e-2),
+    ],
+)
+def test_what_goes_into_an_actuator_is_what_it_makes_the_required_effort_of(name, relative, tolerance):
+    balance = Balance.of([axis()], axis_model())
+    after = balance.required(axis_model())[0]
+    size = float(np.std(after))
+    units = {"coefficient": size**-2, "threshold": size, "width": size, "time_constant": 1.0}
+    values = {own: value * units[own] for own, value in relative.items()}
+    into = balance.required(axis_model().with_element(CATALOGUE[name], values))[0]
+    path = replace(balance.motions[0].path(after, 0.0 * after, into, False), signal=into)
+    made = into + effect_along(CATALOGUE[name], values, axis_model(), path)
+    assert np.linalg.norm(made - after) < tolerance * size * np.sqrt(len(after))
+
+
+def test_beyond_a_saturation_the_effort_that_went_in_stays_finite():
+    balance = Balance.of([axis()], axis_model())
+    after = balance.required(axis_model())[0]
+    limit = 0.8 * float(np.abs(after).max())
+    model = axis_model().with_element(CATALOGUE["actuator_saturation"], {"limit": limit})
+    into = balance.required(model)[0]
+    np.testing.assert_allclose(
+        into, np.where(np.abs(after) > limit, 2 * after - np.sign(after) * limit, after)
+    )
 
 
 def test_a_dead_band_takes_what_it_takes_from_the_effort():

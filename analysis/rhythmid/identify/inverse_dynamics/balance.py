@@ -29,8 +29,12 @@ DECIMATED = 2.5  # rows a period of the cut-off: the Nyquist rate and a quarter 
 MEMORY = 2e8  # bytes of forces that are kept, so that a refit computes again only what changed
 MANY_ROWS = 200  # of a short record that are kept at least: their correlation is allowed for
 LEAST_ROWS = 40  # rows without which nothing is estimated
-LEVELS = (1.0, -1.0, 0.3)  # of the effort's size, at which it is seen whether an actuator is a gain
-STRAIGHT = 1e-9  # of a signal: curvature that is rounding
+INVERSIONS = (
+    8  # steps of an actuator's inversion at most: an error that halves each time is then below a hundredth
+)
+EXACT = 1e-6  # of a signal: as near as an inversion goes
+SECANT = 1e-3  # of a signal, over which a slope is taken
+FLAT = 0.05  # of its usual slope, below which an element counts as passing nothing on
 SUBSTEPS = 4  # of an element's own states in a sample of the motion, whose bandwidth has ten
 INVISIBLE = 1e-4  # of a signal that is left by a filter that it does not pass
 NEIGHBOURS = np.arange(-2, 4)  # samples from which a value between two is interpolated (Lagrange)
@@ -214,24 +218,32 @@ class Balance:
     def _before(self, motion: Motion, term: Term, model: Model, after: Array, leg: Array) -> Array:
         """The signal (n,) that went into an actuator or command element for `after` to come out.
 
-        Exact where the element is a gain and an offset at each instant, like a motor with its back-EMF; else to first order:
-        what went in is what has to come out less the change on the way.
+        Newton's steps at each instant where the element has no memory; else the change on the way is taken off again as long as that
+        helps. What no signal makes come out, beyond a limit, is what went in to first order.
         """
-        if not term.element.own:
-            size = float(np.std(after)) or 1.0
-            nothing = self._along(motion, term, model, after, leg, np.zeros_like(after))
-            slopes = [
-                (self._along(motion, term, model, after, leg, np.full_like(after, level * size)) - nothing)
-                / (level * size)
-                for level in LEVELS
-            ]
-            gain = 1.0 + slopes[0]
-            straight = (
-                max(float(np.abs(one - slopes[0]).max()) for one in slopes) <= STRAIGHT * np.abs(gain).max()
-            )
-            if straight and np.abs(gain).min() > 0.0:
-                return (after - nothing) / gain
-        return after - self._along(motion, term, model, after, leg, after)
+        into, error = after, -self._along(motion, term, model, after, leg, after)
+        first_order, least = after + error, EXACT * np.linalg.norm(after)
+        for _ in range(INVERSIONS):
+            step = error if term.element.own else error / self._slope(motion, term, model, after, leg, into)
+            left = after - into - step - self._along(motion, term, model, after, leg, into + step)
+            if term.element.own:
+                nearer = np.full(len(after), np.linalg.norm(left) < np.linalg.norm(error))
+            else:
+                nearer = np.abs(left) < np.abs(error)
+            into, error = np.where(nearer, into + step, into), np.where(nearer, left, error)
+            if not nearer.any() or np.linalg.norm(error) <= least:
+                break
+        return np.where(into == after, first_order, into)
+
+    def _slope(
+        self, motion: Motion, term: Term, model: Model, effort: Array, leg: Array, signal: Array
+    ) -> Array:
+        """Slope (n,) of what comes out of an element without memory over what goes in; the usual one where nothing more comes out."""
+        width = SECANT * (float(np.std(signal)) or 1.0)
+        sides = [self._along(motion, term, model, effort, leg, signal + side * width) for side in (-0.5, 0.5)]
+        slope = 1.0 + (sides[1] - sides[0]) / width
+        usual = float(np.median(slope)) or 1.0
+        return np.where(slope / usual > FLAT, slope, usual)
 
     def _along(
         self, motion: Motion, term: Term, model: Model, effort: Array, leg: Array, signal: Array
