@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rhythmid.identify.joint import stretches_of
@@ -12,7 +12,7 @@ from rhythmid.identify.series import prepare, record_of
 from rhythmid.record.gaps import LEAST_SAMPLES, PAST, cut_at_gaps
 from rhythmid.record.interpolation import interpolation_errors
 from rhythmid.record.record import Channel, Record
-from rhythmid.record.timing import gaps_between
+from rhythmid.record.timing import gaps_between, nominal_period
 from rhythmid.simulation.signal import band_limited
 
 RATE = 200.0
@@ -156,6 +156,32 @@ def test_commands_that_were_held_up_and_came_in_a_burst_are_not_lost():
     kept = (due < 3.0) | (due >= 3.02)
     first, lost = gaps_between(arrived[kept])
     assert (arrived[kept][first].round(3).tolist(), lost.tolist()) == ([2.999], [20])
+
+
+def bursts(time, held, rng):
+    """Stamps of samples that were held back for up to `held` [s] and then came one right after another."""
+    release = np.cumsum(rng.uniform(0.2 * held, held, int(len(time) / RATE / held * 4)))
+    late = release[np.searchsorted(release, time)]
+    return late + 5e-5 * np.arange(len(time)) / len(time) + 1e-6 * np.arange(len(time))
+
+
+@given(seed=seeds)
+@settings(max_examples=20, deadline=None)
+def test_the_period_of_samples_that_come_in_bursts_is_the_mean_one(seed):
+    step = np.diff(bursts(TIME, 0.05, np.random.default_rng(seed)))
+    assert nominal_period(step) == pytest.approx(1.0 / RATE, rel=0.1)
+
+
+def test_samples_that_come_in_bursts_are_compared_one_by_one_and_none_is_lost():
+    time = bursts(TIME, 0.05, np.random.default_rng(1))
+    (made,) = prepare([Record("log", Channel(time, np.sin(2 * np.pi * 0.7 * time), "rad"))])
+    assert made.block == 1 and made.used.all() and len(made.used) == len(time)
+
+
+def test_a_few_gaps_do_not_end_the_averaging_of_samples():
+    kept = without(*((begin, begin + 0.1) for begin in (2.0, 7.0, 15.0)))
+    (made,) = prepare([record(slow(0), measured=kept)], 4)
+    assert made.block == 4 and 0.9 < made.used.mean() < 1.0
 
 
 def test_of_a_forced_record_no_stretch_is_kept_that_does_not_tell_the_forcings_phase():

@@ -19,11 +19,13 @@ from rhythmid.identify.inputs import Inputs
 from rhythmid.identify.spread import relative_spreads
 from rhythmid.model import Model
 from rhythmid.record.record import Record
+from rhythmid.record.timing import nominal_period
 from rhythmid.simulation.generated_source import InputKind, OutputKind
 from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, spline
 
 ERASED = 0.02  # share of a motion's power that a Hann window leaves (of a steady one 3/8), below which the motion is gone
 LEAST_PART = 16  # samples in which a frequency can still be seen
+TORN = 0.1  # of the blocks with a gap, beyond which stamps are too uneven to average samples; rare gaps cost fewer
 REACH = 2  # blocks on either side from which `of_block` takes differences
 REST_LENGTH = "linear_spring.rest_length"
 NO_SPRING = 1e-4  # of the inertia's own stiffness m ω², below which a spring sets no scale
@@ -208,7 +210,8 @@ def _held_before(time: Array, value: Array) -> tuple[Array, Array]:
 
 
 def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]:
-    """Series of all records. With `block` None the averaging is chosen from the records' bandwidth.
+    """Series of all records. With `block` None the averaging is chosen from the records' bandwidth; samples with uneven
+    stamps are not averaged.
 
     Raises InputError for a record too short to say anything, or with values that are not finite.
     """
@@ -220,7 +223,7 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
             raise InputError(
                 f"{record.name}: has only {len(time)} samples of the output; at least 16 are needed"
             )
-        period = float(np.median(np.diff(time)))
+        period = nominal_period(np.diff(time))
         command = None
         if record.input is not None and len(record.input.time) > 1:
             if record.input_kind == "base_displacement" and record.hold == "zero":
@@ -250,7 +253,10 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
         )
     if block is None:
         block = min(block_length(s.value, s.period) for s in longest_of_each(made))
-    made = [replace(s, block=block, used=_whole_blocks(s, block)) for s in made]
+    whole = [_whole_blocks(s, block) for s in made]
+    if np.concatenate(whole).mean() < 1.0 - TORN:
+        block, whole = 1, [np.ones(len(s.time), bool) for s in made]
+    made = [replace(s, block=block, used=used) for s, used in zip(made, whole)]
     spreads = relative_spreads([(record_of(s), s.time, s.value) for s in made], block)
     return [replace(s, spread=spread) for s, spread in zip(made, spreads)]
 

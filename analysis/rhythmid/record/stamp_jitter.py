@@ -127,7 +127,7 @@ def slope_of(time: Array, value: Array, noise: float) -> Array:
         if len(time) <= 2 * width:
             break
         slope = _line_slope(time, value, width)
-        step = float(np.median(np.diff(time)))
+        step = nominal_period(np.diff(time))
         variance = 3.0 * noise**2 / (step**2 * width * (width + 1) * (2 * width + 1))
         if variance < STEADY * float(np.mean(slope**2)):
             break

@@ -15,6 +15,7 @@ OFTEN = 0.1  # share of steps longer than 1.5 periods, beyond which a channel is
 NEIGHBOURS = 25
 # steps over which the period is read off in turn, up to about NEIGHBOURS, over which it must not drift
 SPANS = (1, 2, 4, 8, 16, 32)
+BURSTS = 0.5  # of the usual span's mean step, below which the usual step is one within a burst of messages that were held back
 FULL = 0.5  # of the periods missing, by which the earliest sample after a gap is late,
 AT_AN_END = 0.95  # and where so few samples are left that all of them may have come late by jitter
 
@@ -109,12 +110,16 @@ def nominal_period(step: Times) -> float:
 
     The median, refined over 1, 2, 4, ... steps by the mean of those spans that lie within half a period of so many periods: what
     jitter and rounding do to a period falls with the length of the span, and spans in which a sample is missing are left out.
-    Rounded to whole nanoseconds, the resolution of stamps; not where the steps are even and the rounding would lead away from them.
+    Where messages were held back and came in bursts, it is the mean step of the usual span instead. Rounded to whole nanoseconds, the resolution of stamps; not where the steps are even and the rounding would lead away from them.
     """
     period = float(
         np.percentile(step, 50.0, method="lower")
     )  # a step that occurs, where steps are of two kinds
     time = np.concatenate([[0.0], np.cumsum(step)])
+    longest = max(count for count in SPANS if count <= len(step))
+    usual = float(np.median(time[longest:] - time[:-longest])) / longest
+    if period < BURSTS * usual:
+        return usual
     even = False
     for steps in (count for count in SPANS if count <= len(step)):
         span = time[steps:] - time[:-steps]
