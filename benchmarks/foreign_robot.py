@@ -174,12 +174,12 @@ def judge(effect: Effect, found: Mapping[str, Any], delay: float, sigmas: float)
     return wrong
 
 
-def campaign(name: str, runs: int, length: float) -> int:
-    """Record and diagnose so many times; the number of wrong verdicts."""
+def campaign(name: str, runs: int, length: float, keep: Path | None) -> int:
+    """Record and diagnose so many times; the number of wrong verdicts. The bags stay in `keep`, where that is given."""
     right = covered = 0
     for seed in range(runs):
         with TemporaryDirectory() as folder:
-            bag = Path(folder) / "bag"
+            bag = Path(folder) / "bag" if keep is None else keep / f"{name}-{seed}"
             acted = record(bag, EFFECTS[name].parameters, length, seed=seed)
             began = time.monotonic()
             found, delay = answer(bag), true_delay(bag, acted)
@@ -203,11 +203,12 @@ def main() -> None:
     many = commands.add_parser("campaign", help="record and diagnose many times")
     many.add_argument("--effect", choices=EFFECTS, default="nothing")
     many.add_argument("--runs", type=int, default=20)
+    many.add_argument("--keep", type=Path, metavar="FOLDER", help="of the bags, which are deleted else")
     for command in (one, many):
         command.add_argument("--length", type=float, default=8.0, help="of each of two excitations [s]")
     given = parser.parse_args()
     if given.what == "campaign":
-        sys.exit(int(campaign(given.effect, given.runs, given.length) > 0))
+        sys.exit(int(campaign(given.effect, given.runs, given.length, given.keep) > 0))
     pairs = (pair.split(":=") for pair in given.parameters)
     record(given.bag.absolute(), {name: float(value) for name, value in pairs}, given.length)
     print(f"bag: {given.bag}")

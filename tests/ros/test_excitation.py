@@ -66,7 +66,9 @@ def last_state(run):
 
 
 def test_it_plays_the_experiments_samples_on_a_grid_without_gaps(graph, excite):
-    _, heard, run, _ = excite(CHIRP, ramp=0.1, count=500, catch_up=10.0)  # on a busy machine, too
+    _, heard, run, _ = excite(
+        CHIRP, ramp=0.1, count=500, catch_up=10.0, stale_after=10.0
+    )  # on a busy machine, too
     start(graph)
     graph.until(lambda: last_state(run).get("state") == "finished", "the end")
     graph.until(lambda: len(heard) == 501, "501 samples")

@@ -97,11 +97,12 @@ def _proposals(base: Model, now: Round, count: int, chi2: float) -> tuple[list[P
     made, enough = [], []
     local = {best.element.name: group for best, group in distinct(now.local, LOCAL)}
     for best, group in distinct(now.scores, count):
-        starts = [one.start for one in group[: 3 if len(group) > MANY else 2]]
+        starts = [(one.start, one.own(base)) for one in group[: 3 if len(group) > MANY else 2]]
         if not 0.2 < abs(best.size) < 5.0:  # far from the guess that was scored, the size is an extrapolation
-            starts.insert(1, dict(best.values))
-        starts = [*[one.start for one in local.pop(best.element.name, [])[:1]], *starts][:3]
-        made.append(propose(base, best.element, starts, now.added, chi2))
+            starts.insert(1, (dict(best.values), best.own(base, 1.0)))
+        starts = [*[(one.start, {}) for one in local.pop(best.element.name, [])[:1]], *starts][:3]
+        values, beside = zip(*starts)
+        made.append(propose(base, best.element, values, now.added, chi2, beside))
         enough.append(chi2 - 0.8 * best.statistic)
     for group in local.values():
         made.append(propose(base, group[0].element, [one.start for one in group[:2]], now.added, chi2))

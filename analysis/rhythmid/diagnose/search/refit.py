@@ -93,8 +93,9 @@ def _fit_proposal(
         assert failure is not None
         raise failure
     best = _carried_on(best, run, names, noise, reach)
-    guessed = proposal.guesses[0] if proposal.guesses else {}
-    flat = _flat(best.model, best.differences[0], list(guessed))
+    of_effect = f"{proposal.added[-1]}." if proposal.added else ""
+    guessed = [name for name in (proposal.guesses or ({},))[0] if name.startswith(of_effect)]
+    flat = _flat(best.model, best.differences[0], guessed)
     if flat:
         back = best.model.with_values({name: proposal.guesses[0][name] for name in flat})
         again = descend(back, run, names, noise, best.starts, BRIEF, None, TOLERANCE)

@@ -10,7 +10,7 @@ asymptotically chi-squared with one degree of freedom when the element is absent
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
@@ -55,7 +55,8 @@ class Score:
     """How well one first guess of one element explains the residual.
 
     `statistic` is the score test's chi-squared; `size` the factor on the guess that fits best (an element whose sign is
-    physics scores 0 when that is negative).
+    physics scores 0 when that is negative). `beside` are the changes of the model's own parameters that go with the guess of
+    size one: what of the effect they had stood in for.
     """
 
     key: int
@@ -63,6 +64,7 @@ class Score:
     values: Mapping[str, float]
     statistic: float
     size: float
+    beside: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def start(self) -> dict[str, float]:
@@ -72,13 +74,25 @@ class Score:
         scaled = dict(self.values)
         name = self.element.size
         low, high = self.element.parameter(name).bounds
-        factor = float(np.clip(self.size, -30.0, 30.0))
-        if abs(factor) < 0.05:
-            factor = math.copysign(0.05, factor)
-        value = self.element.absent + factor * (scaled[name] - self.element.absent)
+        value = self.element.absent + self._factor * (scaled[name] - self.element.absent)
         margin = 1e-3 * abs(scaled[name])
         scaled[name] = float(np.clip(value, low + margin if low > -math.inf else low, high))
         return scaled
+
+    @property
+    def _factor(self) -> float:
+        """The size of the first guess: neither nothing nor far beyond what was scored."""
+        factor = float(np.clip(self.size, -30.0, 30.0))
+        return math.copysign(max(abs(factor), 0.05), factor)
+
+    def own(self, model: Model, factor: float | None = None) -> dict[str, float]:
+        """Values of the model's own parameters beside the first guess, or beside the guess times `factor`, within their bounds."""
+        found = {}
+        for name, change in self.beside.items():
+            low, high = model.parameters[name].bounds
+            moved = model.value(name) + (self._factor if factor is None else factor) * change
+            found[name] = float(np.clip(moved, low, high))
+        return found
 
 
 @dataclass(frozen=True)
@@ -238,14 +252,18 @@ def whitened(fit: Fit, samples: Sequence[Array], noise: NoiseModel) -> list[Arra
     return found
 
 
-def parameter_basis(fit: Fit) -> Array:
-    """Orthonormal basis (n, r) of what small changes of the free parameters do."""
+def parameter_basis(fit: Fit) -> tuple[Array, Array]:
+    """Orthonormal basis (n, r) of what small changes of the free parameters do, and (p, r) the changes that make each."""
     jacobian = fit.linearisation.jacobian
     norms = np.linalg.norm(jacobian, axis=0)
-    if not (norms > 0).any():
-        return np.zeros((len(fit.linearisation.residual), 0))
-    left, singular, _ = np.linalg.svd(jacobian[:, norms > 0] / norms[norms > 0], full_matrices=False)
-    return left[:, singular > 1e-9 * singular[0]]
+    felt = norms > 0.0
+    if not felt.any():
+        return np.zeros((len(fit.linearisation.residual), 0)), np.zeros((len(norms), 0))
+    left, singular, right = np.linalg.svd(jacobian[:, felt] / norms[felt], full_matrices=False)
+    kept = singular > 1e-9 * singular[0]
+    changes = np.zeros((len(norms), int(kept.sum())))
+    changes[felt] = (right[kept] / singular[kept, None]).T / norms[felt, None]
+    return left[:, kept], changes
 
 
 def sizes_along(known: Trajectories) -> Scales:
@@ -307,7 +325,7 @@ def _impossible(element: Element, values: Mapping[str, float], factor: float) ->
 
 def score(fit: Fit, changes: Sequence[Change]) -> list[Score]:
     """Scores of all changes under the fit's noise model, best first."""
-    left = parameter_basis(fit)
+    left, made_by = parameter_basis(fit)
     residual = fit.linearisation.residual
     residual = residual - left @ (left.T @ residual)
     found: list[Score] = []
@@ -323,7 +341,9 @@ def score(fit: Fit, changes: Sequence[Change]) -> list[Score]:
         statistic = size**2 * strength
         if _impossible(one.element, one.values, size):
             statistic = 0.0
-        found.append(Score(one.key, one.element, one.values, statistic, size))
+        proportional = one.element.size and math.isfinite(one.element.absent)
+        beside = dict(zip(fit.names, -made_by @ (left.T @ joined))) if proportional else {}
+        found.append(Score(one.key, one.element, one.values, statistic, size, beside))
     return sorted(found, key=lambda s: -s.statistic)
 
 

@@ -105,8 +105,10 @@ def propose(
     guesses: Sequence[dict[str, float]],
     added: tuple[str, ...],
     ceiling: float = math.inf,
+    beside: Sequence[dict[str, float]] = (),
 ) -> Proposal:
-    """The base model, whose chi2 is `ceiling`, with one more element; `guesses` are values of the element's parameters."""
+    """The base model, whose chi2 is `ceiling`, with one more element; `guesses` are values of the element's parameters, and those
+    `beside` each of the model's own."""
     extended = base.with_element(element, guesses[0])
     label = extended.terms[-1].label
 
@@ -114,7 +116,9 @@ def propose(
         return {f"{label}.{name}": value for name, value in guess.items()}
 
     faint = [fainter(element, guesses[0], share) for share in FAINTER] if element.size else []
-    return Proposal((*added, label), extended, tuple(map(named, guesses)), ceiling, tuple(map(named, faint)))
+    own = [*beside, *({} for _ in guesses[len(beside) :])]
+    begun = tuple(named(guess) | values for guess, values in zip(guesses, own, strict=True))
+    return Proposal((*added, label), extended, begun, ceiling, tuple(map(named, faint)))
 
 
 def fainter(element: Element, guess: dict[str, float], share: float) -> dict[str, float]:

@@ -14,6 +14,7 @@ from rhythmid.identify.inverse_dynamics.estimate import condition_of, fit_effort
 from rhythmid.model import INERTIA, Model
 from rhythmid.record.record import Record
 from rhythmid.simulation.effect import Path, effect_along
+from rhythmid.simulation.generated_source import OutputKind
 
 # of the scaled normal equations' root, beyond which a robot's parameters are said not to be excited (K. Schröer, in: Robot
 # Calibration, Chapman & Hall, 1993; M. Gautier, W. Khalil, Int. J. Robot. Res. 11 (1992) 362 aim below it)
@@ -30,7 +31,7 @@ class Applicability:
     """Whether the effort can be scored, and why or why not.
 
     `condition` is that of the scaled columns, `explained` the share of the effort's power that a free map explains, `effort_share`
-    the effort's variation as a share of the inertial force. `restoring` says whether the model holds the machine anywhere,
+    the effort's variation as a share of the inertial force. `restoring` says whether the model holds what is measured anywhere,
     `closed` whether a controller does: of a machine with a restoring force and without a controller a long free run means
     something. `balance` holds the rows, where there are any.
     """
@@ -82,7 +83,8 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
             f"the motion does not tell the parameters apart (condition number {condition:.3g})",
         )
     return Applicability(
-        applies, reason, chosen.effort, condition, chosen.explained, share, restores(balance, model), closed, balance
+        applies, reason, chosen.effort, condition, chosen.explained, share,
+        restores(balance, model, records[0].output_kind), closed, balance,
     )  # fmt: skip
 
 
@@ -92,12 +94,15 @@ def _inertial(balance: Balance, model: Model) -> float:
     return float(np.std(balance.predicted(heavier) - balance.predicted(model))) / 0.01
 
 
-def restores(balance: Balance, model: Model) -> bool:
-    """Whether the model's forces at rest push the machine back from both ends of its travel, as the records show that."""
-    position = np.concatenate([motion.leg_position for motion in balance.motions])
-    travel = np.linspace(float(position.min()), float(position.max()), POINTS)
+def restores(balance: Balance, model: Model, measured: OutputKind = "position") -> bool:
+    """Whether the model's forces push what is measured back from both ends of its range: the position at rest, or the velocity
+    of a machine of which only that is known."""
+    of_speed = measured == "velocity"
+    signal = [motion.leg_velocity if of_speed else motion.leg_position for motion in balance.motions]
+    span = np.linspace(float(np.min(np.concatenate(signal))), float(np.max(np.concatenate(signal))), POINTS)
     zero, total = np.zeros(POINTS), np.zeros(POINTS)
-    path = Path(np.linspace(0.0, 1.0, POINTS), travel, zero, zero, zero, zero)
+    position, velocity = (zero, span) if of_speed else (span, zero)
+    path = Path(np.linspace(0.0, 1.0, POINTS), position, velocity, zero, zero, zero)
     for term in model.terms:
         if term.element.slot == "force" and term.element.acts in ("leg", "body"):
             total += effect_along(term.element, {n: v.value for n, v in term.values.items()}, model, path)
