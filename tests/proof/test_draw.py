@@ -99,6 +99,9 @@ def test_what_contains_or_equals_an_effect_leaves_the_catalogue_with_it(catalogu
     assert set(absent_with(catalogue, "clock_skew")) == {"clock_skew", "delay_drift"}
     assert "coulomb_friction" not in absent_with(catalogue, "stribeck_friction")
     assert "constant_force" in absent_with(catalogue, "asymmetric_coulomb_friction")
+    motor = DESIGNS["motor"].alike
+    assert {"command_lag", "sensor_lag"} <= set(absent_with(catalogue, "actuator_lag", motor))
+    assert "command_lag" not in absent_with(catalogue, "actuator_lag")
 
 
 @pytest.mark.parametrize("design", ["axis", "joint", "decay", "motor"])

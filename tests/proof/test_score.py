@@ -89,6 +89,20 @@ def test_a_name_counts_only_under_the_verdict_that_physics_is_missing(verdict, o
     assert judged(truth("coulomb_friction"), answer(verdict, "coulomb_friction")).outcome == outcome
 
 
+@pytest.mark.parametrize(
+    ("design", "group", "outcome"),
+    [
+        ("motor", ("command_lag", "actuator_lag", "sensor_lag"), "family"),
+        ("motor", ("actuator_lag", "command_hold"), "undecided"),
+        ("motor", ("command_lag", "sensor_lag"), "undecided"),
+        ("hopper", ("command_lag", "actuator_lag", "sensor_lag"), "undecided"),
+    ],
+)
+def test_what_no_record_of_a_machine_tells_apart_need_not_be_decided(design, group, outcome):
+    said = answer("undecided", group[0], families=[group])
+    assert judged(truth("actuator_lag", design=design), said).outcome == outcome
+
+
 def test_pairs_need_both_names_and_both_slots():
     both = truth("coulomb_friction", "backlash", kind="pairs")
     assert judged(both, answer("missing_physics", "backlash", "coulomb_friction")).outcome == "exact"

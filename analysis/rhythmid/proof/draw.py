@@ -114,10 +114,11 @@ def related(catalogue: Catalogue, first: str, second: str) -> bool:
 SUMS = {"asymmetric_coulomb_friction": ("constant_force",)}
 
 
-def absent_with(catalogue: Catalogue, name: str) -> tuple[str, ...]:
-    """What must leave the catalogue so that `name` is unknown to it: itself, what is the same model or makes it one with others,
-    what contains it."""
-    gone = {name, *SUMS.get(name, ())} | {twin for group in EQUIVALENT if name in group for twin in group}
+def absent_with(catalogue: Catalogue, name: str, alike: frozenset[str] = frozenset()) -> tuple[str, ...]:
+    """What must leave the catalogue so that `name` is unknown to it: itself, what is the same model (on a machine on which some
+    effects are `alike`) or makes it one with others, what contains it."""
+    same = [group for group in (*EQUIVALENT, alike) if name in group]
+    gone = {name, *SUMS.get(name, ())}.union(*same)
     gone |= {richer for one in tuple(gone) for richer in catalogue[one].special_case_of}
     return tuple(sorted(gone & set(catalogue)))
 
@@ -207,7 +208,7 @@ def _draw(
         return None
     start_ns = 0 if rng.random() < 0.5 else int(rng.integers(1_500_000_000, 1_900_000_000)) * 1_000_000_000
     nominal = nominal_model(rig, design, believed, fixed)
-    gone = absent_with(catalogue, names[0]) if kind == "left-out" else ()
+    gone = absent_with(catalogue, names[0], design.alike) if kind == "left-out" else ()
     used = {term.element.name for term in Model.from_text(nominal, catalogue=catalogue).terms}
     case = Case(
         label, kind, design.name, cluttered, rig, noise, draw_log(rng, noise) if cluttered else Log(), concealed,

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.proof.equations import FOREIGN
+from rhythmid.proof.machines.designs import DESIGNS
 
 Outcome = Literal["exact", "family", "wrong", "unknown", "undecided", "consistent", "failed"]
 FAMILY = 2  # members that a declared family may have
@@ -115,6 +116,8 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
     kin = _kin_of(clutter, catalogue)
     stands_for = {name: _declared(name, families, catalogue) for name in named}
     outcome = _outcome(true, stands_for, answer, kin)
+    if outcome == "undecided" and _all_alike(true, families, DESIGNS[truth["design"]].alike):
+        outcome = "family"
     ranked = _ranked(answer)
     slots = {catalogue[name].slot for name in true}
     if len(true) == 1:
@@ -163,6 +166,11 @@ def _ranked(answer: dict[str, Any]) -> list[dict[str, Any]]:
     if all(effect.get("share") is not None for effect in missing):
         missing.sort(key=lambda effect: -effect["share"])
     return missing
+
+
+def _all_alike(true: tuple[str, ...], families: tuple[tuple[str, ...], ...], alike: frozenset[str]) -> bool:
+    """Whether an answer does not decide between effects that no record of the machine tells apart, the true one among them."""
+    return any(set(true) <= set(group) <= alike for group in families) and bool(true)
 
 
 def _declared(name: str, families: tuple[tuple[str, ...], ...], catalogue: Catalogue) -> set[str]:

@@ -166,7 +166,7 @@ def new_bag(path: str | Path, storage: Storage = "mcap", compress: bool = False)
             raise
         writer.close()
         if os.path.lexists(path):  # renaming would replace an empty folder
-            raise InputError(f"{path}: was made by someone else meanwhile and is not overwritten")
+            raise InputError(f"{path}: was created by another process meanwhile and is not overwritten")
         (folder / path.name).rename(path)
     except (OSError, sqlite3.Error) as error:
         raise InputError(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from None

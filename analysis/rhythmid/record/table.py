@@ -141,7 +141,7 @@ def _check_size(path: Path, size: int) -> None:
     """Raise InputError where a file claims to hold more bytes than its own size allows."""
     if size > largest(path.stat().st_size):
         raise InputError(
-            f"{path}: claims to hold {size} bytes in {path.stat().st_size}: no such table is read"
+            f"{path}: claims to hold {size} bytes in {path.stat().st_size}: such tables are not read"
         )
 
 

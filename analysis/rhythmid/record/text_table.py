@@ -228,7 +228,7 @@ def _check_size(path: Path) -> None:
             size += len(piece)
             if size > most:
                 raise InputError(
-                    f"{path}: holds more than {most} bytes in {path.stat().st_size}: no such table is read"
+                    f"{path}: holds more than {most} bytes in {path.stat().st_size}: such tables are not read"
                 )
 
 

@@ -31,7 +31,7 @@ CLOSE = 0.1  # change of the noise's variance from pass to pass that is none
 SETTLED = 15  # segments until the beginning is forgotten, three of the seconds of which a minute has sixty
 ROUGH = 3  # differences of the measurement that leave noise and take motion away
 LEAST = 1e-9  # of the motion: noise that no sensor is below
-LOST = 0.5  # of the motion that innovations may be, above which the model is none of this machine
+LOST = 0.5  # of the motion that innovations may be, above which the model is not one of this machine
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def calibrate(
     nrmse = float(np.sqrt(np.mean([one.rms**2 for one in found]))) / float(np.std(output.value))
     if not nrmse < LOST:
         raise InputError(
-            f"the model leaves {100.0 * nrmse:.0f} % of the motion in the healthy stretch: it is none of this machine; identify it first"
+            f"the model leaves {100.0 * nrmse:.0f} % of the motion in the healthy stretch unexplained: it is not a model of this machine; identify the machine first"
         )
     return Calibration(extended, changes, period, filter, sizes, noise, healthy, nrmse)
 

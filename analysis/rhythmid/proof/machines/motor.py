@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rhythmid.proof.machine import Effect, Machine
-from rhythmid.proof.machines.rig import Design, Rig, Rng, log_uniform
+from rhythmid.proof.machines.rig import LAGS, Design, Rig, Rng, log_uniform
 from rhythmid.proof.protocol import Run, draw_sweep, draw_tones
 
 RATES = (200, 500, 1000)  # [Hz]
@@ -57,4 +57,5 @@ DESIGN = Design(
     {"inertia.mass": "mass", "viscous_damper.damping": "damping"},
     (0.003, 0.02),
     by_effort=True,
+    alike=LAGS,
 )

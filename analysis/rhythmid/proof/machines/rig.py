@@ -67,7 +67,7 @@ class Design:
     `effects` are the catalogue's that it may conceal; `draw` makes one of it that shows them; `unknown` tells which attribute
     of the machine each parameter of the nominal model is that has to be estimated. `by_effort`: a mismatch is measured in the
     effort, for a free run of such a machine means little. `noise` is the range of the measurement's noise in proportion to the
-    rig's scale; `delays`: nominal delays are part of the model.
+    rig's scale; `delays`: nominal delays are part of the model. `alike` are effects that no record of such a machine tells apart.
     """
 
     name: str
@@ -79,10 +79,14 @@ class Design:
     delays: Collection[str] = ()
     bags: bool = False
     known_with: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    alike: frozenset[str] = frozenset()
 
     def known(self, effects: Sequence[str]) -> tuple[str, ...]:
         """Attributes that have been measured beforehand when these effects are concealed."""
         return tuple(name for effect in effects for name in self.known_with.get(effect, ()))
+
+
+LAGS = frozenset({"command_lag", "actuator_lag", "sensor_lag"})  # alike in a linear machine with one input
 
 
 def log_uniform(rng: Rng, low: float, high: float) -> float:

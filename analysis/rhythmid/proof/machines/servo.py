@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from rhythmid.proof.machine import Machine
-from rhythmid.proof.machines.rig import Design, Rig, Rng
+from rhythmid.proof.machines.rig import LAGS, Design, Rig, Rng
 from rhythmid.proof.protocol import Run, draw_moves, draw_tones, from_reference
 
 RATES = (50, 100, 200)  # [Hz]
@@ -39,5 +39,5 @@ def draw(rng: Rng, conceals: Sequence[str]) -> Rig:
 
 DESIGN = Design(
     "servo", EFFECTS, draw, {"position_control.proportional": "proportional", "position_control.derivative": "derivative"},
-    (0.002, 0.01), delays=("input",),
+    (0.002, 0.01), delays=("input",), alike=LAGS,
 )  # fmt: skip
