@@ -34,6 +34,8 @@ from rhythmid.simulation.simulate import simulate
 ARRIVAL = (2e-4, 6e-4)  # s by which commands are late under `command_jitter`
 STAMPED = 0.3  # standard deviation of what the stamps are out by under `stamp_jitter`, in sample periods
 IRREGULAR = 0.15  # standard deviation of the times under `jittered`, in sample periods
+HELD = 0.01  # s between writes, on average, under `held_back`
+WRITING = 2e-5  # s that it takes to write a row
 SETTLED = 2.0  # s of the run before the table begins
 Table = dict[str, Array]  # the columns t [s], u, y of equal length
 Fault = Callable[[np.random.Generator, Table], Table]
@@ -182,6 +184,14 @@ def stamps_out(rng: np.random.Generator, table: Table) -> Table:
     return table | {"y": CubicSpline(t, table["y"])(np.clip(t + late, t[0], t[-1]))}
 
 
+def held_back(rng: np.random.Generator, table: Table) -> Table:
+    """Rows that were held back and written in bursts, each with the time at which it was written."""
+    t = table["t"]
+    release = t[0] + np.cumsum(rng.uniform(0.0, 2.0 * HELD, int(2 * np.ptp(t) / HELD) + 2))
+    late = release[np.searchsorted(release, t)] + WRITING * (np.arange(len(t)) % 10)
+    return table | {"t": np.maximum.accumulate(late) + 1e-7 * np.arange(len(t))}
+
+
 FAULTS: dict[str, Fault] = {
     "clean": lambda rng, table: table,
     "few_lost": few_lost,
@@ -193,6 +203,7 @@ FAULTS: dict[str, Fault] = {
     "reordered": reordered,
     "jittered": lambda rng, table: table,  # made by the simulation
     "rounded": rounded,
+    "held_back": held_back,
     "stamp_jitter": stamps_out,
     "command_jitter": lambda rng, table: table,  # made by the simulation
 }

@@ -46,4 +46,6 @@ DESIGN = Design(
         "viscous_damper.damping": "damping",
     },
     (0.002, 0.02),
+    # three poles either way: a relaxation is a lag, from a start of its own
+    alike=frozenset({"sensor_lag", "viscoelastic_relaxation"}),
 )  # fmt: skip
