@@ -7,6 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.identify import paper_hopper
 from rhythmid.identify.joint import stretches_of
 from rhythmid.identify.series import prepare, record_of
 from rhythmid.record.gaps import LEAST_SAMPLES, PAST, cut_at_gaps
@@ -191,3 +193,15 @@ def test_of_a_forced_record_no_stretch_is_kept_that_does_not_tell_the_forcings_p
     given_ = replace(given_, forcing=Channel(TIME[kept], forcing.value[kept], "N"))
     durations = [one.duration for one in stretches_of([given_])]
     assert len(durations) == 2 and min(durations) > 2.0
+
+
+def test_a_command_that_came_in_bursts_costs_no_finer_steps():
+    time = bursts(TIME, 0.05, np.random.default_rng(1))
+    given_ = Record(
+        "log",
+        Channel(time, np.sin(2 * np.pi * 0.7 * time), "m"),
+        Channel(time, slow(0), "N"),
+        hold="zero",
+    )
+    run = prepare_run(paper_hopper(), prepare([given_]))
+    assert run.max_step > 0.5 / RATE

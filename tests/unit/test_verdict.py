@@ -6,9 +6,11 @@ import pytest
 from contests import BLOCKS, SIZE, contest, decided, ends, predicted, supposed, verdict
 
 from rhythmid.diagnose.answer.result import FitQuality, MissingEffect
-from rhythmid.diagnose.answer.wording import summary_of
+from rhythmid.diagnose.answer.wording import freed_value, summary_of
 from rhythmid.diagnose.rejections import RULES
 from rhythmid.diagnose.verdict import significance
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.identify.identify import paper_hopper
 
 NOMINAL = supposed("", predicted(1.0))
 NAMED = ("missing_physics", ("friction",))
@@ -325,3 +327,18 @@ def test_a_name_is_stated_only_where_the_records_tell_it_from_others_by_far(marg
     assert decision.verdict == expected and decision.named == ("friction",)
     assert (decision.probability["friction"] >= 0.8) == (expected == "missing_physics")
     assert "lacks" in decision.reason or expected == "missing_physics"
+
+
+@pytest.mark.parametrize(
+    ("elements", "said"),
+    [
+        (("inertia.mass",), "comes out at 0.3, and that predicts"),
+        (("coulomb_friction", "inertia.mass"), "and that with coulomb friction predicts"),
+        (("inertia.mass", "coulomb_friction"), "and that with coulomb friction predicts"),
+        (("inertia.mass", "linear_spring.stiffness"), "0.3. linear_spring.stiffness is held at 200 N/m"),
+    ],
+)
+def test_a_freed_value_is_told_wherever_it_stands_among_the_effects(elements, said):
+    fitted = paper_hopper().with_element(load_catalogue()["coulomb_friction"], {"force": 0.1})
+    fitted = fitted.with_values({"inertia.mass": 0.3})
+    assert said in freed_value(paper_hopper(), fitted, elements)

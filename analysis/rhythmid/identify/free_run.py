@@ -14,6 +14,7 @@ from rhythmid.identify.declared import own_model
 from rhythmid.identify.inputs import Inputs
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
+from rhythmid.record.timing import nominal_period
 from rhythmid.simulation.compiled import Compiled, compile_model
 from rhythmid.simulation.generated_source import InputKind, OutputKind, Variant
 from rhythmid.simulation.signal import pieces
@@ -99,7 +100,7 @@ def _sees_steps(model: Model) -> bool:
 def _ticks(series: Sequence[Series]) -> list[float]:
     """Usual time [s] between the knots of each series' command."""
     knots = [one.command.x[:-1] for one in series if one.command is not None]
-    return [float(np.median(np.diff(times))) for times in knots if len(times) > 2]
+    return [nominal_period(np.diff(times)) for times in knots if len(times) > 2]
 
 
 def prepare_run(

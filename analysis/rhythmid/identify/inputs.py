@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
+from rhythmid.record.timing import BURSTS, nominal_period
 from rhythmid.simulation.signal import FAR, impulse_preserving, pieces
 
 Array = NDArray[np.float64]
@@ -43,12 +44,14 @@ class Inputs:
 
     @cached_property
     def smooth(self) -> Pieces | None:
-        """Smooth surrogate for a held command that changes about as often as the measurement is sampled, or more often; None where
-        there is none."""
+        """Smooth surrogate for a held command that changes about as often as the measurement is sampled, or more often, and at even
+        times; None where there is none."""
         command = self.commanded
         if command is None or command.c.shape[0] > 1 or len(command.x) <= SMOOTHED_FROM or not self.averaged:
             return None
-        if float(np.median(np.diff(command.x[:-1]))) > 2.0 * self.period * (1.0 + 1e-6):
+        step = np.diff(command.x[:-1])
+        usual = nominal_period(step)
+        if usual > 2.0 * self.period * (1.0 + 1e-6) or float(np.median(step)) < BURSTS * usual:
             return None
         return _contiguous(pieces(impulse_preserving(command)))
 

@@ -99,13 +99,18 @@ def summary_of(
 
 
 def freed_value(nominal: Model, fitted: Model, elements: Sequence[str]) -> str:
-    """A sentence about the fixed value, the last of the `elements`, that a hypothesis frees beside the others."""
-    *effects, name = elements
-    given, free = nominal.parameters[name], fitted.value(name)
+    """Sentences about the fixed values among the `elements`, which a hypothesis frees beside the others."""
+    effects = [label for label in elements if fitted.term(label) is not None]
+    freed = [name for name in elements if name not in effects]
     beside = f" with {' and '.join(effects).replace('_', ' ')}" if effects else ""
+    values = [
+        f"{name} is held at {nominal.parameters[name].value:g} {nominal.parameters[name].unit} as given. Freed it comes out at "
+        f"{fitted.value(name):.4g}"
+        for name in freed
+    ]
     return (
-        f"{name} is held at {given.value:g} {given.unit} as given. Freed it comes out at {free:.4g}, and that{beside} predicts the "
-        "records better than any effect does while it is held: check that value, or drop its 'fixed: true'."
+        f"{'. '.join(values)}, and that{beside} predicts the records better than any effect does while it is held: check "
+        f"{'that value' if len(freed) == 1 else 'these values'}, or drop its 'fixed: true'."
     )
 
 

@@ -38,6 +38,8 @@ ELEMENT = Element(
     acts="body",
     size="amplitude",
     starts=starts,
+    # with less than one period in a record it is a drift or a constant; beyond half the rate nothing is sampled
+    ranges=lambda s: {"frequency": (1.0 / s.duration, 0.5 / s.period)},
     also_known_as=("hum", "rotating imbalance", "external vibration"),
     family="disturbance",
     confusable={
