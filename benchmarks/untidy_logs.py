@@ -189,7 +189,8 @@ def held_back(rng: np.random.Generator, table: Table) -> Table:
     t = table["t"]
     release = t[0] + np.cumsum(rng.uniform(0.0, 2.0 * HELD, int(2 * np.ptp(t) / HELD) + 2))
     late = release[np.searchsorted(release, t)] + WRITING * (np.arange(len(t)) % 10)
-    return table | {"t": np.maximum.accumulate(late) + 1e-7 * np.arange(len(t))}
+    written = np.asarray(np.maximum.accumulate(late) + 1e-7 * np.arange(len(t)), dtype=float)
+    return table | {"t": written}
 
 
 FAULTS: dict[str, Fault] = {

@@ -15,6 +15,7 @@ from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block, Topic
 from rhythmid.record.clocks import clock_notes
 from rhythmid.record.columns import Columns, read_columns
+from rhythmid.record.held_back import evened
 from rhythmid.record.judged import judged
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality
@@ -263,8 +264,9 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
             time, value = time[~absent], value[~absent]
         shared = next((c.time for c in channels.values() if np.array_equal(c.time, time)), time)
         channels[role] = Channel(shared, value, samples.source.unit, str(samples.source))
+    channels, held_back = evened(channels)
     clocks = {role: samples.source.clock(signals.time).kind for role, samples in made.items()}
-    notes = (*quality.notes, *clock_notes(judgement, clocks))
+    notes = (*quality.notes, *clock_notes(judgement, clocks), *held_back)
     return Record(
         name, input_kind=signals.input_kind, output_kind=signals.output_kind, forcing_law=signals.forcing_law,
         quality=replace(quality, channels=judgement, notes=notes), parameters=signals.declared(name), **channels,
