@@ -32,6 +32,7 @@ LEAST_ROWS = 40  # rows without which nothing is estimated
 INVERSIONS = (
     8  # steps of an actuator's inversion at most: an error that halves each time is then below a hundredth
 )
+SETTLING = 0.5  # of its error that a correction has to leave at most: a limit of rate, which cannot be inverted, leaves nearly all
 EXACT = 1e-6  # of a signal: as near as an inversion goes
 SECANT = 1e-3  # of a signal, over which a slope is taken
 FLAT = 0.05  # of its usual slope, below which an element counts as passing nothing on
@@ -219,7 +220,7 @@ class Balance:
         """The signal (n,) that went into an actuator or command element for `after` to come out.
 
         Newton's steps at each instant where the element has no memory; else the change on the way is taken off again as long as that
-        helps. What no signal makes come out, beyond a limit, is what went in to first order.
+        settles. What no signal makes come out, beyond a limit, is what went in to first order.
         """
         into, error = after, -self._along(motion, term, model, after, leg, after)
         first_order, least = after + error, EXACT * np.linalg.norm(after)
@@ -227,7 +228,7 @@ class Balance:
             step = error if term.element.own else error / self._slope(motion, term, model, after, leg, into)
             left = after - into - step - self._along(motion, term, model, after, leg, into + step)
             if term.element.own:
-                nearer = np.full(len(after), np.linalg.norm(left) < np.linalg.norm(error))
+                nearer = np.full(len(after), np.linalg.norm(left) < SETTLING * np.linalg.norm(error))
             else:
                 nearer = np.abs(left) < np.abs(error)
             into, error = np.where(nearer, into + step, into), np.where(nearer, left, error)
