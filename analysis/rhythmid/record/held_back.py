@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from rhythmid.record.record import Channel
-from rhythmid.record.timing import BURSTS, nominal_period
+from rhythmid.record.timing import nominal_period
 
 Array = NDArray[np.float64]
 # of the error of a straight line through both neighbours, at which samples are the smoother for even times: noise alone makes it 0.87
 SMOOTHER = 0.5
+TOGETHER = 0.1  # of the period, below which the usual step is that of samples which were written one right after another
 MINIMA = 64  # parts of a recording of whose samples only the soonest can touch the line
 PARTS = 8  # of a recording, in which the lateness is compared: a lost sample shifts all that follow
 STEADY = 0.5  # of the lateness' standard deviation, by which its medians over these parts may differ
@@ -53,7 +54,7 @@ def _taken(time: Array, values: list[Array]) -> Array | None:
     if len(time) < LEAST:
         return None
     step = np.diff(time)
-    if float(np.median(step)) >= BURSTS * nominal_period(step):
+    if float(np.median(step)) >= TOGETHER * nominal_period(step):
         return None
     if not any(_smoother(time, value) for value in values):
         return None
