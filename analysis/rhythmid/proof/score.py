@@ -170,7 +170,7 @@ def _ranked(answer: dict[str, Any]) -> list[dict[str, Any]]:
 
 def _all_alike(true: tuple[str, ...], families: tuple[tuple[str, ...], ...], alike: frozenset[str]) -> bool:
     """Whether an answer does not decide between effects that no record of the machine tells apart, the true one among them."""
-    return any(set(true) <= set(group) <= alike for group in families) and bool(true)
+    return bool(true) and any(set(true) <= set(group) <= alike for group in families)
 
 
 def _declared(name: str, families: tuple[tuple[str, ...], ...], catalogue: Catalogue) -> set[str]:

@@ -23,7 +23,7 @@ TOGETHER = 0.1  # of the period, below which the usual step is that of samples w
 MINIMA = 64  # parts of a recording of whose samples only the soonest can touch the line
 PARTS = 8  # of a recording, in which the lateness is compared: a lost sample shifts all that follow
 STEADY = 0.5  # of the lateness' standard deviation, by which its medians over these parts may differ
-LEAST = 200  # samples
+LEAST = 200  # samples, so that each part has enough of them for a median
 
 
 def evened(channels: Mapping[str, Channel]) -> tuple[dict[str, Any], tuple[str, ...]]:

@@ -110,7 +110,9 @@ def nominal_period(step: Times) -> float:
 
     The median, refined over 1, 2, 4, ... steps by the mean of those spans that lie within half a period of so many periods: what
     jitter and rounding do to a period falls with the length of the span, and spans in which a sample is missing are left out.
-    Where messages were held back and came in bursts, it is the mean step of the usual span instead. Rounded to whole nanoseconds, the resolution of stamps; not where the steps are even and the rounding would lead away from them.
+    Where messages were held back and came in bursts, it is the mean step of the usual span instead.
+
+    Rounded to whole nanoseconds, the resolution of stamps; not where the steps are even and the rounding would lead away from them.
     """
     period = float(
         np.percentile(step, 50.0, method="lower")

@@ -100,7 +100,8 @@ def calibrate(
     nrmse = float(np.sqrt(np.mean([one.rms**2 for one in found]))) / float(np.std(output.value))
     if not nrmse < LOST:
         raise InputError(
-            f"the model leaves {100.0 * nrmse:.0f} % of the motion in the healthy stretch unexplained: it is not a model of this machine; identify the machine first"
+            f"the model leaves {100.0 * nrmse:.0f} % of the motion in the healthy stretch unexplained: it is not a model of this "
+            "machine; identify the machine first"
         )
     return Calibration(extended, changes, period, filter, sizes, noise, healthy, nrmse)
 

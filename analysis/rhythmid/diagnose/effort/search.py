@@ -173,9 +173,8 @@ class _Search:
         order = sorted(range(len(new)), key=lambda index: -others[index].score)
         best = order[0]
         whole = float(np.mean(self.nominal.fit.residual**2)) - free.mean_square
-        for index in order[
-            1:
-        ]:  # of forms of one thing the simplest that is not replaced stands for all of them
+        # of forms of one thing the simplest that is not replaced stands for all of them
+        for index in order[1:]:
             if self._simpler(new[index], new[best]) and not replaces(
                 others[best], others[index], free.mean_square, whole
             ):

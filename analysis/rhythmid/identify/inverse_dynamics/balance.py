@@ -220,12 +220,15 @@ class Balance:
         """The signal (n,) that went into an actuator or command element for `after` to come out.
 
         Newton's steps at each instant where the element has no memory; else the change on the way is taken off again as long as that
-        settles. What no signal makes come out, beyond a limit, is what went in to first order.
+        settles. Where an element passes nothing on, in a dead band or beyond a limit, it is what went in to first order.
         """
         into, error = after, -self._along(motion, term, model, after, leg, after)
         first_order, least = after + error, EXACT * np.linalg.norm(after)
         for _ in range(INVERSIONS):
-            step = error if term.element.own else error / self._slope(motion, term, model, after, leg, into)
+            step = error
+            if not term.element.own:
+                slope = self._slope(motion, term, model, after, leg, into)
+                step = np.divide(error, slope, out=np.zeros_like(error), where=slope != 0.0)
             left = after - into - step - self._along(motion, term, model, after, leg, into + step)
             if term.element.own:
                 nearer = np.full(len(after), np.linalg.norm(left) < SETTLING * np.linalg.norm(error))
@@ -239,12 +242,12 @@ class Balance:
     def _slope(
         self, motion: Motion, term: Term, model: Model, effort: Array, leg: Array, signal: Array
     ) -> Array:
-        """Slope (n,) of what comes out of an element without memory over what goes in; the usual one where nothing more comes out."""
+        """Slope (n,) of what comes out of an element without memory over what goes in; 0 where hardly anything more comes out."""
         width = SECANT * (float(np.std(signal)) or 1.0)
         sides = [self._along(motion, term, model, effort, leg, signal + side * width) for side in (-0.5, 0.5)]
         slope = 1.0 + (sides[1] - sides[0]) / width
         usual = float(np.median(slope)) or 1.0
-        return np.where(slope / usual > FLAT, slope, usual)
+        return np.where(slope / usual > FLAT, slope, 0.0)
 
     def _along(
         self, motion: Motion, term: Term, model: Model, effort: Array, leg: Array, signal: Array
