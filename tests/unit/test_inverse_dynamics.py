@@ -105,6 +105,15 @@ def test_the_effort_is_scored_where_it_makes_the_motion():
     assert found.balance is not None
 
 
+@pytest.mark.parametrize(("damping", "held"), [(3.0, True), (0.0, False)])
+def test_a_machine_of_which_only_the_speed_is_known_runs_free_where_damping_holds_that(damping, held):
+    record = axis()
+    speed = Channel(record.output.time, np.gradient(record.output.value, record.output.time), "m/s")
+    model = axis_model().with_values({"viscous_damper.damping": damping})
+    found = applicable([replace(record, output=speed, output_kind="velocity")], model)
+    assert found.balance is not None and found.free_run_means_something is held
+
+
 def test_the_effort_is_not_scored_where_the_machine_swings_by_itself():
     found = applicable([axis(free=True)], axis_model())
     assert not found.applies

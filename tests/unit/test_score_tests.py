@@ -1,4 +1,4 @@
-"""The screening of candidates: the line that a residual holds is found between the bins of its spectra."""
+"""The screening of candidates: first guesses with what goes with them, and the line that a residual holds."""
 
 from types import SimpleNamespace
 from typing import cast
@@ -6,9 +6,11 @@ from typing import cast
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.search.score_tests import residual_line
-from rhythmid.identify.output_error import Fit
-from rhythmid.identify.series import Series
+import rhythmid as rh
+from rhythmid.diagnose.search.score_tests import changes_of, residual_line, score, trajectories
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.identify.output_error import Fit, estimate
+from rhythmid.identify.series import Series, prepare
 
 PERIOD, BLOCK = 1e-3, 5
 
@@ -41,3 +43,32 @@ def test_too_short_or_silent_residuals_hold_no_line():
     quiet = fit_of(7.31, 5.0, 500)
     still = SimpleNamespace(run=quiet.run, residuals=(np.full(500, 0.1),))
     assert residual_line(cast(Fit, still)) == 0.0
+
+
+def test_a_guess_brings_what_the_models_own_parameters_had_stood_in_for():
+    text = (
+        "inertia: {mass: {value: 1.0, unit: kg, fixed: true}}\nforce:\n"
+        "  - linear_spring: {stiffness: {value: 300, unit: N/m}, rest_length: {value: 0.0, unit: m, fixed: true}}\n"
+        "  - viscous_damper: {damping: {value: 1.0, unit: N*s/m}}\n"
+    )
+    element = load_catalogue()["second_mode"]
+    values = {"mass": 0.2, "frequency": 9.0, "damping_ratio": 0.1}
+    model = rh.Model.from_text(text)
+    run = {
+        "excitation": {"type": "chirp", "amplitude": 1.0, "sweep": 10.0, "band": [0.5, 8.0]},
+        "noise": {"measurement_std": 1e-6},
+    }
+    record = rh.simulate(model.with_element(element, values), run).record
+    fit = estimate(model, prepare([record]))
+    fitted = fit.model.value("linear_spring.stiffness")
+    (best,) = score(fit, changes_of(trajectories(fit), [(element, values | {"mass": 0.03})]))
+    begun = best.own(fit.model)["linear_spring.stiffness"]
+    assert fitted < 270.0 and abs(begun - 300.0) < 0.5 * abs(fitted - 300.0)
+    assert best.start["mass"] == pytest.approx(0.2, rel=0.5)
+    low = best.own(fit.model, 0.0)
+    assert low["linear_spring.stiffness"] == fitted  # nothing of the effect moves nothing
+
+
+def test_what_repeats_less_than_once_in_a_record_is_no_periodic_disturbance(scales):
+    narrowed = load_catalogue().within(scales)["periodic_disturbance"].parameter("frequency")
+    assert narrowed.bounds == (1.0 / scales.duration, 0.5 / scales.period)
