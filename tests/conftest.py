@@ -1,6 +1,7 @@
 """What all tests share: where compiled models go, how examples are drawn, and the command `rhythmid`, as a process or within this one."""
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -23,7 +24,9 @@ Command = Callable[..., subprocess.CompletedProcess[str]]
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep compiled models from run to run, but apart from the user's own."""
+    """Keep compiled models from run to run, but apart from the user's own; let Ctrl-C do what it does on a terminal."""
+    # a shell without job control starts background processes that ignore it, and so would the commands under test
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     if getattr(config, "cache", None) is not None:
         os.environ.setdefault("RHYTHMID_CACHE", str(config.cache.mkdir("compiled")))
 
