@@ -98,8 +98,11 @@ class Browser:
         elif event == "Page.loadEventFired":
             self._loaded = True
 
-    def open(self, path: Path, width: int, dark: bool = False, medium: str = "screen") -> None:
-        """Show a file at this width [px] and wait until it has loaded."""
+    def open(
+        self, path: Path, width: int, dark: bool = False, medium: str = "screen", scripts: bool = True
+    ) -> None:
+        """Show a file at this width [px] and wait until it has loaded and its scripts, which follow the layout, have drawn."""
+        self.call("Emulation.setScriptExecutionDisabled", value=not scripts)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.call("Emulation.setEmulatedMedia", media=medium, features=[scheme])
         self.call(
@@ -115,6 +118,8 @@ class Browser:
         self.call("Page.navigate", url=path.as_uri())
         while not self._loaded:
             self._next()
+        if scripts:
+            self.settle()
 
     def evaluate(self, expression: str) -> Any:
         """Value of a JavaScript expression in the page."""

@@ -103,7 +103,6 @@ def test_the_pointer_shows_the_values_of_all_curves(browser, page: Path) -> None
 
 def test_a_legend_hides_and_shows_a_curve(browser, page: Path) -> None:
     browser.open(page, 1200)
-    browser.settle()
     button = "document.querySelectorAll('details[open] figure.wide')[1].querySelector('.legend button')"
     height = f"(() => {{ const s = {PLOTS}[1].scales.y; return s.max - s.min }})()"
     whole = browser.evaluate(height)
@@ -141,7 +140,6 @@ def test_keys_and_buttons_do_what_the_mouse_does(browser, page: Path) -> None:
 
 def test_an_orbit_is_drawn_in_the_order_of_its_points_and_can_be_read(browser, page: Path) -> None:
     browser.open(page, 1200)
-    browser.settle()
     orbit = "[...document.querySelectorAll('details[open] .holder')].map(h => h.plot).find(p => p.mode === 2)"
     browser.evaluate(f"{orbit}.over.scrollIntoView({{block: 'center', behavior: 'instant'}})")
     x, y, at, speed = browser.evaluate(
@@ -177,13 +175,9 @@ def test_every_plot_of_every_report_has_data_and_is_drawn(browser, others: list[
 
 
 def test_without_scripts_the_drawings_are_shown(browser, page: Path) -> None:
-    browser.call("Emulation.setScriptExecutionDisabled", value=True)
-    try:
-        browser.open(page, 1200)
-        assert browser.evaluate(
-            "[...document.querySelectorAll('section > figure > svg')].every(s => s.checkVisibility())"
-        )
-        assert browser.evaluate("document.querySelectorAll('.live').length") == 0
-        assert not browser.evaluate("document.querySelector('.hint').checkVisibility()")
-    finally:
-        browser.call("Emulation.setScriptExecutionDisabled", value=False)
+    browser.open(page, 1200, scripts=False)
+    assert browser.evaluate(
+        "[...document.querySelectorAll('section > figure > svg')].every(s => s.checkVisibility())"
+    )
+    assert browser.evaluate("document.querySelectorAll('.live').length") == 0
+    assert not browser.evaluate("document.querySelector('.hint').checkVisibility()")

@@ -66,7 +66,6 @@ def report(tmp_path_factory: pytest.TempPathFactory, browser) -> Path:
 @pytest.mark.parametrize(("width", "dark"), [(1200, False), (1200, True), (390, False)])
 def test_the_page_loads_without_errors_or_requests(browser, report: Path, width: int, dark: bool) -> None:
     browser.open(report, width, dark)
-    browser.settle()
     assert browser.messages == []
     assert browser.requests == [report.as_uri()]
     assert browser.evaluate("document.querySelector('h1').innerText") == "Missing physics: Coulomb friction"
