@@ -14,6 +14,8 @@ import yaml
 MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"
 DELAYS = {"input": 0.040, "measurement": 0.050}
 CLOSE = 0.3  # ms
+PEAK = 2.0  # peak over mean of a sinusoid's power
+SURE = 3.0  # standard deviations
 SWEEP = 20.0  # s
 pytestmark = pytest.mark.timeout(240)
 
@@ -67,27 +69,31 @@ def recorded(rhythmid, tmp_path) -> tuple[Path, dict[str, dict[str, str]]]:
     return tmp_path / "bag", figures(done.stderr)
 
 
-def test_delays_of_a_busy_machine_lie_between_what_was_asked_for_and_the_mean_of_what_was_applied(
+def test_delays_of_a_busy_machine_are_means_of_what_was_applied_weighted_by_the_power_of_the_signal(
     recorded, rhythmid, tmp_path
 ):
     bag, told = recorded
     done = rhythmid("identify", bag, "--json", "result.json")
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "result.json").read_text())
+    nothing = {"value": 0.0, "std": 0.0}
     drift = {
-        "input": result["parameters"].get("input_delay_drift.rate", {"value": 0.0})["value"],
-        "measurement": result["parameters"].get("clock_skew.skew", {"value": 0.0})["value"],
+        "input": result["parameters"].get("input_delay_drift.rate", nothing),
+        "measurement": result["parameters"].get("clock_skew.skew", nothing),
     }
     for name, node in (("input", "command_delay"), ("measurement", "measurement_delay")):
         applied = float(told[node]["applied_delay_mean_ms"])
         if name == "input":
             applied += float(told["plant"]["transport_mean_ms"])
         assert told[node]["dropped"] == "0"
-        assert applied >= 1e3 * DELAYS[name]  # nothing is released early
-        found = 1e3 * (
-            result["delays"][name]["value"] + 0.5 * SWEEP * drift[name]
-        )  # in the middle of the run
-        # a stall of the whole machine holds a few messages back for long: the mean moves, most messages do not
-        assert 1e3 * DELAYS[name] - CLOSE < found < applied + CLOSE, (name, told)
+        late = applied - 1e3 * DELAYS[name]
+        assert late >= 0.0  # nothing is released early
+        # what is found is a mean weighted by the power of the signal: a stall counts for more where the signal is large
+        middle = {
+            key: 1e3 * (result["delays"][name][key] + 0.5 * SWEEP * drift[name][key])
+            for key in ("value", "std")
+        }
+        found, close = middle["value"] - 1e3 * DELAYS[name], CLOSE + SURE * middle["std"]
+        assert -close < found < PEAK * late + close, (name, middle, told)
     assert result["parameters"]["linear_spring.stiffness"]["value"] == pytest.approx(200.0, rel=2e-3)
     assert result["parameters"]["switched_damper.stance"]["value"] == pytest.approx(2.0, rel=2e-2)

@@ -291,7 +291,13 @@ def test_a_stranger_who_commands_ends_the_run_with_code_1_and_is_named(
 
 
 def test_a_node_that_lives_and_does_not_work_ends_the_run(no_shared_memory, started, tmp_path):
-    path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"}, duration=60.0)
+    # a reader that takes nothing makes its writers slow; that measurements grow stale by it is promised elsewhere
+    path = experiment_file(
+        tmp_path,
+        time={"mode": "realtime", "layout": "processes"},
+        safety={"stale_after": 60.0},
+        duration=60.0,
+    )
     run = started(path)
     run.wait_for_samples(tmp_path / "experiment_bag")
     children = run.children()
