@@ -36,6 +36,7 @@ from rhythmid.diagnose.verdict import Decision, decide
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import Fit, start_only
+from rhythmid.identify.robust_covariance import with_robust_covariance
 from rhythmid.identify.sample_clock.tick_interval import ticks_followed
 from rhythmid.identify.series import Series, scales
 from rhythmid.identify.student import autocorrelation_time
@@ -106,7 +107,8 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     if trial.added and selection.chosen.kind == "effects":
         found = ticks_followed(profiled(finely_stepped(found, case.pool), case.pool), case.pool)
     between = covariance_between(found.fit.names, selection.chosen, contest.hypotheses)
-    found = replace(found, fit=replace(found.fit, covariance=found.fit.covariance + between))
+    fit = with_robust_covariance(found.fit)
+    found = replace(found, fit=replace(fit, covariance=fit.covariance + between))
     before = dependences(trajectories(found.nominal), rows, case.pool) if trial.added else after
     return FreeRunResult(
         scoring,

@@ -28,6 +28,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import size_of
+from rhythmid.identify.robust_covariance import with_robust_std
 from rhythmid.identify.student import autocorrelation_time
 
 Array = NDArray[np.float64]
@@ -157,16 +158,19 @@ def effort_run(
         selection,
         decide(contest, selection, detectable),
         detectable,
-        _among_models(chosen, contest, selection),
+        _among_models(chosen, found.balance.record, contest, selection),
         found.nominal,
         left if chosen is found.chosen else remainder_of(found.balance, chosen),
         errors,
     )
 
 
-def _among_models(chosen: Fitted, contest: Contest, selection: Selection) -> Fitted:
-    """The chosen fit with standard deviations that hold what the choice of the model adds."""
+def _among_models(
+    chosen: Fitted, record: NDArray[np.int64], contest: Contest, selection: Selection
+) -> Fitted:
+    """The chosen fit with standard deviations that hold what the choice of the model adds; `record` (n,) is that of each row."""
     between = covariance_between(chosen.fit.names, selection.chosen, contest.hypotheses)
-    std = chosen.fit.std.copy()  # of the alignment first, which belongs to no model
+    fit = with_robust_std(chosen.fit, record)
+    std = fit.std.copy()  # of the alignment first, which belongs to no model
     std[1:] = np.hypot(std[1:], np.sqrt(np.diag(between)))
-    return replace(chosen, fit=replace(chosen.fit, std=std))
+    return replace(chosen, fit=replace(fit, std=std))
