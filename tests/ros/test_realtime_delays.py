@@ -95,5 +95,9 @@ def test_delays_of_a_busy_machine_are_means_of_what_was_applied_weighted_by_the_
         }
         found, close = middle["value"] - 1e3 * DELAYS[name], CLOSE + SURE * middle["std"]
         assert -close < found < PEAK * late + close, (name, middle, told)
-    assert result["parameters"]["linear_spring.stiffness"]["value"] == pytest.approx(200.0, rel=2e-3)
-    assert result["parameters"]["switched_damper.stance"]["value"] == pytest.approx(2.0, rel=2e-2)
+    for name, true, share in (
+        ("linear_spring.stiffness", 200.0, 2e-3),
+        ("switched_damper.stance", 2.0, 2e-2),
+    ):
+        estimate = result["parameters"][name]
+        assert abs(estimate["value"] - true) < share * true + SURE * estimate["std"], (name, estimate)
