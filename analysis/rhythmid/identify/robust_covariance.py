@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from rhythmid.identify.covariance import covariance_of
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit
@@ -22,30 +23,41 @@ Array = NDArray[np.float64]
 # blocks of all records together: so many that a standard deviation from them is known to a ninth, 1/sqrt(2 BLOCKS), and so few
 # that each outlasts what is not noise
 BLOCKS = 40
+# chance that the blocks of white noise scatter by more: what they scatter by less says nothing against the information
+CHANCE = 0.025
 
 
-def scattered(scores: Array, records: Sequence[slice], inverse: Array) -> Array:
-    """Standard deviations (p,) of estimates, from the scatter of their scores over blocks; zero where the blocks are too few.
+def widening(columns: Array, residual: Array, records: Sequence[slice], inverse: Array, std: Array) -> Array:
+    """Factors (p,) by which standard deviations have to be larger, 1 where the scores of blocks scatter by no more than chance lets them.
 
     Parameters
     ----------
-    scores : (n, p) gradient of each row's negative log likelihood at the estimate.
+    columns : (n, p) sensitivities of the residual, in units of the noise.
+    residual : (n,) in the same units.
     records : rows of each record, which has its share of the blocks.
-    inverse : (p, p) inverse of the sum of the rows' information.
+    inverse : (p, p) inverse of the information, `columns` with themselves and what priors add.
+    std : (p,) standard deviations without the blocks.
     """
-    sums = []
+    moved, share = (
+        [],
+        [],
+    )  # by each block: of the estimates, and of their variances where the residual is white
     for rows in records:
-        count = max(1, round(BLOCKS * (rows.stop - rows.start) / max(len(scores), 1)))
-        sums += [part.sum(axis=0) for part in np.array_split(scores[rows], count)]
-    freedom = len(sums) - len(inverse)  # with every parameter that is fitted the scores sum to zero once more
-    if freedom < 1 or not len(inverse):
-        return np.zeros(len(inverse))
-    moved = np.array(sums) @ inverse
-    return np.sqrt(np.sum(moved**2, axis=0) * len(sums) / freedom)
+        count = max(1, round(BLOCKS * (rows.stop - rows.start) / max(len(residual), 1)))
+        for part in np.array_split(np.arange(rows.start, rows.stop), count):
+            moved.append((residual[part] @ columns[part]) @ inverse)
+            share.append(np.sum((columns[part] @ inverse) ** 2, axis=0))
+    lost = len(inverse)  # with every parameter that is fitted the scores sum to zero once more
+    if not lost or len(moved) <= lost:
+        return np.ones(lost)
+    variance = np.sum(np.square(moved), axis=0) * len(moved) / (len(moved) - lost)
+    freedom = np.sum(share, axis=0) ** 2 / np.sum(np.square(share), axis=0)
+    ratio = variance / std**2
+    return np.where(ratio * freedom > chi2.isf(CHANCE, freedom), np.sqrt(np.maximum(ratio, 1.0)), 1.0)
 
 
 def with_robust_covariance(fit: Fit) -> Fit:
-    """The fit of a free run with standard deviations of at least what its blocks' scores say, and its correlations as they are.
+    """The fit of a free run with standard deviations that its blocks' scores bear out, and its correlations as they are.
 
     The information is that of the sensitivities: what else has widened the fit's covariance says nothing of the scores.
     """
@@ -53,24 +65,24 @@ def with_robust_covariance(fit: Fit) -> Fit:
     inverse = covariance_of(line.jacobian, [fit.model.parameters[name].prior for name in fit.names])
     known = np.isfinite(np.diag(inverse)) & np.isfinite(np.diag(fit.covariance))
     known &= np.diag(fit.covariance) > 0.0
-    scores = line.jacobian[:, known] * line.residual[:, None]
     std = np.sqrt(np.diag(fit.covariance)[known])
     factors = np.ones(len(known))
-    factors[known] = np.maximum(scattered(scores, line.pieces, inverse[np.ix_(known, known)]) / std, 1.0)
+    factors[known] = widening(
+        line.jacobian[:, known], line.residual, line.pieces, inverse[np.ix_(known, known)], std
+    )
     return replace(fit, covariance=fit.covariance * np.outer(factors, factors))
 
 
 def with_robust_std(fit: EffortFit, record: NDArray[np.int64]) -> EffortFit:
-    """The fit of an effort with standard deviations of at least what its blocks' scores say; `record` (n,) is that of each row."""
-    weight = weights_of(fit.residual, fit.scale) / fit.scale**2
-    inside = ~fit.at_limit
-    columns = fit.jacobian[:, inside]
-    information = (columns * weight[:, None]).T @ columns + np.diag(fit.precision[inside])
+    """The fit of an effort with standard deviations that its blocks' scores bear out; `record` (n,) is that of each row."""
+    inside = ~fit.at_limit & (fit.std > 0.0)
+    root = np.sqrt(weights_of(fit.residual, fit.scale)) / fit.scale
+    columns = fit.jacobian[:, inside] * root[:, None]
+    information = columns.T @ columns + np.diag(fit.precision[inside])
     scaling = 1.0 / np.sqrt(np.diag(information))
     inverse = np.linalg.pinv(information * np.outer(scaling, scaling)) * np.outer(scaling, scaling)
     ends = np.flatnonzero(np.diff(record, append=-1)) + 1
     records = [slice(int(a), int(b)) for a, b in zip((0, *ends[:-1]), ends, strict=True)]
     std = fit.std.copy()
-    scores = columns * (weight * fit.residual)[:, None]
-    std[inside] = np.maximum(std[inside], scattered(scores, records, inverse))
+    std[inside] *= widening(columns, fit.residual * root, records, inverse, std[inside])
     return replace(fit, std=std)
