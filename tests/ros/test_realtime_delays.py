@@ -14,8 +14,7 @@ import yaml
 MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"
 DELAYS = {"input": 0.040, "measurement": 0.050}
 CLOSE = 0.3  # ms
-PEAK = 2.0  # peak over mean of a sinusoid's power
-SURE = 3.0  # standard deviations
+SURE = 3.0  # standard deviations, which a machine that starves the graph makes large
 SWEEP = 20.0  # s
 pytestmark = pytest.mark.timeout(240)
 
@@ -69,7 +68,7 @@ def recorded(rhythmid, tmp_path) -> tuple[Path, dict[str, dict[str, str]]]:
     return tmp_path / "bag", figures(done.stderr)
 
 
-def test_delays_of_a_busy_machine_are_means_of_what_was_applied_weighted_by_the_power_of_the_signal(
+def test_delays_of_a_busy_machine_lie_between_what_was_asked_for_and_the_mean_of_what_was_applied(
     recorded, rhythmid, tmp_path
 ):
     bag, told = recorded
@@ -86,15 +85,13 @@ def test_delays_of_a_busy_machine_are_means_of_what_was_applied_weighted_by_the_
         if name == "input":
             applied += float(told["plant"]["transport_mean_ms"])
         assert told[node]["dropped"] == "0"
-        late = applied - 1e3 * DELAYS[name]
-        assert late >= 0.0  # nothing is released early
-        # what is found is a mean weighted by the power of the signal: a stall counts for more where the signal is large
-        middle = {
-            key: 1e3 * (result["delays"][name][key] + 0.5 * SWEEP * drift[name][key])
-            for key in ("value", "std")
-        }
-        found, close = middle["value"] - 1e3 * DELAYS[name], CLOSE + SURE * middle["std"]
-        assert -close < found < PEAK * late + close, (name, middle, told)
+        assert applied >= 1e3 * DELAYS[name]  # nothing is released early
+        found, std = (  # in the middle of the run
+            1e3 * (result["delays"][name][key] + 0.5 * SWEEP * drift[name][key]) for key in ("value", "std")
+        )
+        close = CLOSE + SURE * std
+        # a stall of the whole machine holds a few messages back for long: the mean moves, most messages do not
+        assert 1e3 * DELAYS[name] - close < found < applied + close, (name, std, told)
     for name, true, share in (
         ("linear_spring.stiffness", 200.0, 2e-3),
         ("switched_damper.stance", 2.0, 2e-2),
