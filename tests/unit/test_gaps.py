@@ -205,3 +205,22 @@ def test_a_command_that_came_in_bursts_costs_no_finer_steps():
     )
     run = prepare_run(paper_hopper(), prepare([given_]))
     assert run.max_step > 0.5 / RATE
+
+
+@given(seed=seeds, count=st.integers(1, 40))
+@settings(max_examples=20, deadline=None)
+def test_a_forcing_that_repeats_is_known_where_its_samples_are_missing(seed, count):
+    rng = np.random.default_rng(seed)
+    kept = without(*((begin, begin + 0.12) for begin in rng.uniform(0.1, 19.8, count)))
+    forcing = 0.3 + np.sin(2 * np.pi * 1.05 * TIME) + 0.2 * np.sin(2 * np.pi * 2.1 * TIME + rng.uniform(0, 6))
+    given_ = replace(record(np.zeros(len(TIME))), forcing=Channel(TIME[kept], forcing[kept], "N"))
+    (one,) = stretches_of([given_])
+    assert one.forcing is not None and len(one.forcing) == len(TIME)
+    np.testing.assert_allclose(one.forcing.value, forcing, atol=1e-6)
+
+
+def test_a_forcing_that_does_not_repeat_is_cut_where_its_samples_are_missing():
+    kept = without((7.0, 8.0))
+    forcing = np.cumsum(np.random.default_rng(5).standard_normal(len(TIME)))
+    given_ = replace(record(slow(0)), forcing=Channel(TIME[kept], forcing[kept], "N"))
+    assert len(cut_at_gaps(given_).stretches) == 2

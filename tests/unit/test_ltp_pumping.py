@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from rhythmid.errors import InputError
-from rhythmid.ltp.pumping import Pumping, active_pumping, fundamental_frequency, pumping_of_channel
+from rhythmid.ltp.pumping import Pumping, active_pumping, pumping_of_channel
+from rhythmid.record.fourier_series import fundamental_frequency
 from rhythmid.record.record import Channel, Record
 
 TIME = np.arange(12_000) * 1e-3

@@ -31,7 +31,6 @@ from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-PERIODS = 2.0  # of the forcing that a stretch covers at least, as `pumping_of` asks for
 STUCK = 0.5  # unexplained share (rms) of the response to the command, beyond which a fit is no answer
 POOR_MOTION = 0.2  # the same of the whole motion: what leaves more than a fifth of it is not identified
 CYCLE_HARMONICS = 24  # that are projected out where the limit cycle is not to be used
@@ -312,15 +311,16 @@ def step_of(series: Sequence[Series]) -> float:
 
 
 def stretches_of(records: Sequence[Record]) -> tuple[Record, ...]:
-    """The records, cut where commands are missing. Stretches over less than two periods of the forcing, which do not tell its
-    phase, are left out where a longer one is there."""
+    """The records, cut where commands are missing. Stretches whose forcing does not tell its phase, being too short or full
+    of gaps, are left out where another one does."""
     found: list[Record] = []
     for record in records:
-        stretches, pumping = cut_at_gaps(record).stretches, active_pumping(record)
-        least = PERIODS / pumping.frequency if pumping is not None and len(stretches) > 1 else 0.0
-        found += [one for one in stretches if one.duration > least] or [
-            max(stretches, key=lambda s: s.duration)
-        ]
+        stretches = cut_at_gaps(record).stretches
+        if len(stretches) > 1 and active_pumping(record) is not None:
+            told = [one for one in stretches if active_pumping(one) is not None]
+        else:
+            told = list(stretches)
+        found += told or [max(stretches, key=lambda s: s.duration)]
     return tuple(found)
 
 

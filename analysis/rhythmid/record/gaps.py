@@ -1,7 +1,7 @@
-"""Gaps: where a channel lacks samples, which of them its neighbours tell, and a record cut where they do not.
+"""Gaps: where a channel lacks samples, which of them the others tell, and a record cut where they do not.
 
-A measurement that is missing is not compared, nothing else happens. A command that is missing acted all the same: where its
-neighbours do not tell what it was, the record is cut, and goes on with an initial state of its own.
+A measurement that is missing is not compared, nothing else happens. A command that is missing acted all the same: where neither its
+neighbours nor its repetition tell what it was, the record is cut, and goes on with an initial state of its own.
 """
 
 from collections.abc import Iterable
@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.errors import InputError
+from rhythmid.record.fourier_series import FourierSeries, fourier_series
 from rhythmid.record.interpolation import cubic, interpolation_errors
 from rhythmid.record.record import Channel, Record
 from rhythmid.record.timing import gaps_between
@@ -33,8 +35,8 @@ class Cut:
 def cut_at_gaps(record: Record) -> Cut:
     """The record with short gaps of its commands filled in, cut at the long ones.
 
-    A gap is short where a cubic through its neighbours tells the command so well that the error moves the machine by less
-    than the noise of the measurement; how well it does is seen where no sample is missing. A held command that is the same
+    A gap is short where a cubic through its neighbours, or the Fourier series of a command that repeats, tells the command so well
+    that the error moves the machine by less than the noise of the measurement; how well it does is seen where no sample is missing. A held command that is the same
     before and after is not missing. The stretches bear the name of the record with the time at which they begin.
     """
     notes: list[str] = []
@@ -48,9 +50,7 @@ def cut_at_gaps(record: Record) -> Cut:
         spans += open_
         if count:
             record = replace(record, **{role: filled})
-            notes.append(
-                f"{record.name}: {count} lost samples of the {role} are interpolated between their neighbours"
-            )
+            notes.append(f"{record.name}: {count} lost samples of the {role} are interpolated")
     if not spans:
         return Cut((record,), tuple(notes))
     stretches = tuple(_between(record, _joined(spans)))
@@ -77,18 +77,29 @@ def _bridged(channel: Channel, output: Channel, held: bool) -> tuple[Channel, in
     tolerable = _tolerable(output)
     spread = max(float(np.std(value)), 1e-300)
     errors = interpolation_errors(value, int(lost.max()))
-    told = np.array([errors[n] / spread * n * channel.period < tolerable for n in lost])
+    law = None if held else _periodic(channel)
+    left = np.inf if law is None else law.left
+    told = np.array([min(errors[n], left) / spread * n * channel.period < tolerable for n in lost])
     stamps, values = [time], [value]
     for at, count in zip(first[told], lost[told]):
         between = time[at] + (time[at + 1] - time[at]) * np.arange(1, count + 1) / (count + 1)
         near = slice(max(at - 1, 0), at + 3)
+        near_by = law is None or errors[count] <= left
         stamps.append(between)
-        values.append(cubic(time[near], value[near], between))
+        values.append(cubic(time[near], value[near], between) if near_by else law(between))
     open_ = [(float(time[at]), float(time[at + 1])) for at in first[~told]]
     every = np.concatenate(stamps)
     order = np.argsort(every, kind="stable")
     filled = replace(channel, time=every[order], value=np.concatenate(values)[order])
     return filled, int(lost[told].sum()), open_
+
+
+def _periodic(channel: Channel) -> FourierSeries | None:
+    """What a channel repeats; None where it does not cover two periods."""
+    try:
+        return fourier_series(channel.time, channel.value)
+    except InputError:
+        return None
 
 
 def _tolerable(output: Channel) -> float:
