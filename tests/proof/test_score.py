@@ -73,6 +73,15 @@ def test_a_declared_family_of_two_holds_the_name():
     assert judged(truth("clock_skew"), said).outcome == "family"
 
 
+def test_a_law_that_was_moved_to_a_place_stands_for_the_element_that_the_place_has():
+    said = answer("missing_physics", "actuator_lag")
+    (missing,) = said["missing"]
+    missing["element"] = "sensor_lag_of_the_actuator"
+    lag = judged(truth("actuator_lag", kind="left-out", absent=["actuator_lag"]), said)
+    assert lag.outcome == "family" and lag.stated_wrong == () and lag.dominant_first
+    assert judged(truth("command_lag"), said).stated_wrong == ("sensor_lag_of_the_actuator",)
+
+
 def test_a_family_of_three_is_no_answer():
     group = ("delay_drift", "clock_skew", "backlash")
     assert (

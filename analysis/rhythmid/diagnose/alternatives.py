@@ -217,12 +217,17 @@ def _places(element: Element) -> tuple[Slot, ...]:
     return ()
 
 
+def moved_name(name: str, place: Slot) -> str:
+    """What the law of an element is called in another place than its own."""
+    return f"{name}_of_the_{place}"
+
+
 def _moved(base: Trial, term: Term, place: Slot) -> Proposal:
     """The model with one of its effects in another place."""
     measured = place == "sensor"
     element = replace(
         term.element,
-        name=f"{term.element.name}_of_the_{place}",
+        name=moved_name(term.element.name, place),
         slot=place,
         initial=lambda x, v, f, **_: (x if measured else f,) * len(term.element.own),
     )

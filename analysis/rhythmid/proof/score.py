@@ -5,6 +5,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from rhythmid.diagnose.alternatives import moved_name
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.proof.equations import FOREIGN
 from rhythmid.proof.machines.designs import DESIGNS
@@ -174,11 +175,18 @@ def _all_alike(true: tuple[str, ...], families: tuple[tuple[str, ...], ...], ali
 
 
 def _declared(name: str, families: tuple[tuple[str, ...], ...], catalogue: Catalogue) -> set[str]:
-    """What a name stands for: itself, the other one of a family of two, and richer laws that contain it, as far as the answer
-    declares that it cannot tell them apart."""
+    """What a name stands for: itself; the element of a place that a law of its family was moved to, which is the same law; the other one
+    of a family of two, and richer laws that contain it, as far as the answer declares that it cannot tell them apart."""
     groups = [set(group) for group in families if name in group]
     richer = set(catalogue[name].special_case_of) if name in catalogue else set()
-    return {name}.union(*(group if len(group) <= FAMILY else group & richer for group in groups))
+    same = {
+        one.name
+        for one in catalogue.values()
+        if any(
+            name == moved_name(kin.name, one.slot) for kin in catalogue.values() if kin.family == one.family
+        )
+    }
+    return {name, *same}.union(*(group if len(group) <= FAMILY else group & richer for group in groups))
 
 
 def _outcome(
