@@ -22,6 +22,7 @@ from rhythmid.identify.harmonic_likelihood import INPUT_DELAY, MEASUREMENT_DELAY
 from rhythmid.identify.identification import Delays, Estimate, Observables
 from rhythmid.identify.inner_delays import with_inner_delays
 from rhythmid.identify.joint import JointFit, without_forcing
+from rhythmid.identify.robust_covariance import widening
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.undetermined import sum_of, undetermined
 from rhythmid.ltp.limit_cycle import limit_cycle
@@ -92,7 +93,7 @@ def observables(joint: JointFit) -> Observables | None:
     """A, B and C, each from its own part of the data, and the closure A + C − B in its standard deviations.
 
     The limit cycle is given a delay of its own beside that of the response to the command; both are estimated, one
-    step from the joint optimum, together with everything else. None where there is no cycle or a delay is not free.
+    step from the joint optimum, together with everything else, with standard deviations that the scores of blocks bear out. None where there is no cycle or a delay is not free.
     """
     fit = joint.fit
     if joint.pumping is None or INPUT_DELAY not in fit.names or MEASUREMENT_DELAY not in fit.names:
@@ -107,7 +108,9 @@ def observables(joint: JointFit) -> Observables | None:
     covariance = inverse / np.outer(norms, norms)
     step = -covariance @ (joined.T @ fit.linearisation.residual)
     moved = covariance @ (joined.T @ discretisation_error(fit))
-    covariance = covariance + np.outer(moved, moved)
+    left = fit.linearisation.residual + joined @ step
+    factors = widening(joined, left, fit.linearisation.pieces, covariance, np.sqrt(np.diag(covariance)))
+    covariance = covariance * np.outer(factors, factors) + np.outer(moved, moved)
     u, y, gap = fit.names.index(INPUT_DELAY), fit.names.index(MEASUREMENT_DELAY), len(fit.names)
     delays = {u: fit.model.value(INPUT_DELAY), y: fit.model.value(MEASUREMENT_DELAY), gap: 0.0}
 

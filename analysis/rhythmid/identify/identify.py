@@ -25,7 +25,7 @@ from rhythmid.identify.paper_conditions import lacks_paper_method, lacks_transfe
 from rhythmid.identify.paper_delays import combined, paper_delays
 from rhythmid.identify.paper_quality import MISFIT, notes_of, quality_of
 from rhythmid.identify.plausibility import SHIFTED, check_plausible, shift
-from rhythmid.identify.robust_covariance import with_robust_covariance
+from rhythmid.identify.specification import well_specified
 from rhythmid.identify.timing import compensated, measurement_jitter
 from rhythmid.ltp.harmonic_estimate import HarmonicEstimates
 from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, smoothed
@@ -307,7 +307,7 @@ def _by_likelihood(
         return None
     tell("looking for clocks that drift and commands that are held")
     joint, notes = compensated(found) if found.search.arrived else (found, ())
-    joint = replace(joint, fit=with_discretisation_error(with_robust_covariance(joint.fit)))
+    joint = replace(joint, fit=with_discretisation_error(well_specified(joint.fit)))
     fit = joint.fit
     own = [name for name in fit.names if name not in DELAYS]
     values = fit.model.parameters
