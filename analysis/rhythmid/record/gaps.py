@@ -84,9 +84,11 @@ def _bridged(channel: Channel, output: Channel, held: bool) -> tuple[Channel, in
     for at, count in zip(first[told], lost[told]):
         between = time[at] + (time[at + 1] - time[at]) * np.arange(1, count + 1) / (count + 1)
         near = slice(max(at - 1, 0), at + 3)
-        near_by = law is None or errors[count] <= left
         stamps.append(between)
-        values.append(cubic(time[near], value[near], between) if near_by else law(between))
+        if law is None or errors[count] <= law.left:
+            values.append(cubic(time[near], value[near], between))
+        else:
+            values.append(law(between))
     open_ = [(float(time[at]), float(time[at + 1])) for at in first[~told]]
     every = np.concatenate(stamps)
     order = np.argsort(every, kind="stable")
