@@ -224,3 +224,14 @@ def test_a_forcing_that_does_not_repeat_is_cut_where_its_samples_are_missing():
     forcing = np.cumsum(np.random.default_rng(5).standard_normal(len(TIME)))
     given_ = replace(record(slow(0)), forcing=Channel(TIME[kept], forcing[kept], "N"))
     assert len(cut_at_gaps(given_).stretches) == 2
+
+
+@pytest.mark.parametrize(
+    "value", [0.0 * TIME, 0.0 * TIME + 3.0, 0.1 * TIME], ids=["zero", "constant", "trend"]
+)
+def test_a_forcing_that_does_not_oscillate_keeps_its_values_at_a_gap(value):
+    kept = without((7.0, 7.1))
+    given_ = replace(record(slow(0)), forcing=Channel(TIME[kept], value[kept], "N"))
+    for one in cut_at_gaps(given_).stretches:
+        assert one.forcing is not None and len(one.forcing) > 1000
+        np.testing.assert_allclose(one.forcing.value, np.interp(one.forcing.time, TIME, value), atol=1e-9)

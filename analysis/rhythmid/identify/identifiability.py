@@ -93,7 +93,8 @@ def observables(joint: JointFit) -> Observables | None:
     """A, B and C, each from its own part of the data, and the closure A + C − B in its standard deviations.
 
     The limit cycle is given a delay of its own beside that of the response to the command; both are estimated, one
-    step from the joint optimum, together with everything else, with standard deviations that the scores of blocks bear out. None where there is no cycle or a delay is not free.
+    step from the joint optimum, together with everything else, with standard deviations that the scores of blocks bear
+    out. None where there is no cycle or a delay is not free.
     """
     fit = joint.fit
     if joint.pumping is None or INPUT_DELAY not in fit.names or MEASUREMENT_DELAY not in fit.names:

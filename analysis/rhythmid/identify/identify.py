@@ -18,15 +18,15 @@ from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.identifiability import Forcing, Offset, delays_of
 from rhythmid.identify.identification import Delays, Estimate, Identification, Shown
 from rhythmid.identify.inner_delays import dead_times
-from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit
+from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit, explained
 from rhythmid.identify.large_shifts import large_shifts
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
 from rhythmid.identify.paper_conditions import lacks_paper_method, lacks_transfer_functions
 from rhythmid.identify.paper_delays import combined, paper_delays
 from rhythmid.identify.paper_quality import MISFIT, notes_of, quality_of
 from rhythmid.identify.plausibility import SHIFTED, check_plausible, shift
-from rhythmid.identify.specification import well_specified
 from rhythmid.identify.timing import compensated, measurement_jitter
+from rhythmid.identify.weighting import efficient_fit
 from rhythmid.ltp.harmonic_estimate import HarmonicEstimates
 from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, smoothed
 from rhythmid.ltp.pumping import Pumping, pumping_of
@@ -307,8 +307,8 @@ def _by_likelihood(
         return None
     tell("looking for clocks that drift and commands that are held")
     joint, notes = compensated(found) if found.search.arrived else (found, ())
-    joint = replace(joint, fit=with_discretisation_error(well_specified(joint.fit)))
-    fit = joint.fit
+    fit = with_discretisation_error(efficient_fit(joint.fit))
+    joint = replace(joint, fit=fit, search=explained(fit, joint.pumping))
     own = [name for name in fit.names if name not in DELAYS]
     values = fit.model.parameters
     parameters = {

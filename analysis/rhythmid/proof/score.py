@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from rhythmid.diagnose.alternatives import moved_name
 from rhythmid.elements.catalogue import Catalogue
+from rhythmid.elements.element import Element
 from rhythmid.proof.equations import FOREIGN
 from rhythmid.proof.machines.designs import DESIGNS
 
@@ -179,14 +180,15 @@ def _declared(name: str, families: tuple[tuple[str, ...], ...], catalogue: Catal
     of a family of two, and richer laws that contain it, as far as the answer declares that it cannot tell them apart."""
     groups = [set(group) for group in families if name in group]
     richer = set(catalogue[name].special_case_of) if name in catalogue else set()
-    same = {
-        one.name
-        for one in catalogue.values()
-        if any(
-            name == moved_name(kin.name, one.slot) for kin in catalogue.values() if kin.family == one.family
-        )
-    }
+    same = {one.name for one in catalogue.values() for kin in catalogue.values() if _moved_to(one, kin, name)}
     return {name, *same}.union(*(group if len(group) <= FAMILY else group & richer for group in groups))
+
+
+def _moved_to(one: Element, kin: Element, name: str) -> bool:
+    """Whether `name` is that of `kin`, a law of the family and with the parameters of `one`, moved to the place of `one`."""
+    parameters = [[(parameter.name, parameter.unit) for parameter in each.parameters] for each in (one, kin)]
+    alike = one.family == kin.family != "" and parameters[0] == parameters[1]
+    return alike and name == moved_name(kin.name, one.slot)
 
 
 def _outcome(

@@ -34,8 +34,10 @@ class FourierSeries:
 def fourier_series(time: Array, value: Array) -> FourierSeries:
     """The Fourier series of a signal (n,) sampled at increasing times [s].
 
-    Raises InputError where the signal covers less than two periods.
+    Raises InputError where the signal is constant or covers less than two periods.
     """
+    if np.ptp(value) == 0.0:
+        raise InputError("is constant")
     thin = max(1, len(time) // ENOUGH)
     frequency = fundamental_frequency(time[::thin], value[::thin])
     periods = frequency * (time[-1] - time[0])
@@ -49,7 +51,7 @@ def fourier_series(time: Array, value: Array) -> FourierSeries:
 
 def fundamental_frequency(time: Array, value: Array) -> float:
     """Frequency [Hz] of a periodic signal (n,) sampled at increasing times [s]: strongest line, refined to full
-    precision by the drift of its phase."""
+    precision by the drift of its phase; 0 where none is stronger than its trend."""
     n = len(time)
     span = time[-1] - time[0]
     even = np.linspace(time[0], time[-1], n)
@@ -57,6 +59,8 @@ def fundamental_frequency(time: Array, value: Array) -> float:
     window = np.hanning(n)
     spectrum = np.abs(np.fft.rfft((grid - np.average(grid, weights=window)) * window, 4 * n))
     line = int(np.argmax(spectrum)) * (n - 1) / (span * 4 * n)
+    if line == 0.0:
+        return 0.0  # a trend, no oscillation
     frequency, left = _refined(time - time.mean(), value, line)
     for divisor in (2, 3):  # the strongest line may be a harmonic: then a multiple of its period leaves less
         if left > HARMONIC * np.std(value) and line * span > 1.5 * divisor:

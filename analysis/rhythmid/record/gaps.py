@@ -35,9 +35,10 @@ class Cut:
 def cut_at_gaps(record: Record) -> Cut:
     """The record with short gaps of its commands filled in, cut at the long ones.
 
-    A gap is short where a cubic through its neighbours, or the Fourier series of a command that repeats, tells the command so well
-    that the error moves the machine by less than the noise of the measurement; how well it does is seen where no sample is missing. A held command that is the same
-    before and after is not missing. The stretches bear the name of the record with the time at which they begin.
+    A gap is short where a cubic through its neighbours, or the Fourier series of a command that repeats, tells the command so
+    well that the error moves the machine by less than the noise of the measurement; how well it does is seen where no sample
+    is missing. A held command that is the same before and after is not missing. The stretches bear the name of the record
+    with the time at which they begin.
     """
     notes: list[str] = []
     spans: list[tuple[float, float]] = []
@@ -97,7 +98,7 @@ def _bridged(channel: Channel, output: Channel, held: bool) -> tuple[Channel, in
 
 
 def _periodic(channel: Channel) -> FourierSeries | None:
-    """What a channel repeats; None where it does not cover two periods."""
+    """What a channel repeats; None where it is constant or does not cover two periods."""
     try:
         return fourier_series(channel.time, channel.value)
     except InputError:

@@ -1,0 +1,53 @@
+"""Measurements that are held back and come in bursts leave what goes with the motion: the fit is not weighted by its colour then."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import rhythmid as rh
+from rhythmid.identify.identify import paper_hopper
+from rhythmid.identify.joint import best_fit
+from rhythmid.identify.robust_covariance import with_robust_covariance
+from rhythmid.identify.weighting import efficient_fit
+from rhythmid.record.record import Record
+
+RUN = {
+    "excitation": {"type": "chirp", "amplitude": 0.1, "band": [0, 7], "sweep": 20.0},
+    "forcing": {"amplitude": 1.0, "frequency": 1.0},
+    "delays": {"input": 0.04, "measurement": 0.05},
+    "noise": {"measurement_std": 1e-5},
+}
+
+
+def recorded(seed: int, held: float) -> Record:
+    """A hopper whose measurements are late by up to `held` [s], all those in waiting at one time."""
+    record = rh.simulate(paper_hopper(), RUN | {"seed": seed}).record
+    if not held:
+        return record
+    rng, time = np.random.default_rng(seed), record.output.time
+    release = time[0] + np.cumsum(rng.uniform(0.2 * held, held, int(8 * np.ptp(time) / held)))
+    stamps = release[np.searchsorted(release, time)] + 1e-9 * np.arange(len(time))
+    return replace(record, output=replace(record.output, time=stamps))
+
+
+def test_noise_that_is_added_to_the_output_is_weighted_by_its_colour() -> None:
+    fit = best_fit(recorded(1, 0.0), paper_hopper()).fit
+    assert efficient_fit(fit).values.tolist() == fit.values.tolist()
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_what_comes_in_bursts_is_not_and_the_intervals_hold_the_truth(seed: int) -> None:
+    record = recorded(seed, 0.06)
+    true = {"linear_spring.stiffness": 200.0, "switched_damper.stance": 2.0, "input_delay.delay": 0.04}
+    found = best_fit(record, paper_hopper()).fit
+    weighted = with_robust_covariance(found)
+    told = efficient_fit(found)
+    for fit, holds in ((told, True), (weighted, False)):
+        errors = [abs(fit.model.value(name) - value) / fit.std[name] for name, value in true.items()]
+        assert (max(errors) < 3.0) is holds, errors
+
+
+def test_limit_cycle_and_response_are_not_said_to_disagree_where_measurements_come_in_bursts() -> None:
+    closure = rh.identify(recorded(1, 0.06), paper_hopper()).delays.closure
+    assert closure is not None and abs(closure) < 3.0  # -5.4 by the information alone
