@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rhythmid.diagnose.alternatives import alternatives
 from rhythmid.diagnose.baseline import Calibration
@@ -19,6 +20,7 @@ from rhythmid.diagnose.contenders import (
     remembered,
     rows_of,
 )
+from rhythmid.diagnose.discrepancy import mean_product
 from rhythmid.diagnose.evidence import prediction
 from rhythmid.diagnose.fine_steps import finely_stepped
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
@@ -28,13 +30,16 @@ from rhythmid.diagnose.model_uncertainty import covariance_between
 from rhythmid.diagnose.scoring import Scoring
 from rhythmid.diagnose.search.forward import Search, search
 from rhythmid.diagnose.search.refit import reach_of, whole_fit
-from rhythmid.diagnose.search.score_tests import Trajectories, trajectories, under
+from rhythmid.diagnose.search.round import distinct
+from rhythmid.diagnose.search.score_tests import Trajectories, changes_of, projected, trajectories, under
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.shape import shape_of
 from rhythmid.diagnose.verdict import Decision, decide
+from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
+from rhythmid.identify.covariance import covariance_of
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.robust_covariance import with_robust_covariance
 from rhythmid.identify.sample_clock.tick_interval import ticks_followed
@@ -107,8 +112,9 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     if trial.added and selection.chosen.kind == "effects":
         found = ticks_followed(profiled(finely_stepped(found, case.pool), case.pool), case.pool)
     between = covariance_between(found.fit.names, selection.chosen, contest.hypotheses)
+    unnamed = _unnamed(found, known, case)
     fit = with_robust_covariance(found.fit)
-    found = replace(found, fit=replace(fit, covariance=fit.covariance + between))
+    found = replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed))
     before = dependences(trajectories(found.nominal), rows, case.pool) if trial.added else after
     return FreeRunResult(
         scoring,
@@ -125,6 +131,27 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         decision,
         detectable,
     )
+
+
+def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.float64]:
+    """Mean product (p, p) of the errors of the fit's parameters that come from small effects which it lacks: of each element
+    that is not in the model the guess which the last round scored best."""
+    fit = found.fit
+    made = np.zeros((len(fit.names), len(fit.names)))
+    there = {term.element.name for term in fit.model.terms}
+    scored = distinct(found.rounds[-1].scores, len(catalogue)) if found.rounds else []
+    tried = [(one.element, dict(one.values)) for one, _ in scored if one.element.name not in there]
+    changes = changes_of(trajectories(fit), tried, case.pool)
+    std = np.array([fit.std[name] for name in fit.names])
+    known = np.isfinite(std) & (std > 0.0)
+    if not changes or not known.any():
+        return made
+    line = fit.linearisation
+    columns = np.column_stack([projected(fit, one) for one in changes])
+    priors = [fit.model.parameters[name].prior for name, one in zip(fit.names, known) if one]
+    inverse = covariance_of(line.jacobian[:, known], priors)
+    made[np.ix_(known, known)] = mean_product(line.jacobian[:, known], line.residual, columns, inverse)
+    return made
 
 
 def _trial_of(hypothesis: Hypothesis, contenders: Sequence[Contender]) -> Trial:

@@ -8,7 +8,7 @@ the residuals are what they are taken for, they scatter as the information says
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,14 +75,39 @@ def with_robust_covariance(fit: Fit) -> Fit:
 
 def with_robust_std(fit: EffortFit, record: NDArray[np.int64]) -> EffortFit:
     """The fit of an effort with standard deviations that its blocks' scores bear out; `record` (n,) is that of each row."""
+    rows = weighted(fit)
+    ends = np.flatnonzero(np.diff(record, append=-1)) + 1
+    records = [slice(int(a), int(b)) for a, b in zip((0, *ends[:-1]), ends, strict=True)]
+    std = fit.std.copy()
+    std[rows.inside] *= widening(rows.columns, rows.residual, records, rows.inverse, std[rows.inside])
+    return replace(fit, std=std)
+
+
+@dataclass(frozen=True, eq=False)
+class Weighted:
+    """The rows of an effort in units of their noise, as the last step of the fit weighted them.
+
+    `inside` (p,) marks the parameters that are estimated, of which `columns` (n, q) are the sensitivities and `inverse` (q, q) the inverse
+    of their information with the priors'; `residual` (n,) is predicted less measured.
+    """
+
+    inside: NDArray[np.bool_]
+    columns: Array
+    residual: Array
+    inverse: Array
+
+
+def weighted(fit: EffortFit, correlation: float = 1.0) -> Weighted:
+    """The fit's rows, of which neighbours repeat one another for `correlation` rows."""
     inside = ~fit.at_limit & (fit.std > 0.0)
-    root = np.sqrt(weights_of(fit.residual, fit.scale)) / fit.scale
+    root = root_weights(fit, correlation)
     columns = fit.jacobian[:, inside] * root[:, None]
     information = columns.T @ columns + np.diag(fit.precision[inside])
     scaling = 1.0 / np.sqrt(np.diag(information))
     inverse = np.linalg.pinv(information * np.outer(scaling, scaling)) * np.outer(scaling, scaling)
-    ends = np.flatnonzero(np.diff(record, append=-1)) + 1
-    records = [slice(int(a), int(b)) for a, b in zip((0, *ends[:-1]), ends, strict=True)]
-    std = fit.std.copy()
-    std[inside] *= widening(columns, fit.residual * root, records, inverse, std[inside])
-    return replace(fit, std=std)
+    return Weighted(inside, columns, fit.residual * root, inverse)
+
+
+def root_weights(fit: EffortFit, correlation: float = 1.0) -> Array:
+    """Inverse standard deviation (n,) of each row's noise."""
+    return np.sqrt(weights_of(fit.residual, fit.scale) / correlation) / fit.scale

@@ -2,7 +2,8 @@
 
 The one place where the proof uses the estimator: to know the size of what it conceals, before anything is sealed. Where a
 free run means little, the mismatch is a force: what the effects add to the truth's motion, less what the nominal model's
-free parameters absorb of it, by plain linear least squares.
+free parameters absorb of it, by plain linear least squares, and less what a shift of effort and motion against each
+other absorbs, which no record tells from a lag as short.
 """
 
 import math
@@ -28,6 +29,7 @@ AVERAGED = 200  # [Hz] to which samples are averaged
 STEP = 6.25e-4  # [s] of the fit's integrator: its error must not pass for a mismatch
 CLOSE = 1.25  # factor within which a mismatch is the one asked for
 TRIES = 7
+SHIFT = 2.0  # samples by which effort and motion may be logged apart: nobody knows their clocks better before
 
 
 def record_of(rig: Rig, run: Run, seen: Observation) -> Record:
@@ -81,7 +83,8 @@ def plain_force(machine: Machine, x: Array, v: Array) -> Array:
 
 def force_share(rig: Rig, seen: Sequence[Observation] | None, free: Sequence[str]) -> float:
     """Rms of the force that the nominal model lacks in the learning records `seen`, in proportion to that of the force that
-    drives the machine; what the model's `free` attributes can absorb of it is left out."""
+    drives the machine; what the model's `free` attributes can absorb of it is left out, and where the effort is recorded what a
+    shift of the effort by up to `SHIFT` samples can."""
     if seen is None:
         return math.inf
     x = np.concatenate([one.position for one in seen])
@@ -95,6 +98,12 @@ def force_share(rig: Rig, seen: Sequence[Observation] | None, free: Sequence[str
         "moment": np.sin(x - rig.believed.hanging),
     }  # fmt: skip
     absorbed = np.column_stack([columns[name] for name in free if getattr(rig.believed, name)])
+    if rig.recorded == "effort":
+        forces = np.split(drive, np.cumsum([len(one.position) for one in seen])[:-1])
+        moved = [np.gradient(force) for force in forces]  # by one sample
+        shift = np.concatenate(moved)[:, None]
+        size = np.linalg.lstsq(np.hstack([shift, absorbed]), lacking, rcond=None)[0][0]
+        lacking = lacking - float(np.clip(size, -SHIFT, SHIFT)) * shift[:, 0]
     left = lacking - absorbed @ np.linalg.lstsq(absorbed, lacking, rcond=None)[0]
     return float(np.sqrt(np.mean(left**2) / np.mean(drive**2)))
 

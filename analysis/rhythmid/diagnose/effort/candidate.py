@@ -150,6 +150,14 @@ def screen(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> list
     return sorted(best.values(), key=lambda one: -one.gain)
 
 
+def columns_of(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> Array:
+    """Changes (n, m) of the predicted effort that additions make, those that say nothing left out."""
+    base = balance.predicted(parent.model, parent.alignment)
+    made = [_column(balance, parent, start, base) for start in starts]
+    seen = [column for column in made if column is not None and np.isfinite(column).all() and column.any()]
+    return np.column_stack(seen) if seen else np.zeros((len(base), 0))
+
+
 def _column(balance: Balance, parent: EffortFit, start: Start, base: Array) -> Array | None:
     """Change (n,) of the predicted effort that an addition makes."""
     if start.element is None:

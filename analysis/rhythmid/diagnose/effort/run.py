@@ -8,10 +8,13 @@ from numpy.typing import NDArray
 
 from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.constants import PRACTICAL_EFFORT
+from rhythmid.diagnose.discrepancy import mean_product
+from rhythmid.diagnose.effort.candidate import columns_of, screen, starts_of
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.held_out import HeldOut
 from rhythmid.diagnose.effort.reference import residual_with_map
 from rhythmid.diagnose.effort.remainder import Remainder, remainder_of
+from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.diagnose.effort.search import GAP, MOST_EFFECTS, EffortSearch, search_effort
 from rhythmid.diagnose.evidence import (
     Blocks,
@@ -24,11 +27,12 @@ from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, names_of, riche
 from rhythmid.diagnose.model_uncertainty import covariance_between
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.verdict import Decision, decide
+from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import size_of
-from rhythmid.identify.robust_covariance import with_robust_std
+from rhythmid.identify.inverse_dynamics.estimate import EffortFit, size_of
+from rhythmid.identify.robust_covariance import root_weights, weighted, with_robust_std
 from rhythmid.identify.student import autocorrelation_time
 
 Array = NDArray[np.float64]
@@ -158,7 +162,7 @@ def effort_run(
         selection,
         decide(contest, selection, detectable),
         detectable,
-        _among_models(chosen, found.balance.record, contest, selection),
+        _among_models(chosen, case.catalogue, found.balance, contest, selection),
         found.nominal,
         left if chosen is found.chosen else remainder_of(found.balance, chosen),
         errors,
@@ -166,11 +170,23 @@ def effort_run(
 
 
 def _among_models(
-    chosen: Fitted, record: NDArray[np.int64], contest: Contest, selection: Selection
+    chosen: Fitted, catalogue: Catalogue, balance: Balance, contest: Contest, selection: Selection
 ) -> Fitted:
-    """The chosen fit with standard deviations that hold what the choice of the model adds; `record` (n,) is that of each row."""
+    """The chosen fit with standard deviations that hold what the choice of the model adds, and small effects that it lacks."""
     between = covariance_between(chosen.fit.names, selection.chosen, contest.hypotheses)
-    fit = with_robust_std(chosen.fit, record)
+    fit = with_robust_std(chosen.fit, balance.record)
     std = fit.std.copy()  # of the alignment first, which belongs to no model
     std[1:] = np.hypot(std[1:], np.sqrt(np.diag(between)))
-    return replace(chosen, fit=replace(fit, std=std))
+    return replace(chosen, fit=replace(fit, std=np.hypot(std, _unnamed(balance, chosen.fit, catalogue))))
+
+
+def _unnamed(balance: Balance, fit: EffortFit, catalogue: Catalogue) -> Array:
+    """Standard deviations (p,) of the fit's parameters that come from small effects which it lacks."""
+    sizes = scales_of(balance, fit.model)
+    starts = [one for one in starts_of(catalogue, fit.model, sizes, balance) if one.kind == "effects"]
+    changes = columns_of(balance, fit, [one.start for one in screen(balance, fit, starts)])
+    rows = weighted(fit, fit.correlation)
+    changes = changes * root_weights(fit, fit.correlation)[:, None]
+    std = np.zeros(len(fit.std))
+    std[rows.inside] = np.sqrt(np.diag(mean_product(rows.columns, rows.residual, changes, rows.inverse)))
+    return std

@@ -252,6 +252,12 @@ def whitened(fit: Fit, samples: Sequence[Array], noise: NoiseModel) -> list[Arra
     return found
 
 
+def projected(fit: Fit, change: Change) -> Array:
+    """A change (n,) as the fit's rows see it: whitened, what initial states can do projected out."""
+    white = whitened(fit, change.outputs, fit.noise)
+    return np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])
+
+
 def parameter_basis(fit: Fit) -> tuple[Array, Array]:
     """Orthonormal basis (n, r) of what small changes of the free parameters do, and (p, r) the changes that make each."""
     jacobian = fit.linearisation.jacobian

@@ -1,0 +1,61 @@
+"""What small effects that a model lacks do to its parameters: standard deviations that hold the truth, and nothing where nothing is lacking."""
+
+import numpy as np
+import pytest
+
+from rhythmid.diagnose.discrepancy import mean_product
+
+ROWS, PARAMETERS, CANDIDATES = 600, 3, 20
+
+
+def problem(rng, size):
+    """A linear problem whose residual holds effects of this size, in units of the noise over all rows: the error of the estimates,
+    their standard deviations from the noise alone, and with the discrepancy."""
+    basis = rng.normal(size=(ROWS, 6))  # so that candidates and parameters are alike in part
+    jacobian = basis @ rng.normal(size=(6, PARAMETERS)) + 0.3 * rng.normal(size=(ROWS, PARAMETERS))
+    candidates = basis @ rng.normal(size=(6, CANDIDATES)) + 2.0 * rng.normal(size=(ROWS, CANDIDATES))
+    candidates /= np.linalg.norm(candidates, axis=0)
+    missing = candidates @ (size * rng.normal(size=CANDIDATES))
+    measured = missing + rng.normal(size=ROWS)
+    inverse = np.linalg.inv(jacobian.T @ jacobian)
+    error = inverse @ (jacobian.T @ measured)
+    residual = jacobian @ error - measured
+    added = mean_product(jacobian, residual, 7.0 * candidates, inverse)
+    return error, np.sqrt(np.diag(inverse)), np.sqrt(np.diag(inverse + added))
+
+
+def share_held(size, draws=200):
+    """Shares of the estimates within 1.96 standard deviations, from the noise alone and with the discrepancy, and the mean widening."""
+    rng = np.random.default_rng(7)
+    made = [problem(rng, size) for _ in range(draws)]
+    plain = np.mean([np.abs(error) < 1.96 * std for error, std, _ in made])
+    whole = np.mean([np.abs(error) < 1.96 * std for error, _, std in made])
+    return plain, whole, np.mean([wide / std for _, std, wide in made])
+
+
+def test_intervals_hold_the_truth_beside_small_effects_that_the_model_lacks():
+    plain, whole, _ = share_held(6.0)
+    assert plain < 0.8
+    assert 0.9 < whole < 0.99
+
+
+def test_nothing_is_added_where_the_residual_is_noise():
+    plain, whole, widening = share_held(0.0)
+    assert plain == pytest.approx(whole, abs=0.02)
+    assert widening < 1.03
+
+
+def test_candidates_that_change_nothing_or_that_are_none_add_nothing():
+    rng = np.random.default_rng(1)
+    jacobian, residual = rng.normal(size=(50, 2)), rng.normal(size=50)
+    inverse = np.linalg.inv(jacobian.T @ jacobian)
+    for none in (np.zeros((50, 0)), np.zeros((50, 3))):
+        assert not mean_product(jacobian, residual, none, inverse).any()
+
+
+def test_a_candidate_that_the_parameters_absorb_whole_adds_nothing_by_itself():
+    rng = np.random.default_rng(2)
+    jacobian = rng.normal(size=(200, 2))
+    inverse = np.linalg.inv(jacobian.T @ jacobian)
+    residual = rng.normal(size=200)
+    assert not mean_product(jacobian, residual, jacobian @ np.array([[1.0], [2.0]]), inverse).any()
