@@ -136,8 +136,22 @@ def test_an_outlier_moves_the_scale_and_the_fit_but_little():
     assert found.scale.max() < 1.1 * plain.scale.max()
 
 
-def test_errors_that_are_all_zero_have_the_smallest_scale_there_is():
-    assert 0.0 < scale_of(np.zeros(50)) < 1e-200
+def test_errors_that_are_all_zero_have_a_scale_whose_square_is_a_number():
+    assert 0.0 < scale_of(np.zeros(50)) ** 2 < 1e-200
+
+
+def resting(error_at_rest, least):
+    """Log density of errors of unit scale with one block at rest, where the model errs by this."""
+    error = np.random.default_rng(5).standard_t(4, 600)
+    error[200:250] = error_at_rest
+    none = Linearised.without_priors(error, np.zeros((600, 0)))
+    return predict([none], Blocks.of(rows_of([600]), least=least), rows_of([600]))[0].score
+
+
+def test_where_rounded_samples_rest_a_model_that_is_right_to_the_last_digit_is_no_better_than_one_within_the_rounding():
+    assert np.isfinite(resting(0.0, 0.3))
+    assert resting(0.0, 0.3) == pytest.approx(resting(0.2, 0.3), abs=15.0)
+    assert resting(0.0, 0.0) > resting(0.2, 0.0) + 30.0  # where nothing is rounded the difference counts
 
 
 # cross-validation

@@ -45,6 +45,12 @@ def test_the_banded_solution_is_the_dense_one_of_equation_5() -> None:
     assert operator.solve(output) == pytest.approx(dense, abs=1e-6 * np.abs(dense).max())
 
 
+def test_a_record_too_short_for_the_window_is_smoothed_over_the_whole_band() -> None:
+    made = small(np.random.default_rng(4))
+    estimate = estimate_htf(regularised_least_squares(made, 1, window=1e-3))
+    assert np.isfinite(estimate.htf.std).all() and estimate.htf.std.shape == estimate.htf.value.shape
+
+
 def test_estimates_of_a_real_system_have_conjugate_symmetry() -> None:
     operator = regularised_least_squares(small(np.random.default_rng(3)), 2, window=5.0)
     found = operator.solve(operator.spectra.output_at(operator.bins))

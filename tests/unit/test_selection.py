@@ -102,6 +102,13 @@ def test_a_richer_law_that_is_not_told_apart_by_far_does_not_replace_the_one_tha
         assert equivalent(plain, richer, contest(NOMINAL, plain, richer)) == same
 
 
+def test_a_law_that_leaves_most_of_the_mismatch_is_replaced_by_the_richer_one_that_removes_it():
+    for left, replaced in ((0.7, True), (0.2, False)):
+        richer = supposed("stribeck", predicted(0.05, 70.0))
+        plain = supposed("friction", predicted(left, 50.0), richer={"friction": ("stribeck",)})
+        assert equivalent(plain, richer, contest(NOMINAL, plain, richer)) != replaced
+
+
 def test_where_the_simplest_of_several_that_predict_alike_is_refused_another_is_granted():
     best = supposed("a", predicted(0.1, 80.0, seed=1), free=9)
     plain = supposed("b", predicted(0.1, 79.0, seed=1), shape={"within_bounds": math.inf})

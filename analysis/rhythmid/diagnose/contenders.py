@@ -108,10 +108,15 @@ def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseMode
         noise,
         record,
         np.concatenate(spread),
-        Blocks.of(record, noise.order, held),
+        Blocks.of(record, noise.order, held, _rounding((*series, *unseen), noise)),
         float(np.sqrt(power / max(total, 1))),
         float(np.sqrt(held_power / max(held_total, 1))),
     )
+
+
+def _rounding(series: Sequence[Series], noise: NoiseModel) -> float:
+    """Standard deviation of the error of rounding, in units of the innovations of the noise."""
+    return max(one.resolution for one in series) / math.sqrt(12.0) / noise.std
 
 
 def linearised(fit: Fit, rows: Rows) -> Linearised:
@@ -205,7 +210,7 @@ def contend(
         return found, measured_errors(found.error, rows), values
 
     results = counted(fork_map(one, list(trials)), len(trials), "hypotheses", tell)
-    done = {i: r for i, r in results if not isinstance(r, Exception)}
+    done = {i: r for i, r in results if not isinstance(r, Exception) and np.isfinite(r[0].error).all()}
     return [Contender(*trials[i], *done[i]) for i in sorted(done)]
 
 

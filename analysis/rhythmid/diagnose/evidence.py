@@ -69,14 +69,17 @@ class Blocks:
     block : (n,) block of each row.
     fold : (b,) fold of each block; `UNSEEN` for blocks that no fit sees.
     gap : rows on either side of a block that is left out which its fit does not see either.
+    least : scale that errors have at least, such as that of rounding. Where a machine rests, rounded samples and a model may agree
+        to the last digit, which says nothing of how well the model predicts.
     """
 
     block: Whole
     fold: Whole
     gap: int = 0
+    least: float = 0.0
 
     @classmethod
-    def of(cls, record: Whole, gap: int = 0, unseen: Whole | None = None) -> "Blocks":
+    def of(cls, record: Whole, gap: int = 0, unseen: Whole | None = None, least: float = 0.0) -> "Blocks":
         """Blocks of rows that belong to the records `record` (n,), numbered from 0 in order; each has its share of blocks.
 
         Those of the records numbered in `unseen` are in no fold.
@@ -98,7 +101,7 @@ class Blocks:
         fold = np.full(first, UNSEEN, dtype=np.int64)
         seen = ~np.array(hidden, dtype=bool)
         fold[seen] = np.arange(int(seen.sum())) % FOLDS
-        return cls(block, fold, gap)
+        return cls(block, fold, gap, least)
 
     @property
     def count(self) -> int:
@@ -149,13 +152,13 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
         out, seen = blocks.left_out(int(fold))
         left, columns = fit.residual[seen], jacobian[seen]
         step = np.zeros(columns.shape[1])
-        now, spread = left, scale_of(left)
+        now, spread = left, max(scale_of(left), blocks.least)
         for _ in range(REWEIGHTED if columns.shape[1] else 0):
             weight = weights_of(now, spread) / spread**2
             normal = (columns * weight[:, None]).T @ columns + np.diag(precision)
             step = -np.linalg.lstsq(normal, columns.T @ (weight * left) + pull, rcond=1e-12)[0]
             now = left + columns @ step
-            spread = scale_of(now)
+            spread = max(scale_of(now), blocks.least)
         error[out] += jacobian[out] @ step
         scale[out] = spread
     return CrossValidated(error, scale)
@@ -172,7 +175,11 @@ def prediction(
     seen = blocks.fold != UNSEEN
     counts = blocks.sums(np.ones(len(found.error)))
     density = block_densities(
-        blocks.split(found.error), blocks.sums(found.scale) / np.maximum(counts, 1.0), time, seen
+        blocks.split(found.error),
+        blocks.sums(found.scale) / np.maximum(counts, 1.0),
+        time,
+        seen,
+        blocks.least,
     )
     error = found.error if measured is None else measured
     return Prediction(density - found.penalty * counts * seen / time, blocks.sums(error**2), counts, ~seen)

@@ -8,7 +8,7 @@ where no row of the table of rejections speaks against the best of them.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rhythmid.diagnose.constants import APART, MISMATCH, REST
+from rhythmid.diagnose.constants import APART, MAINLY, MISMATCH, REST
 from rhythmid.diagnose.evidence import weight_for
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.rejections import Claim, Rejection, decisive, rejections_of
@@ -138,8 +138,10 @@ def equivalent(other: Hypothesis, best: Hypothesis, contest: Contest) -> bool:
 
 def replaces(richer: Prediction, plain: Prediction, floor: float, whole: float) -> bool:
     """Whether a richer law is named in the place of one that it contains: it is told apart by far, and removes more than a small
-    share of what the other leaves above the `floor` and of the `whole` mismatch, both mean squared errors."""
-    removed = plain.mean_square - richer.mean_square
-    return weight_for(richer, plain) > APART and removed >= max(
-        REST * (plain.mean_square - floor), MISMATCH * whole
-    )
+    share of what the other leaves above the `floor` and of the `whole` mismatch, both mean squared errors. Or it is told apart, and
+    the simpler one leaves most of the mismatch, which the richer one removes."""
+    removed, left = plain.mean_square - richer.mean_square, plain.mean_square - floor
+    weight = weight_for(richer, plain)
+    if weight > APART:
+        return removed >= max(REST * left, MISMATCH * whole)
+    return weight > decisive(1) and left > MAINLY * whole and removed >= MAINLY * left

@@ -15,10 +15,14 @@ from numpy.typing import NDArray
 from rhythmid.identify.student import DEGREES, log_density, scale_of
 
 Array = NDArray[np.float64]
+# scale of a block at least, as a share of that of the others: a block with less error holds nothing to predict, such as a rest
+QUIETEST = 0.01
 INFORMATION = 2.0 * DEGREES / (DEGREES + 3.0)  # of one error of Student's t on the logarithm of its scale
 
 
-def block_densities(errors: Sequence[Array], scales: Array, time: float, seen: NDArray[np.bool_]) -> Array:
+def block_densities(
+    errors: Sequence[Array], scales: Array, time: float, seen: NDArray[np.bool_], least: float = 0.0
+) -> Array:
     """Log densities (b,) of blocks of errors, divided by the autocorrelation time.
 
     Parameters
@@ -27,6 +31,7 @@ def block_densities(errors: Sequence[Array], scales: Array, time: float, seen: N
     scales : (b,) scale that the fit expects of each block.
     time : autocorrelation time in samples.
     seen : (b,) blocks from which is learnt how much scales vary; of the others no fit has seen anything.
+    least : scale that errors have at least, such as that of rounding.
 
     Returns
     -------
@@ -34,7 +39,10 @@ def block_densities(errors: Sequence[Array], scales: Array, time: float, seen: N
         Log density of each block.
     """
     own = np.array(
-        [math.log(scale_of(one) / scale) if len(one) else 0.0 for one, scale in zip(errors, scales)]
+        [
+            math.log(max(scale_of(one), least, QUIETEST * scale) / scale) if len(one) else 0.0
+            for one, scale in zip(errors, scales)
+        ]
     )
     information = INFORMATION * np.array([len(one) for one in errors]) / time
     variance = _between(own[seen], information[seen])

@@ -108,14 +108,22 @@ def _further(other: Hypothesis, chosen: Hypothesis) -> str:
 
 
 def shares_of(contest: Contest, chosen: Hypothesis) -> dict[str, float]:
-    """Share of the explainable mismatch that is lost without each effect of a hypothesis, by label."""
-    whole = contest.nominal.prediction.mean_square - contest.floor
+    """Share of the explainable mismatch that each effect of a hypothesis removes, by label: the mean of what it removes as the last of them
+    and as the first, for two effects the Shapley value. Effects may stand in for one another, so that neither removes much as
+    the last (L. S. Shapley, Contributions to the Theory of Games 2 (1953) 307)."""
+    nominal, after = contest.nominal.prediction.mean_square, chosen.prediction.mean_square
+    whole = nominal - contest.floor
+    squares = {one.key: one.prediction.mean_square for one in contest.hypotheses}
     found = {}
     for label in chosen.elements:
-        rest = tuple(sorted(set(chosen.elements) - {label}))
-        without = next((one for one in contest.hypotheses if one.key == rest), contest.nominal)
-        removed = without.prediction.mean_square - chosen.prediction.mean_square
-        found[label] = float(min(max(removed / whole, 0.0), 1.0)) if whole > 0.0 else 0.0
+        rest = set(chosen.elements) - {label}
+        # the best of the fitted models without it
+        without = min(square for key, square in squares.items() if set(key) <= rest)
+        removed = [without - after]
+        if rest and (label,) in squares:
+            removed.append(nominal - squares[label,])
+        share = sum(removed) / len(removed) / whole if whole > 0.0 else 0.0
+        found[label] = float(min(max(share, 0.0), 1.0))
     return found
 
 

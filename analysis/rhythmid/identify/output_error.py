@@ -21,6 +21,9 @@ from rhythmid.progress import Tell
 
 Array = NDArray[np.float64]
 LOST = 0.3  # error, as a share of the motion, above which a model has lost the machine
+# times the error of ordinary least squares, beyond which the fit that is weighted by the noise's colour is not given. What is left of
+# noise costs the weighted fit next to nothing of it; motion that the model misses is whitened away and given up for what is left
+MISLED = 1.25
 # chi2 that it may cost to put a parameter on its bound where the fit says that it cannot tell
 FALSE_EDGE = 25.0
 # of the residual, below which an error of integration has to stay: it must not count among models
@@ -209,7 +212,13 @@ def estimate(
     noise = noise_of(end.residuals, series, floor=1e-9 * spread)
     if progress is not None:
         progress(f"residual {noise.variance**0.5:.3g}, colour of order {noise.order}")
+    plain = end
     end = descend(end.model, run, chosen, noise, end.starts, iterations, pool, differences=end.differences)
+    if normalised_error(end.residuals, series) > MISLED * normalised_error(plain.residuals, series):
+        rms = math.sqrt(plain.chi2 / max(plain.samples, 1)) * scaled.std
+        return minimise(
+            plain.model, run, chosen, NoiseModel(np.empty(0), rms), plain.starts, iterations, pool
+        )
     noise = noise_of(end.residuals, series, floor=1e-9 * spread)
     return minimise(end.model, run, chosen, noise, end.starts, iterations, pool, differences=end.differences)
 

@@ -18,6 +18,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.inputs import Inputs
 from rhythmid.identify.spread import relative_spreads
 from rhythmid.model import Model
+from rhythmid.record.quality import resolution
 from rhythmid.record.record import Record
 from rhythmid.record.timing import nominal_period
 from rhythmid.simulation.generated_source import InputKind, OutputKind
@@ -45,6 +46,7 @@ class Series:
     `parameters` are values of the model's parameters that the record declares; see `own_model`. `record` is the record that the
     series is a stretch of, empty for a whole one. `spread` (n // block,) is the standard deviation of each average's noise over its
     root mean square, where it is not the same throughout: jitter of the stamps makes it grow with the slope of the signal.
+    `resolution` is the step of the grid that the samples were rounded to, 0 where they lie on none.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Series:
     parameters: Mapping[str, float] = field(default_factory=dict)
     record: str = ""
     spread: Array | None = None
+    resolution: float = 0.0
 
     @property
     def blocks(self) -> int:
@@ -249,6 +252,7 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
                 record.output_kind,
                 parameters=record.parameters,
                 record=record.whole,
+                resolution=resolution(value),
             )
         )
     if block is None:

@@ -13,15 +13,16 @@ from scipy.special import gammaln
 Array = NDArray[np.float64]
 DEGREES = 4.0  # degrees of freedom: the lowest for which the fourth moment is not finite; Lange et al. use 4 where it is not estimated
 SETTLES = 20  # passes for the scale at most
+NO_ERROR = 1e-150  # scale where there is no error: its square is a number still
 MEDIAN = 0.741  # of |t| for 4 degrees of freedom and unit scale
 
 
 def scale_of(error: Array) -> float:
-    """Maximum-likelihood scale of errors (n,); the smallest positive number where there is no error."""
+    """Maximum-likelihood scale of errors (n,); `NO_ERROR` where there is none."""
     square = error**2
     scale = float(np.median(np.abs(error)) / MEDIAN) or float(np.sqrt(np.mean(square)))
     if scale == 0.0:
-        return 1e-300
+        return NO_ERROR
     for _ in range(SETTLES):
         new = math.sqrt(float(np.mean((DEGREES + 1.0) * square / (DEGREES + square / scale**2))))
         if abs(new - scale) < 1e-3 * scale:

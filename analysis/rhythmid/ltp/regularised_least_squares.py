@@ -84,7 +84,8 @@ class RegularisedLeastSquares:
 
     def _around(self, values: Array) -> Array:
         """Mean of values (h, n) over the bins that the window ties together."""
-        wide = max(1, round(1.0 / (2.0 * self.window * self.spectra.resolution)))
+        tied = round(1.0 / (2.0 * self.window * self.spectra.resolution))
+        wide = min(max(1, tied), (values.shape[1] - 1) // 2)  # no wider than the band
         kernel = np.ones(2 * wide + 1)
         return np.array([np.convolve(row, kernel, mode="same") for row in values]) / np.convolve(
             np.ones(values.shape[1]), kernel, mode="same"

@@ -129,6 +129,7 @@ def search_effort(
         chosen = better
     for label in chosen.elements if len(chosen.elements) > 1 else ():
         search.without(chosen, label)
+        search.simplify(chosen, label)
     beyond = reference_of(balance, chosen, search.blocks)
     made = predict(
         [one.linearised for one in search.found] + [reference, beyond], search.blocks, balance.record
@@ -232,6 +233,24 @@ class _Search:
             if name != label and not name.startswith(f"{label}.")
         }
         return self._fit(rest, model, priors, self._aligned(rest), fitted.fit.alignment)
+
+    def simplify(self, fitted: Fitted, label: str) -> None:
+        """Fit the hypothesis with each law that one of its effects contains in the place of that effect: beside what was found later
+        the simpler law may do."""
+        term = fitted.fit.model.term(label)
+        if term is None:
+            return
+        base = self.without(fitted, label)
+        model = base.fit.model
+        simpler = [
+            start
+            for start in starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
+            if start.element is not None and term.element.name in start.element.special_case_of
+        ]
+        for one in screen(self.balance, base.fit, simpler):
+            made = self.fitted(base, one)
+            if made is not None and not self._known(made):
+                self.found.append(made)
 
     def fitted(self, base: Fitted, one: Screened) -> Fitted | None:
         """The base with an addition, everything refitted from its first guess."""
