@@ -32,8 +32,8 @@ from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, s
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
 from rhythmid.progress import Tell, counted, silent
+from rhythmid.record.cleaning import cleaned
 from rhythmid.record.gaps import cut_at_gaps
-from rhythmid.record.outlier import without_outliers
 from rhythmid.record.record import Record
 from rhythmid.simulation.signal import continuous, spline
 from rhythmid.simulation.simulate import simulate
@@ -137,8 +137,8 @@ def identify(
     Raises
     ------
     InputError
-        When a channel seems to be in another unit, to have its sign turned round or to be exchanged with another, and by the
-        paper's method when a record has no input, is shorter than a period, or the model has no limit cycle.
+        When most of an output is clipped, when a channel seems to be in another unit, to have its sign turned round or to be
+        exchanged with another, and by the paper's method when a record has no input, is shorter than a period, or the model has no limit cycle.
 
     Examples
     --------
@@ -167,12 +167,12 @@ def identify(
     given = (records,) if isinstance(records, Record) else tuple(records)
     if not given:
         raise InputError("nothing to identify from: give at least one record")
-    tidy = [without_outliers(record) for record in given]
-    cut = [note for record, _ in tidy for note in cut_at_gaps(record).notes]
+    clean = [cleaned(record) for record in given]
+    cut = [note for one in clean for note in cut_at_gaps(one.record).notes]
     found = _identified(
-        tuple(record for record, _ in tidy), model, harmonics, method, forcing, offset, htf, tell
+        tuple(one.record for one in clean), model, harmonics, method, forcing, offset, htf, tell
     )
-    return replace(found, notes=(*(note for _, said in tidy for note in said), *cut, *found.notes))
+    return replace(found, notes=(*(note for one in clean for note in one.notes), *cut, *found.notes))
 
 
 def _identified(
