@@ -20,6 +20,7 @@ from rhythmid.identify.identification import Delays, Estimate, Identification, S
 from rhythmid.identify.inner_delays import dead_times
 from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit, explained
 from rhythmid.identify.large_shifts import large_shifts
+from rhythmid.identify.natural_size import sizes_of
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
 from rhythmid.identify.paper_conditions import lacks_paper_method, lacks_transfer_functions
 from rhythmid.identify.paper_delays import combined, paper_delays
@@ -40,7 +41,7 @@ from rhythmid.simulation.simulate import simulate
 
 Array = NDArray[np.float64]
 Method = Literal["joint", "paper"]
-UNKNOWN = 1e3  # times its value: a standard deviation beyond which a parameter is not determined at all
+UNKNOWN = 1e3  # times its size: a standard deviation beyond which a parameter is not determined at all
 CLOSED = 5.0  # standard deviations of the closure that call for a note
 FRACTION = 0.01  # of a sample period, below which a closure is numerical, whatever its standard deviation
 SOURCES = {
@@ -311,9 +312,10 @@ def _by_likelihood(
     joint = replace(joint, fit=fit, search=explained(fit, joint.pumping))
     own = [name for name in fit.names if name not in DELAYS]
     values = fit.model.parameters
+    sizes = dict(zip(own, sizes_of(fit.model, own, fit.run.series)))
     parameters = {
         name: Estimate(values[name].value, fit.std[name], values[name].unit)
-        if fit.std[name] < UNKNOWN * max(abs(values[name].value), 1e-9)
+        if fit.std[name] < UNKNOWN * sizes[name]
         else Estimate(None, None, values[name].unit)
         for name in own
     }
