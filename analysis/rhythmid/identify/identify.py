@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.caution import Caution, not_identified, other_unit
+from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.discretisation import with_discretisation_error
 from rhythmid.identify.harmonic_likelihood import DELAYS
@@ -308,6 +309,9 @@ def _by_likelihood(
         return None
     tell("looking for clocks that drift and commands that are held")
     joint, notes = compensated(found) if found.search.arrived else (found, ())
+    late = command_jitter(joint.fit) if joint.search.arrived else None
+    if late is not None:
+        joint, notes = replace(joint, fit=weighed(joint.fit, late)), (*notes, late.words)
     fit = with_discretisation_error(efficient_fit(joint.fit))
     joint = replace(joint, fit=fit, search=explained(fit, joint.pumping))
     own = [name for name in fit.names if name not in DELAYS]
@@ -324,6 +328,9 @@ def _by_likelihood(
         "unexplained_response": joint.search.response,
         "noise_std": math.sqrt(fit.noise.variance * fit.run.series[0].block),
         "measurement_jitter": jitter.to_dict(),
+        "command_jitter": Estimate(None, None, "s").to_dict()
+        if late is None
+        else Estimate(late.std, late.uncertainty, "s").to_dict(),
     }
     delays = delays_of(joint, forcing, offset, SOURCES.get(seen.source, "the forcing"))
     refused = {
