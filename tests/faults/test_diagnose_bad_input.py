@@ -173,7 +173,7 @@ def test_clipped_samples_are_left_out_and_counted(rubbing):
     assert found.verdict == "missing_physics"
     assert [effect.element for effect in found.missing] == ["coulomb_friction"]
     said = [note for note in found.notes if "clipped" in note]
-    assert len(said) == 2 and all(int(note.split(": ")[1].split()[0]) > 100 for note in said)
+    assert len(said) == 2 and all(int(note.split(" left out, ")[1].split()[0]) > 100 for note in said)
 
 
 @pytest.mark.parametrize("flaw", ["outliers", "repeats"])

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,31 @@ def test_it(run_graph):
     assert "rhythmid run ended with exit code 1" in done.stdout
     assert "measurement_delay] no sensor" in done.stdout
     assert "measurement_delay ended with exit code 2" in done.stdout
+
+
+def test_runs_side_by_side_do_not_hear_one_another(tmp_path):
+    text = """
+import time
+import numpy as np
+import pytest
+
+pytest_plugins = ["rhythmid.testing"]
+
+@pytest.mark.parametrize("amplitude", [0.01, 0.02, 0.03, 0.04])
+def test_it(run_graph, request, amplitude):
+    begin = time.monotonic()
+    chirp = {"type": "chirp", "amplitude": amplitude, "band": [1, 7], "sweep": 1.0}
+    run = run_graph({"excitation": chirp}, timeout=250.0)
+    sent = run.values("excitation", "effort")
+    assert len(sent) == 1000 and 0.9 * amplitude < np.abs(sent).max() <= amplitude
+    np.testing.assert_array_equal(run.values("command", "effort"), sent)
+    (request.path.parent / f"{amplitude}.span").write_text(f"{begin} {time.monotonic()}")
+"""
+    done = run_tests(tmp_path, text, "-n", "4")
+    assert done.returncode == 0, done.stdout
+    assert "4 workers" in done.stdout and "4 passed" in done.stdout
+    spans = sorted(tuple(map(float, one.read_text().split())) for one in tmp_path.glob("*.span"))
+    assert len(spans) == 4 and any(later < end for (_, end), (later, _) in pairwise(spans))  # they were
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from machines import SHORT, hopper, records
-from rhythmid.diagnose.admission import admitted, check_comparable, check_driven, without_clipped
+from rhythmid.diagnose.admission import admitted, check_comparable, check_driven
 from rhythmid.errors import InputError
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
@@ -24,12 +24,6 @@ TIME = 1e-3 * np.arange(8000)
 @pytest.fixture(scope="module")
 def given() -> list[Record]:
     return records(hopper(), SHORT[:2])
-
-
-def limited(record: Record, share: float) -> Record:
-    """The record of a sensor that goes no further than this quantile."""
-    value = record.output.value
-    return replace(record, output=replace(record.output, value=np.minimum(value, np.quantile(value, share))))
 
 
 def swing(decay: float) -> Record:
@@ -56,24 +50,6 @@ def test_outliers_are_left_out_and_told_once_a_record(given):
     found = admitted([replace(given[0], output=replace(given[0].output, value=value))], (), hopper())
     assert found.records[0].output.value.max() < 0.4
     assert len(found.notes) == 1 and given[0].name in found.notes[0]
-
-
-def test_clipped_samples_and_their_neighbours_are_left_out_and_counted(given):
-    clipped = limited(given[1], 0.97)
-    kept, (note,) = without_clipped(clipped)
-    assert (kept.output.value == clipped.output.value.max()).sum() < 20  # shorter runs are peaks
-    gone = len(clipped.output.value) - len(kept.output.value)
-    count = int(note.split(": ")[1].split()[0])
-    assert 200 < count <= gone <= 3 * count
-
-
-def test_what_was_not_clipped_stays_itself(given):
-    assert without_clipped(given[0]) == (given[0], ())
-
-
-def test_a_sensor_that_is_clipped_most_of_the_time_is_refused(given):
-    with pytest.raises(InputError, match=r"% of the output is clipped at .* wider range"):
-        without_clipped(limited(given[0], 0.3))
 
 
 def test_a_free_decay_needs_no_input_and_motion_that_hardly_decays_is_remarked_on():

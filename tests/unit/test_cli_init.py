@@ -1,19 +1,21 @@
-"""`rhythmid init` and `rhythmid convert` as they are typed: from a foreign table to the first verdict, and what they refuse."""
+"""`rhythmid init` and `rhythmid convert` as they are typed: from a foreign recording to the first verdict, and what they refuse."""
 
 import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
-from foreign import STEP, moved, tones
+from foreign import STEP, array, joint_state, moved, tones, write
 
 from rhythmid.record.read import read_record
 
 TIME = np.arange(5000) * STEP
 TORQUE = tones(3, TIME, 1.2, 0.4, 3.0)
 DRY = 0.25
+NOW = 1.7e9  # s at which a bag begins
 
 
 @pytest.fixture
@@ -30,16 +32,39 @@ def table(tmp_path):
     return path
 
 
-def test_three_commands_lead_from_a_foreign_table_to_a_verdict(table, rhythmid):
-    begun = rhythmid("init", "run.csv")
+@pytest.fixture
+def bag(tmp_path):
+    """A robot's bag: states of three joints, and their torques in one array without names or stamps; the knee has dry friction."""
+    rng, rows = np.random.default_rng(0), range(0, len(TIME), 4)
+    torques = np.stack(
+        [np.repeat(tones(seed, TIME, rms)[::4], 4) for seed, rms in ((7, 0.1), (3, 0.4), (8, 0.1))]
+    )
+    dry = (0.0, DRY, 0.0)
+    angles = np.stack([moved(own, 0.05, 0.1, 6.0, held)[0] for own, held in zip(torques, dry, strict=True)])
+    angles += 3e-4 * rng.standard_normal(angles.shape)
+    states = [
+        (NOW + TIME[k] + 2e-4, joint_state(NOW + TIME[k], ["hip", "knee", "ankle"], position=angles[:, k]))
+        for k in rows
+    ]
+    commands = [(NOW + TIME[k] + 1e-4, array(torques[:, k])) for k in rows]
+    return write(
+        tmp_path / "bag", {"/robot/joint_states": states, "/robot/torque_controller/commands": commands}
+    )
+
+
+@pytest.mark.parametrize("recording", ["table", "bag"])
+def test_three_commands_lead_from_a_foreign_recording_to_a_verdict(recording, request, rhythmid):
+    source: Path = request.getfixturevalue(recording)
+    begun = rhythmid("init", source.name)
     assert (begun.returncode, begun.stderr) == (0, "")
     commands = [line.split()[1:] for line in begun.stdout.splitlines() if line.startswith("  rhythmid ")]
     assert [one[0] for one in commands] == ["check", "diagnose"]
     checked = rhythmid(*commands[0])
-    assert checked.returncode == 0 and "note" not in checked.stdout
+    assert checked.returncode == 0
+    assert all("clocks" in line for line in checked.stdout.splitlines() if "note" in line)
     done = rhythmid(*commands[1], "--json", "answer.json", timeout=250.0)
     assert done.returncode == 0, done.stderr
-    answer = json.loads((table.parent / "answer.json").read_text())
+    answer = json.loads((source.parent / "answer.json").read_text())
     assert answer["verdict"] == "missing_physics" and answer["missing"][0]["element"] == "coulomb_friction"
     found = answer["missing"][0]["parameters"]["force"]
     assert found["value"] == pytest.approx(DRY, abs=max(0.01, 3.0 * found["std"]))

@@ -5,16 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from machines import hopper, record
+from machines import CATALOGUE, hopper, record
 from rhythmid.errors import InputError
+from rhythmid.identify.bound import expected_fit
 from rhythmid.identify.identifiability import Offset, aliases, delays_of, offset_of
 from rhythmid.identify.identification import Delays
 from rhythmid.identify.identify import identify
 from rhythmid.identify.joint import JointFit, joint_likelihood
+from rhythmid.identify.natural_size import natural_size
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.series import prepare
 from rhythmid.identify.undetermined import undetermined
 from rhythmid.model import Model
+from rhythmid.offline_run import simulate
 from rhythmid.record.record import Record
 
 SPEC = {"type": "chirp", "amplitude": 0.05, "band": [0, 7], "sweep": 12.0}
@@ -146,3 +149,65 @@ def test_an_undetermined_parameter_is_given_no_value(joint, with_free_gravity):
     assert found.parameters["gravity.acceleration"].value is None
     assert found.parameters["linear_spring.stiffness"].value == pytest.approx(200.0, rel=1e-3)
     assert "gravity.acceleration" in " ".join(found.delays.undetermined)
+
+
+AT_REST = """
+inertia: {mass: {value: 1.0, unit: kg, fixed: true}}
+force:
+  - linear_spring: {stiffness: {value: 200.0, unit: N/m}, rest_length: {value: 0.0, unit: m}}
+  - viscous_damper: {damping: {value: 2.0, unit: N*s/m}}
+"""
+SWEEP = {
+    "excitation": SPEC | {"amplitude": 1.0},
+    "forcing": {"amplitude": 0.0},
+    "noise": {"measurement_std": 1e-5},
+}
+
+
+@pytest.fixture(scope="module")
+def about_zero() -> Record:
+    """A record of a spring whose true rest length is 0."""
+    return simulate(Model.from_text(AT_REST), SWEEP).record
+
+
+@pytest.mark.parametrize("start", [0.0, 0.01])
+def test_a_rest_length_that_is_zero_is_determined(about_zero, start):
+    guess = Model.from_text(AT_REST).with_values({"linear_spring.rest_length": start})
+    found = identify(about_zero, guess)
+    rest = found.parameters["linear_spring.rest_length"]
+    assert abs(rest.value) < 4.0 * rest.std < 1e-4
+    assert found.delays.undetermined == ()
+
+
+def test_a_parameter_that_the_motion_never_feels_is_told(about_zero):
+    stop = CATALOGUE["end_stop_contact"]
+    model = Model.from_text(AT_REST).with_element(stop, {"stiffness": 1e4, "position": 10.0, "side": 1.0})
+    fixed = replace(model.parameters["end_stop_contact.position"], fixed=True)
+    found = identify(about_zero, model.with_parameters({"end_stop_contact.position": fixed}))
+    assert "nothing in the records determines end_stop_contact.stiffness" in found.delays.undetermined
+    assert found.parameters["end_stop_contact.stiffness"].value is None
+    assert not any("rest_length" in words for words in found.delays.undetermined)
+
+
+def test_parameters_whose_effect_drowns_in_the_noise_are_told():
+    still = simulate(Model.from_text(AT_REST), SWEEP | {"excitation": SPEC | {"amplitude": 1e-7}}).record
+    told = " ".join(one.words for one in undetermined(expected_fit(Model.from_text(AT_REST), still, 1e-5)))
+    assert "linear_spring.stiffness" in told and "viscous_damper.damping" in told
+    assert "rest_length" not in told  # where it comes to rest is seen as well as ever
+
+
+@pytest.mark.parametrize(
+    ("unit", "size"),
+    [
+        ("m", 0.02), ("N", 1.5), ("N/m", 75.0), ("N*s/m", 7.5), ("N*s^2/m^2", 37.5), ("m/s", 0.2), ("1/m", 50.0), ("Hz", 10.0),
+        ("kg", 2.0), ("1", 1.0), ("rad", 1.0), ("ohm", None),
+    ],
+)  # fmt: skip
+def test_a_parameter_is_measured_by_what_it_would_have_to_be_to_matter(scales, unit, size):
+    known = replace(scales, effort=1.5, position=0.02, mass=2.0, frequency=10.0 / (2.0 * np.pi))
+    assert natural_size(unit, known) == (size if size is None else pytest.approx(size))
+
+
+def test_what_a_design_leaves_in_doubt_is_no_rest_length_of_zero(about_zero):
+    fit = expected_fit(Model.from_text(AT_REST), about_zero, 1e-5)
+    assert undetermined(fit) == []

@@ -67,6 +67,18 @@ def test_without_a_recorded_effort_the_controllers_gains_make_it(air: Machine):
     assert any("armature and delay" in line for line in found.not_separable)
 
 
+def test_samples_at_a_limit_of_one_joints_sensor_are_left_out_and_told(air: Machine):
+    record = swung(air)
+    knee = record.joints["knee"]
+    limit = float(np.quantile(knee.output.value, 0.93))
+    clipped = replace(knee, output=replace(knee.output, value=np.minimum(knee.output.value, limit)))
+    record = replace(record, joints={**record.joints, "knee": clipped})
+    found = identify_machine([record], air)
+    assert sum("knee: samples of the output that are clipped at" in note for note in found.notes) == 1
+    damping = found.parameters["knee.viscous_damper.damping"]
+    assert damping.value == pytest.approx(air.value("knee.viscous_damper.damping"), abs=3.0 * damping.std)
+
+
 @given(st.lists(st.floats(-2.0, 2.0), min_size=10, max_size=10))
 def test_every_factor_is_a_link_that_can_be_and_comes_back(entries: list[float]):
     inertial = from_cholesky(np.array(entries))

@@ -14,7 +14,6 @@ from rhythmid.identify.series import prepare
 from rhythmid.identify.timing import (
     _first_samples,
     command_hold,
-    command_jitter,
     compensated,
     measurement_jitter,
 )
@@ -91,18 +90,6 @@ def test_measurement_jitter_is_read_off_residuals_that_grow_with_speed():
     jitter = measurement_jitter(joint.fit)
     assert jitter.value == pytest.approx(2e-4, rel=0.05)
     assert near(joint, U, DELAYS[0], 5e-5) and near(joint, Y, DELAYS[1] + late.mean())  # its mean is a delay
-
-
-def test_command_jitter_is_read_off_the_roll_off():
-    joint = fitted(concealing("command_jitter", std=0.01))
-    stamps = np.arange(12000) * 1e-3
-    arrival = np.maximum.accumulate(stamps + uniform_delay(stamps, 0.01, 0.0))  # none overtakes another
-    acting = stamps - stamps[np.searchsorted(arrival, stamps, side="right") - 1]
-    jitter = command_jitter(joint.fit)
-    assert jitter.value == pytest.approx(float(acting[1000:].std()), abs=max(4.0 * jitter.std, 1e-3))
-    assert joint.fit.model.value(U) == pytest.approx(
-        DELAYS[0] + float((arrival - stamps)[1000:].mean()), abs=2e-3
-    )
 
 
 def test_lost_samples_of_every_channel_do_no_harm():

@@ -24,7 +24,7 @@ from rhythmid.identify.output_error import estimate, start_only
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.progress import Tell
-from rhythmid.record.outlier import without_outliers
+from rhythmid.record.cleaning import cleaned
 from rhythmid.record.record import Channel, Record
 from rhythmid.report.comparison import LABELS
 from rhythmid.report.quantity import pretty_unit
@@ -276,7 +276,7 @@ def compare(
     Raises
     ------
     InputError
-        Where there is too little in common.
+        Where there is too little in common, or most of an output is clipped.
 
     Examples
     --------
@@ -295,8 +295,8 @@ def compare(
                 f"{simulation.name} holds a {simulation.output_kind}, {one.name} a {one.output_kind}; name the same quantity under 'output:'"
             )
     tell("aligning simulation and recording")
-    tidy = [without_outliers(one) for one in recordings]
-    aligned = [(align(simulation, one), one, said) for one, said in tidy]
+    clean = [cleaned(one) for one in recordings]
+    aligned = [(align(simulation, one.record), one.record, one.notes) for one in clean]
     alignment, recording, left_out = min(
         aligned, key=lambda case: (bool(case[0].mismatch), case[0].difference or 0.0)
     )

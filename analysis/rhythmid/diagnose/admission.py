@@ -1,9 +1,9 @@
-"""Which records a diagnosis can use: outliers and clipped samples are left out, what drives the machine has to be known, and
+"""Which records a diagnosis can use: what does not say where the machine was is left out, what drives the machine has to be known, and
 records of one diagnosis have to come from one machine in one set of units."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +12,12 @@ from rhythmid.errors import InputError
 from rhythmid.identify.drive import drive_of, driven
 from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
+from rhythmid.record.cleaning import cleaned
 from rhythmid.record.gaps import cut_at_gaps
-from rhythmid.record.outlier import without_outliers
 from rhythmid.record.punctuality import punctuality_notes
-from rhythmid.record.quality import clipped_samples
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-MOSTLY = 0.5  # share of clipped samples beyond which a record is useless
 DECAYS = 0.7  # of the motion's size from the first quarter to the last, above which it may be driven
 
 
@@ -39,17 +37,16 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
     """
     whole = (*records, *holdout)
     remark = check_driven(whole, model)
-    tidy = [without_outliers(record) for record in whole]
-    cleaned = [without_clipped(record) for record, _ in tidy]
-    given = tuple(driven(record, model) for record, _ in cleaned)
+    clean = [cleaned(record) for record in whole]
+    given = tuple(driven(one.record, model) for one in clean)
     check_comparable(prepare(given))
     cut = [cut_at_gaps(record) for record in given]
     notes = dict.fromkeys(
         (
             remark,
             *(f"{one.name}: {note}" for one in whole for note in punctuality_notes(one.run)),
-            *(note for _, said in (*tidy, *cleaned) for note in said),
-            *(drive_of(a, b) for (a, _), b in zip(cleaned, given)),
+            *(note for one in clean for note in one.notes),
+            *(drive_of(one.record, b) for one, b in zip(clean, given)),
             *(note for one in cut for note in one.notes),
         )
     )
@@ -58,28 +55,6 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
         for part in (cut[: len(records)], cut[len(records) :])
     )
     return Admitted(learnt, unseen, tuple(note for note in notes if note is not None))
-
-
-def without_clipped(record: Record) -> tuple[Record, tuple[str, ...]]:
-    """The record without samples of the output at a limit of its sensor, and what there is to say of them.
-
-    Raises InputError when most of the record is clipped.
-    """
-    channel = record.output
-    bad = clipped_samples(channel.value)
-    if not bad.any():
-        return record, ()
-    share = float(bad.mean())
-    limits = " and ".join(f"{v:.6g}" for v in np.unique(channel.value[bad]))
-    if share > MOSTLY:
-        raise InputError(
-            f"{record.name}: {100 * share:.0f} % of the output is clipped at {limits} {channel.unit}; choose a wider range of the sensor"
-        )
-    # the samples beside a limit are often half clipped by the sensor's own averaging
-    near = bad | np.concatenate([[False], bad[:-1]]) | np.concatenate([bad[1:], [False]])
-    kept = replace(channel, time=channel.time[~near], value=channel.value[~near])
-    note = f"{record.name}: {int(bad.sum())} samples of the output ({100 * share:.2g} %) are clipped at {limits} {channel.unit} and left out"
-    return replace(record, output=kept), (note,)
 
 
 def check_driven(records: Sequence[Record], model: Model) -> str | None:

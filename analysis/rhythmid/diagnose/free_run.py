@@ -39,6 +39,7 @@ from rhythmid.diagnose.verdict import Decision, decide
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
+from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.covariance import covariance_of
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.robust_covariance import with_robust_covariance
@@ -72,7 +73,8 @@ class FreeRunResult:
 
 def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     """Search, weigh and decide."""
-    calibration, seen = scoring.calibration, list(scoring.calibration.series)
+    calibration = _with_jitter(scoring)
+    seen = list(calibration.series)
     unseen = tuple(scoring.unseen) if case.holdout else ()
     known = case.catalogue.within(scales(seen, calibration.fit.model))
     found = search(seen, calibration.fit, case.nominal, known, case.pool, case.tell, case.budget)
@@ -152,6 +154,20 @@ def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.floa
     inverse = covariance_of(line.jacobian[:, known], priors)
     made[np.ix_(known, known)] = mean_product(line.jacobian[:, known], line.residual, columns, inverse)
     return made
+
+
+def _with_jitter(scoring: Scoring) -> Calibration:
+    """The calibrated nominal model; what jitter of the commands excites is its noise, where that shows in free run."""
+    found = scoring.calibration
+    jitter = command_jitter(found.fit) if scoring.kind == "free_run" else None
+    if jitter is None:
+        return found
+    fit = weighed(found.fit, jitter)
+    return replace(found, fit=fit, series=fit.run.series, notes=(*found.notes, _sentence(jitter.words)))
+
+
+def _sentence(words: str) -> str:
+    return f"{words[0].upper()}{words[1:]}."
 
 
 def _trial_of(hypothesis: Hypothesis, contenders: Sequence[Contender]) -> Trial:

@@ -94,14 +94,14 @@ def _magnitude(parameter: "Parameter", scales: "Scales") -> float:
     }
     if parameter.unit in known:
         return known[parameter.unit]
-    powers = dict(_powers(parameter.unit))
-    if "N" not in powers or not set(powers) <= {"N", "m", "s", "kg"}:
+    found = dict(powers(parameter.unit))
+    if "N" not in found or not set(found) <= {"N", "m", "s", "kg"}:
         raise NoGuess(f"the unit {parameter.unit} of its {parameter.name} says nothing of its size")
     sizes = {"N": scales.force, "m": scales.position, "s": 1.0 / rate, "kg": scales.mass}
-    return COEFFICIENT * math.prod(sizes[unit] ** power for unit, power in powers.items())
+    return COEFFICIENT * math.prod(sizes[unit] ** power for unit, power in found.items())
 
 
-def _powers(unit: str) -> Iterator[tuple[str, int]]:
+def powers(unit: str) -> Iterator[tuple[str, int]]:
     """The units in a product such as N*s^2/m^2, with their powers."""
     for divided, name, power in re.findall(r"([*/]?)([A-Za-z]+)(?:\^(\d+))?", unit):
         yield name, (-1 if divided == "/" else 1) * int(power or 1)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.caution import Caution, not_identified, other_unit
+from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.discretisation import with_discretisation_error
 from rhythmid.identify.harmonic_likelihood import DELAYS
@@ -20,6 +21,7 @@ from rhythmid.identify.identification import Delays, Estimate, Identification, S
 from rhythmid.identify.inner_delays import dead_times
 from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit, explained
 from rhythmid.identify.large_shifts import large_shifts
+from rhythmid.identify.natural_size import sizes_of
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
 from rhythmid.identify.paper_conditions import lacks_paper_method, lacks_transfer_functions
 from rhythmid.identify.paper_delays import combined, paper_delays
@@ -32,15 +34,15 @@ from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, s
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
 from rhythmid.progress import Tell, counted, silent
+from rhythmid.record.cleaning import cleaned
 from rhythmid.record.gaps import cut_at_gaps
-from rhythmid.record.outlier import without_outliers
 from rhythmid.record.record import Record
 from rhythmid.simulation.signal import continuous, spline
 from rhythmid.simulation.simulate import simulate
 
 Array = NDArray[np.float64]
 Method = Literal["joint", "paper"]
-UNKNOWN = 1e3  # times its value: a standard deviation beyond which a parameter is not determined at all
+UNKNOWN = 1e3  # times its size: a standard deviation beyond which a parameter is not determined at all
 CLOSED = 5.0  # standard deviations of the closure that call for a note
 FRACTION = 0.01  # of a sample period, below which a closure is numerical, whatever its standard deviation
 SOURCES = {
@@ -137,8 +139,8 @@ def identify(
     Raises
     ------
     InputError
-        When a channel seems to be in another unit, to have its sign turned round or to be exchanged with another, and by the
-        paper's method when a record has no input, is shorter than a period, or the model has no limit cycle.
+        When most of an output is clipped, when a channel seems to be in another unit, to have its sign turned round or to be
+        exchanged with another, and by the paper's method when a record has no input, is shorter than a period, or the model has no limit cycle.
 
     Examples
     --------
@@ -167,12 +169,12 @@ def identify(
     given = (records,) if isinstance(records, Record) else tuple(records)
     if not given:
         raise InputError("nothing to identify from: give at least one record")
-    tidy = [without_outliers(record) for record in given]
-    cut = [note for record, _ in tidy for note in cut_at_gaps(record).notes]
+    clean = [cleaned(record) for record in given]
+    cut = [note for one in clean for note in cut_at_gaps(one.record).notes]
     found = _identified(
-        tuple(record for record, _ in tidy), model, harmonics, method, forcing, offset, htf, tell
+        tuple(one.record for one in clean), model, harmonics, method, forcing, offset, htf, tell
     )
-    return replace(found, notes=(*(note for _, said in tidy for note in said), *cut, *found.notes))
+    return replace(found, notes=(*(note for one in clean for note in one.notes), *cut, *found.notes))
 
 
 def _identified(
@@ -307,13 +309,17 @@ def _by_likelihood(
         return None
     tell("looking for clocks that drift and commands that are held")
     joint, notes = compensated(found) if found.search.arrived else (found, ())
+    late = command_jitter(joint.fit) if joint.search.arrived else None
+    if late is not None:
+        joint, notes = replace(joint, fit=weighed(joint.fit, late)), (*notes, late.words)
     fit = with_discretisation_error(efficient_fit(joint.fit))
     joint = replace(joint, fit=fit, search=explained(fit, joint.pumping))
     own = [name for name in fit.names if name not in DELAYS]
     values = fit.model.parameters
+    sizes = dict(zip(own, sizes_of(fit.model, own, fit.run.series)))
     parameters = {
         name: Estimate(values[name].value, fit.std[name], values[name].unit)
-        if fit.std[name] < UNKNOWN * max(abs(values[name].value), 1e-9)
+        if fit.std[name] < UNKNOWN * sizes[name]
         else Estimate(None, None, values[name].unit)
         for name in own
     }
@@ -322,6 +328,9 @@ def _by_likelihood(
         "unexplained_response": joint.search.response,
         "noise_std": math.sqrt(fit.noise.variance * fit.run.series[0].block),
         "measurement_jitter": jitter.to_dict(),
+        "command_jitter": Estimate(None, None, "s").to_dict()
+        if late is None
+        else Estimate(late.std, late.uncertainty, "s").to_dict(),
     }
     delays = delays_of(joint, forcing, offset, SOURCES.get(seen.source, "the forcing"))
     refused = {

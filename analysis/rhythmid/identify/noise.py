@@ -113,3 +113,32 @@ def estimate_noise(residuals: Sequence[Array], highest: int = 24, floor: float =
         if score < best_score:
             best, best_score = NoiseModel(a.copy(), float(np.sqrt(error))), score
     return best
+
+
+def burg(stretches: Sequence[Array], highest: int = 24) -> NoiseModel:
+    """Autoregressive model of stretches (n_i,) by Burg's method, its order chosen by the Bayesian information criterion.
+
+    For noise that a lightly damped machine remembers: sample covariances take a stretch to be zero beyond its ends, which hides such a
+    colour. (J. P. Burg, Maximum Entropy Spectral Analysis, thesis, Stanford 1975; Stoica, Moses, section 3.9.3.)
+    """
+    forward = backward = [one for one in stretches if len(one) > 2 * highest]
+    total = sum(len(one) for one in forward)
+    error = sum(float(one @ one) for one in forward) / max(total, 1)
+    if error <= 0.0:
+        return NoiseModel(np.empty(0), 1e-300)
+    best, least = NoiseModel(np.empty(0), float(np.sqrt(error))), np.log(error)
+    a = np.empty(0)
+    for order in range(1, highest + 1):
+        ahead, behind = [f[1:] for f in forward], [b[:-1] for b in backward]
+        power = sum(float(f @ f + b @ b) for f, b in zip(ahead, behind))
+        reflection = 2.0 * sum(float(f @ b) for f, b in zip(ahead, behind)) / max(power, 1e-300)
+        a = np.concatenate([a - reflection * a[::-1], [reflection]])
+        error *= 1.0 - reflection**2
+        if error <= 0.0:
+            break
+        forward = [f - reflection * b for f, b in zip(ahead, behind)]
+        backward = [b - reflection * f for f, b in zip(ahead, behind)]
+        score = np.log(error) + order * np.log(total) / total
+        if score < least:
+            best, least = NoiseModel(a.copy(), float(np.sqrt(error))), score
+    return best

@@ -162,14 +162,23 @@ def _fit(
 
 
 def noise_of(residuals: Sequence[Array], series: Sequence[Series], floor: float = 0.0) -> NoiseModel:
-    """Noise model of residuals over the averages that were used."""
+    """Noise model of residuals over the averages that were used; its colour is that of the series where they know it."""
     stretches = []
     for residual, one in zip(residuals, series):
         if one.ignored is not None:
             columns = one.ignored[one.used]
             residual = residual - one.ignored @ np.linalg.lstsq(columns, residual[one.used], rcond=1e-12)[0]
         stretches += [one.levelled(residual[s], s) for s in runs(one.used)]
-    return estimate_noise(stretches, floor=floor)
+    return coloured(stretches, series, floor)
+
+
+def coloured(stretches: Sequence[Array], series: Sequence[Series], floor: float) -> NoiseModel:
+    """Noise model of what is left in stretches of these series."""
+    colour = series[0].colour
+    if colour is None:
+        return estimate_noise(stretches, floor=floor)
+    size = float(np.sqrt(np.mean(np.concatenate([colour.whiten(one) for one in stretches]) ** 2)))
+    return replace(colour, std=max(size * colour.std, floor, 1e-300))
 
 
 def estimate(

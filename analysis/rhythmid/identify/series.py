@@ -16,6 +16,7 @@ from scipy.interpolate import PPoly
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
 from rhythmid.identify.inputs import Inputs
+from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.spread import relative_spreads
 from rhythmid.model import Model
 from rhythmid.record.quality import resolution
@@ -46,7 +47,8 @@ class Series:
     `parameters` are values of the model's parameters that the record declares; see `own_model`. `record` is the record that the
     series is a stretch of, empty for a whole one. `spread` (n // block,) is the standard deviation of each average's noise over its
     root mean square, where it is not the same throughout: jitter of the stamps makes it grow with the slope of the signal.
-    `resolution` is the step of the grid that the samples were rounded to, 0 where they lie on none.
+    `resolution` is the step of the grid that the samples were rounded to, 0 where they lie on none. `colour` is the noise model,
+    where that is known up to its size, as that of what jitter of commands excites.
     """
 
     name: str
@@ -65,6 +67,7 @@ class Series:
     record: str = ""
     spread: Array | None = None
     resolution: float = 0.0
+    colour: NoiseModel | None = None
 
     @property
     def blocks(self) -> int:

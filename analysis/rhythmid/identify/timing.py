@@ -231,19 +231,6 @@ def _smear(fit: Fit, largest: float, pool: ThreadPoolExecutor | None) -> tuple[f
     return best, spread
 
 
-def command_jitter(fit: Fit, largest: float = 0.05, pool: ThreadPoolExecutor | None = None) -> Estimate:
-    """Standard deviation σ [s] of the delay of single commands, from the roll-off of the response.
-
-    On average over the jitter the machine receives the command smeared over √12 σ; the mean of the jitter is part of the
-    input delay.
-    """
-    found = _smear(fit, largest, pool)
-    if found is None:
-        return Estimate(None, None, "s")
-    std = math.sqrt(found[0])
-    return Estimate(std, found[1] / (2.0 * max(std, math.sqrt(found[1]))), "s")
-
-
 def _widened(fit: Fit, name: str, std: float) -> Fit:
     """The fit with a further independent error of `name` in its covariance."""
     index = fit.names.index(name)

@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 
 from rhythmid.identify.harmonic_likelihood import INPUT_DELAY, MEASUREMENT_DELAY
 from rhythmid.identify.identification import Estimate
+from rhythmid.identify.natural_size import sizes_of
 from rhythmid.identify.output_error import Fit
-from rhythmid.identify.series import dominant_frequency
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Direction:
-    """A change of parameters (unit vector, in units of their size) that the records do not notice, in words."""
+    """A change of parameters (unit vector, in units of their sizes) that the records do not notice, in words."""
 
     names: tuple[str, ...]
     weights: Array
@@ -25,18 +25,15 @@ class Direction:
 
 
 def undetermined(fit: Fit) -> list[Direction]:
-    """Directions in parameter space whose standard deviation exceeds the parameters themselves.
+    """Directions in parameter space whose standard deviation exceeds the sizes of the parameters.
 
-    Null space of the Fisher information, each parameter measured by its own size, a delay by the motion's period / 2π.
+    Null space of the Fisher information, each parameter measured by what it would have to be to matter: see `natural_size`.
     """
     p = len(fit.names)
     if p == 0:
         return []
-    radian = 1.0 / (2 * np.pi * max(dominant_frequency(one) for one in fit.run.series))
     parameters = fit.model.parameters
-    size = np.array(
-        [radian if parameters[n].unit == "s" else abs(v) or 1.0 for n, v in zip(fit.names, fit.values)]
-    )
+    size = sizes_of(fit.model, fit.names, fit.run.series)
     information = (fit.linearisation.jacobian * size).T @ (fit.linearisation.jacobian * size)
     for i, name in enumerate(fit.names):
         prior = parameters[name].prior

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block
+from rhythmid.record.cleaning import LeftOut, cleaned
 from rhythmid.record.columns import Columns, read_columns
+from rhythmid.record.gaps import Cut, cut_at_gaps
 from rhythmid.record.message_types import stamp_path
 from rhythmid.record.quality import ChannelQuality
 from rhythmid.record.read import read_record
@@ -66,6 +68,8 @@ class BagReport:
     notes : what a user should know of the recording, one line each.
     damage : those of the notes that tell damage of the files; empty for a whole recording.
     record : what could be read; None if it cannot be used as mapped.
+    left_out : samples that no analysis will use, one entry for each reason; the notes tell of them, too.
+    cut : the record as an analysis will take it, cut where commands are missing; None if it cannot be used.
     """
 
     path: Path
@@ -78,6 +82,8 @@ class BagReport:
     notes: tuple[str, ...] = ()
     damage: tuple[str, ...] = ()
     record: Record | None = None
+    left_out: tuple[LeftOut, ...] = ()
+    cut: Cut | None = None
 
     @property
     def remarks(self) -> list[str]:
@@ -105,7 +111,15 @@ class BagReport:
             "problems": list(self.problems),
             "notes": list(self.notes),
             "damage": list(self.damage),
-        }
+            "left_out": [one.to_dict() for one in self.left_out],
+            "cut": None if self.cut is None else {
+                "gaps": [list(gap) for gap in self.cut.gaps],
+                "stretches": [
+                    {"name": one.name, "start": float(one.output.time[0]), "end": float(one.output.time[-1])}
+                    for one in self.cut.stretches
+                ],
+            },
+        }  # fmt: skip
 
     def lines(self) -> list[str]:
         """The report as plain text, without the problems."""
@@ -121,21 +135,29 @@ class BagReport:
                 f"  {topic.name:{width}}  {topic.type}  {timing.count} messages, {timing.rate:.4g} Hz, "
                 f"jitter {1e6 * timing.jitter_std:.3g} us, {timing.gaps} gaps, {timing.duplicates} duplicates{late}"
             )
-        verdict = "what could be read is flawless, but files are damaged" if self.damage else "flawless"
         for role, channel in self.channels.items():
             facts = ", ".join(channel.facts())
-            found.append(
-                f"  {role}: {channel.source}: {facts}: " + ("; ".join(channel.complaints()) or verdict)
-            )
+            found.append(f"  {role}: {channel.source}: {facts}: {self._verdict(role, channel)}")
         found += [f"  note: {note}" for note in self.notes]
         return found
+
+    def _verdict(self, role: str, channel: ChannelQuality) -> str:
+        """What deserves mention of a channel; "flawless" where nothing does, of it or of the recording."""
+        said = channel.complaints()
+        if role == "output" and self.left_out:
+            said.append(f"{sum(one.count for one in self.left_out)} samples are left out")
+        if said:
+            return "; ".join(said)
+        if self.damage:
+            return "what could be read is flawless, but files are damaged"
+        return "nothing but what the notes say" if self.notes else "flawless"
 
 
 def quality_report(source: str | Path, signals: Signals | str | Path | None = None) -> BagReport:
     """Report on a bag, or on the tables that a signals.yaml names.
 
-    What makes the recording unusable as a record is reported, not raised: InputError is left for a source that is no
-    recording at all.
+    It tells what analyses will leave out of the record and where they will cut it. What makes the recording unusable as a record is
+    reported, not raised: InputError is left for a source that is no recording at all.
     """
     source = Path(source)
     if isinstance(signals, (str, Path)):
@@ -143,7 +165,7 @@ def quality_report(source: str | Path, signals: Signals | str | Path | None = No
     channels: dict[str, ChannelQuality] = {}
     problems: list[str] = []
     notes: list[str] = []
-    duration, record = 0.0, None
+    duration, record, left_out, cut = 0.0, None, (), None
     try:
         record = read_record(source, signals)
         channels, duration = dict(record.quality.channels), record.duration
@@ -152,10 +174,18 @@ def quality_report(source: str | Path, signals: Signals | str | Path | None = No
         if not is_bag(source) or not source.exists():
             raise
         problems.append(str(error))
+    if record is not None:
+        try:
+            clean = cleaned(record)
+            left_out, cut = clean.left_out, cut_at_gaps(clean.record)
+            notes += [*clean.notes, *cut.notes]
+        except InputError as error:
+            problems.append(str(error))
     if not is_bag(source):
         return BagReport(
-            source, source.stat().st_size, duration, (), channels, notes=tuple(notes), record=record
-        )
+            source, source.stat().st_size, duration, (), channels, problems=tuple(problems), notes=tuple(notes),
+            record=record, left_out=left_out, cut=cut,
+        )  # fmt: skip
     bag = Bag(source, verify=True)
     received, stamped = _times(bag)
     lost = bag.lost({name: len(log_ns) for name, log_ns in received.items()})
@@ -172,8 +202,9 @@ def quality_report(source: str | Path, signals: Signals | str | Path | None = No
     )
     size = sum(file.stat().st_size for file in bag.files)
     return BagReport(
-        source, size, duration, topics, channels, bag.truncated, tuple(problems), tuple(notes), damage, record
-    )
+        source, size, duration, topics, channels, bag.truncated, tuple(problems), tuple(notes), damage, record,
+        left_out, cut,
+    )  # fmt: skip
 
 
 def _times(bag: Bag) -> tuple[dict[str, NDArray[np.int64]], dict[str, Columns]]:

@@ -26,10 +26,11 @@ EXACT = (
 
 @dataclass(frozen=True)
 class Cut:
-    """The stretches of a record between the gaps of its commands, and what there is to say of them."""
+    """The stretches of a record between the `gaps` of its commands, from and until [s], and what there is to say of them."""
 
     stretches: tuple[Record, ...]
     notes: tuple[str, ...]
+    gaps: tuple[tuple[float, float], ...] = ()
 
 
 def cut_at_gaps(record: Record) -> Cut:
@@ -58,12 +59,12 @@ def cut_at_gaps(record: Record) -> Cut:
     if not stretches:
         return Cut((record,), tuple(notes))  # too often to be cut: what remains is the hold
     kept = sum(one.duration for one in stretches)
-    gaps = _joined(spans)
+    gaps = tuple(_joined(spans))
     notes.append(
-        f"{record.name}: cut where commands are missing ({len(gaps)} times, {sum(b - a for a, b in gaps):.3g} s in all) into "
-        f"stretches with initial states of their own ({len(stretches)}, {kept:.4g} s)"
+        f"{record.name}: cut where commands are missing ({len(gaps)} times, the first at t = {gaps[0][0]:.6g} s, "
+        f"{sum(b - a for a, b in gaps):.3g} s in all) into stretches with initial states of their own ({len(stretches)}, {kept:.4g} s)"
     )
-    return Cut(stretches, tuple(notes))
+    return Cut(stretches, tuple(notes), gaps)
 
 
 def _bridged(channel: Channel, output: Channel, held: bool) -> tuple[Channel, int, list[tuple[float, float]]]:

@@ -1,14 +1,11 @@
 """Samples that do not say where the machine was: outliers, which a smooth signal cannot have taken, such as a bit that fell
 over or a lost echo, and repeats, where a sensor is read more often than it measures or has stood still for a while."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from rhythmid.record.quality import clipped_samples, resolution
-from rhythmid.record.record import Record
 
 WIDEST = 3  # samples in a row that may be outliers
 FAR_OFF = 12.0  # times the usual unevenness, from which a sample is suspected
@@ -80,25 +77,3 @@ def _leaps(step: Array, begin: int, end: int) -> bool:
     if begin == 0 or end + 1 >= len(step):
         return False
     return abs(step[end]) > LEAP * max(abs(step[begin - 1]), abs(step[end + 1]))
-
-
-def without_outliers(record: Record) -> tuple[Record, tuple[str, ...]]:
-    """The record without outliers and repeated samples of the output, and what there is to say of them.
-
-    An acceleration keeps its outliers: impacts do make such peaks there.
-    """
-    notes: list[str] = []
-    for find, said in (
-        (outlying_samples, "stand far off their neighbours"),
-        (repeated_samples, "repeat the one before while the motion goes on"),
-    ):
-        channel = record.output
-        bad = find(channel.value)
-        if not bad.any() or (find is outlying_samples and record.output_kind == "acceleration"):
-            continue
-        notes.append(
-            f"{record.name}: samples of the output that {said} are left out, {int(bad.sum())} of {len(bad)}, the first at "
-            f"t = {channel.time[bad][0]:.6g} s"
-        )
-        record = replace(record, output=replace(channel, time=channel.time[~bad], value=channel.value[~bad]))
-    return record, tuple(notes)

@@ -24,6 +24,7 @@ from rhythmid.identify.joints.joint_order import check_order
 from rhythmid.identify.joints.reference_delay import reference_delay
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
+from rhythmid.record.cleaning import cleaned_joints
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.simulation.transport import INPUT_DELAY
 
@@ -57,6 +58,8 @@ def diagnose_machine(
         raise InputError("no record is given; name at least one bag or table")
     known, spent = catalogue or load_catalogue(), Budget(budget)
     nominal, links = machine, {}
+    records, said = cleaned_joints(records)
+    holdout, of_holdout = cleaned_joints(holdout)
     balances = JointBalances.of(machine, records)
     check_order(balances)
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
@@ -78,6 +81,7 @@ def diagnose_machine(
     answers = {joint: _answer(one) for joint, one in found.items()}
     stated = {joint: stated_at(one) for joint, one in found.items()}
     diagnosis = compose_machine(nominal, found, answers, stated, links, refused)
+    diagnosis = replace(diagnosis, notes=(*said, *of_holdout))
     return MachineAnswer(diagnosis, _augmented(machine, found, stated), found)
 
 

@@ -24,8 +24,8 @@ from rhythmid.errors import InputError
 from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.least_squares import reduced
 from rhythmid.identify.multiple_shooting import periods_long, windows
-from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
-from rhythmid.identify.output_error import Fit, minimise
+from rhythmid.identify.noise import NoiseModel, runs
+from rhythmid.identify.output_error import Fit, coloured, minimise
 from rhythmid.identify.series import Series
 
 MISFIT = 0.1  # error, as a share of the motion, and
@@ -95,7 +95,7 @@ def noise_without(fit: Fit, changes: Sequence[Change], most: int = 60) -> NoiseM
         for r, one in zip(residuals, fit.run.series)
         for s in runs(one.used)
     ]
-    return estimate_noise(stretches, floor=fit.noise.std * 1e-6)
+    return coloured(stretches, fit.run.series, fit.noise.std * 1e-6)
 
 
 def one_round(

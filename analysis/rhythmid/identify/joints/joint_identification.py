@@ -26,6 +26,7 @@ from rhythmid.identify.joints.output_error import Knowledge, free_runs, refine
 from rhythmid.identify.joints.reference_delay import reference_delay
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
+from rhythmid.record.cleaning import cleaned_joints
 from rhythmid.record.joint_record import JointRecord
 
 CLOSE = 0.9  # correlation of two estimates, from which the records tell only a combination of them
@@ -94,6 +95,8 @@ def identify_machine(
     """
     if not records:
         raise InputError("no record is given; name at least one bag or table")
+    records, said = cleaned_joints(records)
+    holdout, of_holdout = cleaned_joints(holdout)
     seen, unseen = (records, holdout) if holdout else _split(records)
     balances = JointBalances.of(machine, seen)
     check_order(balances)
@@ -122,7 +125,7 @@ def identify_machine(
         tell("inertias of the links")
         inertia = estimate_inertia(balances, fits)
     tell("free runs")
-    runs, notes = {}, []
+    runs, notes = {}, [*said, *of_holdout]
     others = JointBalances.of(machine, unseen, balances)
     try:
         runs["given"] = free_runs(machine, others, unseen).nrmse

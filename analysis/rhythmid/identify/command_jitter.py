@@ -1,0 +1,175 @@
+"""Jitter of commands: single commands act earlier or later than their mean delay, which a machine that is lightly damped remembers.
+
+A command that is late by ε gives the machine the impulse −ε ΔF, with ΔF the step of the command. What a record shows of that has the
+colour of the machine's own response, and in a record of a few decay times that cannot be told from what is left of a fit: the fit has
+taken most of it for parameters. It can be simulated, though: runs whose commands jitter tell the colour, and the size of the
+innovations, of which there are many, the standard deviation of the jitter. That it is jitter shows in innovations that are the
+larger, the larger the steps of the command were just then, and that do not follow from the command itself as what a model lacks would.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PPoly
+
+from rhythmid.identify.free_run import FreeRun, with_series
+from rhythmid.identify.noise import NoiseModel, burg, runs
+from rhythmid.identify.output_error import Fit, minimise
+from rhythmid.identify.series import Series
+
+Array = NDArray[np.float64]
+RUNS = 16  # with simulated jitter, of all series together at least
+TRIED = 0.05  # of a sample period: standard deviation of the simulated jitter, small enough that its effect is linear
+WHITE = (
+    0.0,
+    0.05,
+    0.1,
+    0.2,
+    0.4,
+    0.8,
+)  # noise of the measurement beside the jitter's, as a share of one innovation of all that is left
+BETTER = (
+    12.5  # in log likelihood over the colour that the residuals have by themselves: five standard deviations
+)
+MOST = 0.5  # share of the innovations' power that has to grow with the command's steps
+SHOWN = 5.0  # standard deviations from which innovations grow with the command's steps
+FOLLOWED = (
+    0.5  # share of the innovations that may follow from the command: beyond it the model lacks something
+)
+LAGS = 8  # blocks of the command from which they may
+LEAST = 500  # commands and blocks of a series, below which its own half tells no colour
+SEED = 20  # of the simulated jitter, so that an answer is the same each time
+
+
+@dataclass(frozen=True)
+class CommandJitter:
+    """Jitter of commands: standard deviation `std` [s], how well that is known [s], and the noise model of what it excites beside the
+    measurement's own noise. It lies between what all innovations would take, and what those that grow with the command's steps do."""
+
+    std: float
+    uncertainty: float
+    noise: NoiseModel
+
+    @property
+    def words(self) -> str:
+        """What is said of it, in one sentence."""
+        return (
+            f"single commands act earlier or later than the input delay says, by {1e3 * self.std:.3g} ± {1e3 * self.uncertainty:.1g} ms "
+            "(standard deviation); what that excites is weighed as noise of the machine's own colour"
+        )
+
+
+def command_jitter(fit: Fit) -> CommandJitter | None:
+    """Jitter of held commands, from what the free runs of a fit leave; None where it does not show."""
+    if not all(_held(one) for one in fit.run.series):
+        return None
+    left = [r[part] for r, one in zip(fit.residuals, fit.run.series) for part in runs(one.used)]
+    whole = sum(len(r) for r in left)
+    usual = burg(left)
+    if whole == 0 or _growing_share(fit, usual) < MOST:  # before any run is simulated
+        return None
+    std = TRIED * fit.run.series[0].period
+    simulated = _simulated(fit, std)
+    if not simulated:
+        return None
+    scale = usual.std / max(burg(simulated).std, 1e-300)
+    rng = np.random.default_rng(SEED)
+    best, likelihood = None, -math.inf
+    for share in WHITE:
+        noise = burg([scale * one + share * usual.std * rng.standard_normal(len(one)) for one in simulated])
+        square = _square(noise, left)
+        value = -0.5 * whole * math.log(square) - whole * math.log(noise.std)
+        if value > likelihood:
+            best, likelihood = (noise, math.sqrt(square)), value
+    assert best is not None
+    own = -0.5 * whole * math.log(_square(fit.noise, left)) - whole * math.log(fit.noise.std)
+    noise, size = best
+    known = replace(noise, std=noise.std * size)
+    share = _growing_share(fit, known)
+    if likelihood < own + BETTER or share < MOST:
+        return None
+    most = std * scale * size
+    least = most * math.sqrt(share)
+    return CommandJitter(
+        0.5 * (most + least), math.hypot(0.5 * (most - least), most / math.sqrt(2.0 * whole)), known
+    )
+
+
+def weighed(fit: Fit, jitter: CommandJitter) -> Fit:
+    """The fit with what jitter of the commands excites as its noise."""
+    series = [replace(one, colour=jitter.noise) for one in fit.run.series]
+    run = replace(fit.run, series=tuple(series))
+    return minimise(fit.model, run, fit.names, jitter.noise, fit.starts)
+
+
+def _held(one: Series) -> bool:
+    if one.command is None or one.kind != "force" or one.ignored is not None or one.spread is not None:
+        return False
+    return one.command.c.shape[0] == 1 and len(one.command.x) > LEAST and one.blocks > LEAST
+
+
+def _simulated(fit: Fit, std: float) -> list[Array]:
+    """What jitter of this standard deviation [s] adds to the outputs, stretch by stretch, after half of each series: before, the machine
+    has not taken up as much as it lets go."""
+    rng, found = np.random.default_rng(SEED), []
+    base = _stopping(fit.run, fit.run.series).outputs(fit.model, fit.starts)
+    for _ in range(max(1, RUNS // len(fit.run.series))):
+        series = [replace(one, command=_jittered(one.command, std, rng)) for one in fit.run.series]
+        made = _stopping(fit.run, series).outputs(fit.model, fit.starts)
+        if base is None or made is None:
+            return []
+        found += [(a - b)[len(a) // 2 :] for a, b in zip(made, base)]
+    return found
+
+
+def _stopping(run: FreeRun, series: Sequence[Series]) -> FreeRun:
+    """The run over these series with steps that end at the knots of the commands: what it errs by is far below what jitter does."""
+    for index, one in enumerate(series):
+        run = with_series(run, index, one)
+    return run
+
+
+def _jittered(command: PPoly | None, std: float, rng: np.random.Generator) -> PPoly | None:
+    """A held command whose steps come earlier or later."""
+    if command is None:
+        return None
+    knots = command.x.copy()
+    knots[1:-1] += std * rng.uniform(-math.sqrt(3.0), math.sqrt(3.0), len(knots) - 2)
+    return PPoly(command.c, knots, extrapolate=command.extrapolate)
+
+
+def _square(noise: NoiseModel, left: Sequence[Array]) -> float:
+    """Mean square of the innovations of what is left."""
+    return float(np.mean(np.concatenate([noise.whiten(one) for one in left]) ** 2))
+
+
+def _growing_share(fit: Fit, noise: NoiseModel) -> float:
+    """Share of the innovations' power that grows with the squares of the command's steps; 0 where that does not show, or where they
+    follow from the command itself."""
+    innovations, squares, commands = [], [], []
+    for residual, one in zip(fit.residuals, fit.run.series):
+        assert one.command is not None
+        knots, steps = one.command.x[1:-1], np.diff(one.command.c[-1])
+        half = 0.5 * one.period * one.block
+        # what steps in a block shows in it and in the next: over both
+        ends = np.concatenate([one.centres[:1] - 3.0 * half, one.centres + half])
+        summed = np.concatenate([[0.0], np.cumsum(steps**2)])[np.searchsorted(knots, ends)]
+        square = np.diff(summed)
+        square[1:] += square[:-1].copy()
+        held = one.command(one.centres)
+        lagged = np.stack([np.roll(held, lag) for lag in range(LAGS)], axis=1)
+        for part in runs(one.used):
+            innovations.append(noise.whiten(residual[part])[LAGS:])
+            squares.append(square[part][LAGS:])
+            commands.append(lagged[part][LAGS:])
+    white, size, past = np.concatenate(innovations), np.concatenate(squares), np.concatenate(commands)
+    follows = past @ np.linalg.lstsq(past, white, rcond=1e-10)[0]
+    if float(follows @ follows) > FOLLOWED * float(white @ white):
+        return 0.0
+    growth = size / max(float(size.mean()), 1e-300) - 1.0
+    power = white**2 / max(float(np.mean(white**2)), 1e-300) - 1.0
+    slope = float(growth @ power) / max(float(growth @ growth), 1e-300)
+    return min(slope, 1.0) if slope * math.sqrt(float(growth @ growth) / 2.0) > SHOWN else 0.0

@@ -1,0 +1,52 @@
+"""Natural size of a parameter: what it would have to be to matter, from its unit and the scales of the records.
+
+Its own value is no measure of how well a parameter is known: one whose true value is 0 has a standard deviation beyond any value. A
+length is measured by the motion, a force by what drives it, a time by the motion's period, a coefficient by what makes such a force
+from such a motion: a damper of that size takes all of the force.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.elements.element import Scales
+from rhythmid.elements.first_guess import powers
+from rhythmid.identify.series import Series, scales
+from rhythmid.model import INERTIA, Model
+
+Array = NDArray[np.float64]
+
+
+def natural_size(unit: str, known: Scales) -> float | None:
+    """Size of a parameter with the unit of a translational machine; None where the unit is none of mechanics."""
+    radian = 1.0 / (2.0 * math.pi * known.frequency)
+    sizes = {
+        "N": known.effort,
+        "m": known.position,
+        "s": radian,
+        "Hz": 1.0 / radian,
+        "kg": known.mass,
+        "rad": 1.0,
+    }
+    found = dict(powers(unit))
+    if not set(found) <= set(sizes):
+        return None
+    return math.prod(sizes[name] ** power for name, power in found.items())
+
+
+def sizes_of(model: Model, names: Sequence[str], series: Sequence[Series]) -> Array:
+    """Sizes (p,) by which a change of the parameters `names` is measured: natural ones, or the values where these are larger.
+
+    A time is measured by the motion's period / 2π however long it is: that far apart two delays are two phases.
+    """
+    known = scales(series, model)
+    units = {INERTIA: "kg"} | {
+        f"{term.label}.{one.name}": one.unit for term in model.terms for one in term.element.parameters
+    }
+    found = []
+    for name in names:
+        natural, value = natural_size(units[name], known), abs(model.value(name))
+        found.append(natural if units[name] == "s" else max(value, natural or 0.0) or 1.0)
+    return np.array(found)

@@ -1,0 +1,120 @@
+"""Cleaning: a record without the samples of its output that do not say where the machine was. Every analysis begins with it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.errors import InputError
+from rhythmid.record.joint_record import JointRecord
+from rhythmid.record.outlier import outlying_samples, repeated_samples
+from rhythmid.record.quality import clipped_samples
+from rhythmid.record.record import Record
+
+Mask = NDArray[np.bool_]
+Reason = Literal["outlier", "repeated", "clipped"]
+MOSTLY = 0.5  # share of clipped samples beyond which a record is useless
+WORDS: dict[Reason, str] = {
+    "outlier": "stand far off their neighbours",
+    "repeated": "repeat the one before while the motion goes on",
+    "clipped": "are clipped{at}, or neighbours of such,",
+}
+# outliers come first: one beyond a sensor's limit would hide it
+FINDERS: tuple[tuple[Reason, Callable[[NDArray[np.float64]], Mask]], ...] = (
+    ("outlier", outlying_samples),
+    ("repeated", repeated_samples),
+    ("clipped", clipped_samples),
+)
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Samples of an output that are left out for one reason: `count` of `total`, the first at `first` [s]; where they are clipped, at
+    which `limits`, in words."""
+
+    reason: Reason
+    count: int
+    total: int
+    first: float
+    limits: str = ""
+
+    @property
+    def words(self) -> str:
+        """What is left out, in one sentence."""
+        at = f" at {self.limits}" if self.limits else ""
+        return (
+            f"samples of the output that {WORDS[self.reason].format(at=at)} are left out, {self.count} of {self.total}, "
+            f"the first at t = {self.first:.6g} s"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "channel": "output",
+            "reason": self.reason,
+            "count": self.count,
+            "total": self.total,
+            "first": self.first,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Cleaned:
+    """A record as it is analysed, and what was left out of it."""
+
+    record: Record
+    left_out: tuple[LeftOut, ...]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was left out, one line each."""
+        return tuple(f"{self.record.name}: {one.words}" for one in self.left_out)
+
+
+def cleaned(record: Record) -> Cleaned:
+    """The record without outliers, repeated and clipped samples of the output.
+
+    An acceleration keeps its outliers: impacts do make such peaks there. With clipped samples go their neighbours, which are often
+    half clipped by the sensor's own averaging. Raises InputError when most of the record is clipped.
+    """
+    total, found = len(record.output), []
+    for reason, find in FINDERS:
+        channel = record.output
+        bad = find(channel.value)
+        if not bad.any() or (reason == "outlier" and record.output_kind == "acceleration"):
+            continue
+        limits = ""
+        if reason == "clipped":
+            values = " and ".join(f"{v:.6g}" for v in np.unique(channel.value[bad]))
+            limits = f"{values} {channel.unit}".rstrip()
+            if bad.mean() > MOSTLY:
+                raise InputError(
+                    f"{record.name}: {100 * bad.mean():.0f} % of the output is clipped at {limits}; choose a wider range of the sensor"
+                )
+            bad = bad | np.append(bad[1:], False) | np.insert(bad[:-1], 0, False)
+        found.append(LeftOut(reason, int(bad.sum()), total, float(channel.time[bad][0]), limits))
+        record = replace(record, output=replace(channel, time=channel.time[~bad], value=channel.value[~bad]))
+    return Cleaned(record, tuple(found))
+
+
+def cleaned_joints(records: Sequence[JointRecord]) -> tuple[list[JointRecord], tuple[str, ...]]:
+    """The recordings of a machine, each joint's record cleaned, and what was left out, one line each."""
+    made, notes = [], []
+    for whole in records:
+        joints = {joint: cleaned(record) for joint, record in whole.joints.items()}
+        base = None if whole.base is None else cleaned(whole.base)
+        notes += [
+            f"{whole.name}, {'base' if joint is None else joint}: {one.words}"
+            for joint, found in (*joints.items(), *([] if base is None else [(None, base)]))
+            for one in found.left_out
+        ]
+        made.append(
+            replace(
+                whole,
+                joints={joint: found.record for joint, found in joints.items()},
+                base=None if base is None else base.record,
+            )
+        )
+    return made, tuple(notes)

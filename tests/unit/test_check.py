@@ -1,0 +1,119 @@
+"""`rhythmid check` tells what analyses will do with a recording: what is left out, how much and why, and where it is cut."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rhythmid.diagnose.admission import admitted
+from rhythmid.model import Model
+from rhythmid.record.bag_report import BagReport, quality_report
+from rhythmid.record.read import read_record
+
+N = 4000
+TIME = 0.005 * np.arange(N)
+U = np.sin(2.0 * np.pi * 0.35 * TIME) + 0.5 * np.sin(2.0 * np.pi * 0.83 * TIME + 1.0)
+Y = 0.1 * np.sin(2.0 * np.pi * 0.35 * TIME - 0.4) + 0.02 * np.sin(2.0 * np.pi * 0.83 * TIME)
+OUTLIERS, STUCK = [700, 1500, 3100], slice(2204, 2210)
+SIGNALS = "time: {column: t}\ninput: {column: u, unit: N, hold: linear}\noutput: {column: y, unit: m}\n"
+MASS = Model.from_text(
+    "inertia: {mass: {value: 1.0, unit: kg}}\nforce: [{viscous_damper: {damping: {value: 1.0, unit: N*s/m}}}]"
+)
+
+
+def table(folder: Path, u: np.ndarray, y: np.ndarray) -> Path:
+    """A table with its signals.yaml beside it; a NaN is an empty field."""
+    rows = (",".join("" if np.isnan(v) else f"{v:.9g}" for v in row) for row in zip(TIME, u, y))
+    (folder / "run.csv").write_text("t,u,y\n" + "\n".join(rows) + "\n")
+    (folder / "signals.yaml").write_text(SIGNALS)
+    return folder / "run.csv"
+
+
+def checked(folder: Path, u: np.ndarray = U, y: np.ndarray = Y) -> BagReport:
+    rng = np.random.default_rng(3)
+    return quality_report(table(folder, u, y + 1e-5 * rng.standard_normal(N)), folder / "signals.yaml")
+
+
+@pytest.fixture
+def spoilt() -> np.ndarray:
+    """The output with three outliers and a sensor that stood still for six samples."""
+    value = Y.copy()
+    value[OUTLIERS] += 0.05
+    return value
+
+
+def stuck(folder: Path, value: np.ndarray) -> BagReport:
+    rng = np.random.default_rng(3)
+    value = value + 1e-5 * rng.standard_normal(N)
+    value[STUCK] = value[STUCK.start - 1]
+    return quality_report(table(folder, U, value), folder / "signals.yaml")
+
+
+def test_outliers_and_stuck_samples_are_told_with_number_and_reason(tmp_path, spoilt):
+    report = stuck(tmp_path, spoilt)
+    lines = "\n".join(report.lines())
+    assert "stand far off their neighbours are left out, 3 of 4000, the first at t = 3.5 s" in lines
+    assert "repeat the one before while the motion goes on are left out, 6 of 4000" in lines
+    assert "9 samples are left out" in lines and "flawless" not in lines
+    assert [(one["reason"], one["count"], one["total"]) for one in report.to_dict()["left_out"]] == [
+        ("outlier", 3, N), ("repeated", 6, N),
+    ]  # fmt: skip
+
+
+def test_what_check_tells_is_what_a_diagnosis_does(tmp_path, spoilt):
+    report = stuck(tmp_path, spoilt)
+    given = admitted([read_record(tmp_path / "run.csv", tmp_path / "signals.yaml")], [], MASS)
+    assert set(report.notes) == set(given.notes)
+    assert report.cut is not None
+    for told, used in zip(report.cut.stretches, given.records, strict=True):
+        np.testing.assert_array_equal(told.output.time, used.output.time)
+
+
+def test_clipped_samples_are_told_to_be_left_out(tmp_path):
+    noisy = Y + 1e-5 * np.random.default_rng(3).standard_normal(N)
+    report = quality_report(table(tmp_path, U, np.minimum(noisy, 0.1)), tmp_path / "signals.yaml")
+    (left_out,) = report.left_out
+    assert left_out.reason == "clipped" and left_out.count > 100
+    assert "are clipped at 0.1 m" in "\n".join(report.lines())
+
+
+def test_where_a_recording_is_cut_is_told(tmp_path):
+    command = np.random.default_rng(1).standard_normal(N)
+    command[1000:1100] = command[3000:3040] = np.nan
+    report = checked(tmp_path, u=command)
+    assert any(
+        "cut where commands are missing (2 times, the first at t = 4.995 s" in one for one in report.notes
+    )
+    cut = report.to_dict()["cut"]
+    assert cut["gaps"] == [pytest.approx([4.995, 5.5]), pytest.approx([14.995, 15.2])]
+    starts = [one["start"] for one in cut["stretches"]]
+    assert starts == pytest.approx([0.0, 5.55, 15.25]) and cut["stretches"][0]["end"] == pytest.approx(4.995)
+
+
+def test_samples_that_are_filled_in_are_told_and_no_channel_is_flawless_beside_a_note(tmp_path):
+    command = U.copy()
+    command[2000] = np.nan
+    report = checked(tmp_path, u=command)
+    assert any("1 lost samples of the input are interpolated" in note for note in report.notes)
+    assert any(line.endswith(": nothing but what the notes say") for line in report.lines())
+    assert not any("flawless" in line for line in report.lines())
+    assert report.to_dict()["cut"]["gaps"] == [] and len(report.to_dict()["cut"]["stretches"]) == 1
+
+
+def test_a_recording_of_which_nothing_is_told_is_flawless(tmp_path):
+    report = checked(tmp_path)
+    assert sum(line.endswith(": flawless") for line in report.lines()) == 2
+    assert report.remarks == [] and report.to_dict()["left_out"] == []
+    assert report.to_dict()["cut"] == {
+        "gaps": [], "stretches": [{"name": "run", "start": 0.0, "end": pytest.approx(TIME[-1])}]
+    }  # fmt: skip
+
+
+def test_an_output_that_is_mostly_clipped_cannot_be_used(tmp_path, command):
+    noisy = Y + 1e-5 * np.random.default_rng(3).standard_normal(N)
+    table(tmp_path, U, np.clip(noisy, -0.02, 0.02))
+    answer = command("check", "run.csv", "--signals", "signals.yaml", "--json", "answer.json")
+    assert answer.code == 2 and "choose a wider range of the sensor" in answer.err
+    written = json.loads((tmp_path / "answer.json").read_text())
+    assert not written["usable"] and written["cut"] is None
