@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rhythmid.diagnose.evidence import Linearised
-from rhythmid.diagnose.hypothesis import Kind
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction, names_of, richer_of
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit
 from rhythmid.model import Model, Prior
@@ -51,6 +51,20 @@ class Fitted:
     def size(self) -> int:
         """Number of parameters."""
         return len(self.fit.names)
+
+    def claimed(self, prediction: Prediction, nrmse: float | None = None) -> Hypothesis:
+        """The hypothesis with what it predicts, and its error on held-out data as a share of the effort."""
+        model = self.fit.model
+        return Hypothesis(
+            self.elements,
+            names_of(model, self.elements),
+            self.kind,
+            self.size,
+            prediction,
+            nrmse,
+            richer=richer_of(model, self.elements),
+            values={name: model.value(name) for name in self.fit.names},
+        )
 
     def std(self) -> dict[str, float]:
         """Standard deviations of the estimated parameters, inflated by the residual's autocorrelation."""

@@ -20,7 +20,7 @@ from rhythmid.diagnose.evidence import (
     cross_validate,
     prediction,
 )
-from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, names_of, richer_of
+from rhythmid.diagnose.hypothesis import Prediction
 from rhythmid.diagnose.model_uncertainty import covariance_between
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.verdict import Decision, decide
@@ -131,16 +131,7 @@ def effort_run(
         for elements, one in predicted.items()
     }
     hypotheses = [
-        Hypothesis(
-            one.elements,
-            names_of(one.fit.model, one.elements),
-            one.kind,
-            one.size,
-            made(predicted[one.elements]),
-            errors[tuple(sorted(one.elements))] / size,
-            richer=richer_of(one.fit.model, one.elements),
-            values={name: one.fit.model.value(name) for name in one.fit.names},
-        )
+        one.claimed(made(predicted[one.elements]), errors[tuple(sorted(one.elements))] / size)
         for one in found.hypotheses
     ]
     left = remainder_of(found.balance, found.chosen)

@@ -12,7 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rhythmid.diagnose.case import Budget
-from rhythmid.diagnose.constants import MISMATCH, PRACTICAL_EFFORT, REST
+from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.effort.candidate import (
     INPUT_DELAY,
     Screened,
@@ -27,9 +27,9 @@ from rhythmid.diagnose.effort.candidate import (
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.reference import reference_of
 from rhythmid.diagnose.effort.scales import scales_of
-from rhythmid.diagnose.evidence import Blocks, Linearised, predict, weight_for
+from rhythmid.diagnose.evidence import Blocks, Linearised, predict
 from rhythmid.diagnose.hypothesis import Kind, Prediction
-from rhythmid.diagnose.rejections import decisive
+from rhythmid.diagnose.rejections import Claim, rejections_of
 from rhythmid.diagnose.selection import replaces
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
@@ -153,7 +153,7 @@ class _Search:
     tried: set[str] = field(default_factory=set)
 
     def further(self, parent: Fitted, reference: Linearised) -> Fitted | None:
-        """The best model with one effect more, or with a kin in the place of one; None where nothing is worth it."""
+        """The best model with one effect more, or with a kin in the place of one; None where the table rejects that."""
         model = parent.fit.model
         starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
         screened = screen(self.balance, parent.fit, starts)
@@ -168,8 +168,8 @@ class _Search:
         self.found.extend(new)
         if not new:
             return None
-        made = predict([f.linearised for f in (*new, parent)] + [reference], self.blocks, self.balance.record)
-        *others, before, free = made
+        fits = [one.linearised for one in (*new, parent, self.nominal)]
+        *others, before, start, free = predict([*fits, reference], self.blocks, self.balance.record)
         order = sorted(range(len(new)), key=lambda index: -others[index].score)
         best = order[0]
         whole = float(np.mean(self.nominal.fit.residual**2)) - free.mean_square
@@ -179,7 +179,11 @@ class _Search:
                 others[best], others[index], free.mean_square, whole
             ):
                 best = index
-        return new[best] if self._worth(others[best], before, free, tried) else None
+        claim = Claim(
+            new[best].claimed(others[best]), parent.claimed(before), self.nominal.claimed(start), free.mean_square, tried,
+            size_of(self.balance), PRACTICAL_EFFORT,
+        )  # fmt: skip
+        return None if rejections_of(claim) else new[best]
 
     def _promising(self, shortlist: Sequence[Screened], parent: Fitted) -> list[Screened]:
         """The additions that are worth a fit; a longer delay is where the alignment has gone further than stamps are rounded."""
@@ -188,18 +192,6 @@ class _Search:
         least = self.promising * parent.fit.correlation
         late = abs(parent.fit.alignment) > Alignment.of(self.balance).std
         return [one for one in shortlist if (late if one.start.kind == "delay" else one.gain > least)]
-
-    def _worth(self, new: Prediction, old: Prediction, free: Prediction, tried: int) -> bool:
-        """Whether a further effect is more than chance and of practical size."""
-        removed = old.mean_square - new.mean_square
-        explainable = max(old.mean_square - free.mean_square, 0.0)
-        start = float(np.mean(self.nominal.fit.residual**2))
-        return bool(
-            weight_for(new, old) > decisive(tried)
-            and removed > REST * explainable
-            and removed > MISMATCH * start
-            and removed > (PRACTICAL_EFFORT * size_of(self.balance)) ** 2
-        )
 
     def _bases(self, parent: Fitted, start: Start) -> list[Fitted]:
         """What an addition is put to: the parent, or where that holds its kin, the parent without it."""
