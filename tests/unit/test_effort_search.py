@@ -14,7 +14,7 @@ from rhythmid.diagnose.effort.held_out import HeldOut
 from rhythmid.diagnose.effort.reference import residual_with_map
 from rhythmid.diagnose.effort.remainder import remainder_of
 from rhythmid.diagnose.effort.search import EffortSearch, kin, search_effort
-from rhythmid.diagnose.rejections import RULES, Claim, Rejection, rejections_of
+from rhythmid.diagnose.rejections import RULES, SHAPES, Claim, Rejection, rejections_of
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import size_of
 
@@ -196,3 +196,18 @@ def test_friction_of_a_share_of_the_effort_that_matters_is_named_and_of_less_is_
     assert answer.verdict == ("missing_physics" if named else "consistent")
     if not named:
         assert "practical_size" in {row.name for row in answer.rejections}
+
+
+@pytest.mark.parametrize(("least", "named"), [(0.5, True), (0.9, False)])
+def test_an_actuators_effect_that_takes_more_of_the_effort_than_it_may_is_kept_and_rejected(
+    monkeypatch, least, named
+):
+    assert SHAPES["moves_the_machine"] == 0.5
+    monkeypatch.setitem(SHAPES, "moves_the_machine", least)
+    one = ("actuator_deadband",)  # which has to take a fourth of the effort for dry friction
+    only = CATALOGUE.without(*(name for name in CATALOGUE if name not in (*one, "viscous_damper")))
+    found = diagnose([axis(friction=3.0, amplitude=0.2, length=10.0)], axis_model(), catalogue=only).diagnosis
+    rejected = {row.hypothesis for row in found.rejections if row.name == "moves_the_machine"}
+    assert rejected == (set() if named else {one})
+    assert one in {hypothesis.elements for hypothesis in found.hypotheses}
+    assert (one[0] in {effect.element for effect in found.missing}) is named

@@ -41,6 +41,13 @@ PRACTICAL_EFFORT = 0.005
 # standard errors within which a simpler or related law predicts as well (A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413)
 EQUIVALENT = 2.0
 
+# of a bound, or of an effect, within which a value is taken to be there: rounding of a descent that stopped at it
+EDGE = 1e-3
+# resolved lines between an effect's frequency and a multiple of the forcing's: closer than the width of a line they are one
+OWN_LINE = 1.0
+# share of the effort that an actuator's effect leaves to move the machine: one that takes more than half explains no motion
+MOVES = 0.5
+
 # --- what a verdict needs -------------------------------------------------------------------------------------------
 # joint probability of the names that an answer stands by
 STATED = 0.8
@@ -48,8 +55,6 @@ STATED = 0.8
 EXPLAINED = 0.8
 # the same, from which the names are the main part of it
 MAINLY = 0.5
-# of a bound, or of an effect, within which a value is taken to be there: rounding of a descent that stopped at it
-EDGE = 1e-3
 # chance that the catalogue holds the truth, as a function of what the names leave of all that anything explains: half at
 # `ADEQUATE`, falling with its power `STEEPNESS` (fitted to sealed cases whose truth was in the catalogue or not: docs/proof.md)
 ADEQUATE = 0.1

@@ -38,7 +38,7 @@ WORTH = 10.0  # difference of the information criterion within which a rival is 
 
 def explanations(contest: Contest, decision: Decision) -> tuple[Explanation, ...]:
     """All hypotheses as the answer lists them, the best first."""
-    ranked = sorted(contest.hypotheses, key=lambda one: -one.prediction.score)
+    ranked = sorted((*contest.hypotheses, *contest.ruled_out), key=lambda one: -one.prediction.score)
     best = ranked[0].prediction
     found = []
     for one in ranked:

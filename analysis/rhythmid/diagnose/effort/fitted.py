@@ -1,6 +1,7 @@
 """A hypothesis about an effort, fitted, in the form that the evidence takes."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,7 +18,7 @@ class Fitted:
     """One explanation of the effort.
 
     `elements` are the labels of what was added (a freed value's name; `input_delay.delay` for a longer delay), `priors` what
-    its fit knew before the data.
+    its fit knew before the data, `shape` statistics of the effects themselves, by the name of the rule that looks at them.
     """
 
     elements: tuple[str, ...]
@@ -25,6 +26,7 @@ class Fitted:
     fit: EffortFit
     priors: dict[str, Prior]
     linearised: Linearised
+    shape: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, elements: tuple[str, ...], kind: Kind, fit: EffortFit, priors: dict[str, Prior]) -> "Fitted":
@@ -62,6 +64,7 @@ class Fitted:
             self.size,
             prediction,
             nrmse,
+            self.shape,
             richer=richer_of(model, self.elements),
             values={name: model.value(name) for name in self.fit.names},
         )

@@ -20,7 +20,7 @@ from rhythmid.diagnose.evidence import (
     cross_validate,
     prediction,
 )
-from rhythmid.diagnose.hypothesis import Prediction
+from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.model_uncertainty import covariance_between
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.verdict import Decision, decide
@@ -116,6 +116,7 @@ def effort_run(
     rows = _rows(case, found, unseen)
     size = size_of(found.balance)
     predicted = {one.elements: rows.predicted(found, one) for one in found.hypotheses}
+    ruled_out = {one.elements: rows.predicted(found, one) for one in found.ruled_out}
     mapped = {
         "the motion and the load": rows.predicted(found, found.chosen, found.beyond),
     }
@@ -128,15 +129,22 @@ def effort_run(
 
     errors = {
         tuple(sorted(elements)): float(np.sqrt(np.mean(one.error[rows.judged] ** 2)))
-        for elements, one in predicted.items()
+        for elements, one in (ruled_out | predicted).items()
     }
-    hypotheses = [
-        one.claimed(made(predicted[one.elements]), errors[tuple(sorted(one.elements))] / size)
-        for one in found.hypotheses
-    ]
+
+    def claimed(one: Fitted, errors_of: CrossValidated) -> Hypothesis:
+        return one.claimed(made(errors_of), errors[tuple(sorted(one.elements))] / size)
+
     left = remainder_of(found.balance, found.chosen)
     maps = {left.goes_with: made(mapped["the motion and the load"])}
-    contest = Contest(tuple(hypotheses), maps, places * found.candidates, size, PRACTICAL_EFFORT)
+    contest = Contest(
+        tuple(claimed(one, predicted[one.elements]) for one in found.hypotheses),
+        maps,
+        places * found.candidates,
+        size,
+        PRACTICAL_EFFORT,
+        tuple(claimed(one, ruled_out[one.elements]) for one in found.ruled_out),
+    )
     selection = select(contest)
     chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)
     noise = predicted[chosen.elements].error
