@@ -1,6 +1,5 @@
 """Diagnosis by the recorded effort: the search, its hypotheses on data that no fit has seen, and the decision."""
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +17,7 @@ from rhythmid.diagnose.evidence import (
     CrossValidated,
     Linearised,
     cross_validate,
+    detectable,
     prediction,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
@@ -147,16 +147,15 @@ def effort_run(
     )
     selection = select(contest)
     chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)
-    noise = predicted[chosen.elements].error
-    detectable = math.sqrt(4.0 * float(np.mean(noise**2)) * math.sqrt(2.0 * time / len(noise))) / size
+    least = detectable(predicted[chosen.elements].error, time) / size
     return EffortResult(
         applicability,
         found,
         rows.heldout,
         contest,
         selection,
-        decide(contest, selection, detectable),
-        detectable,
+        decide(contest, selection, least),
+        least,
         _among_models(chosen, found.balance.record, contest, selection),
         found.nominal,
         left if chosen is found.chosen else remainder_of(found.balance, chosen),
