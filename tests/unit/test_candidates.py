@@ -1,5 +1,6 @@
 """Which elements a search tries, with which first guesses, and what it says of the others."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -204,3 +205,25 @@ def test_a_generic_guess_keeps_to_the_ranges_of_the_scales(scales):
     )
     (guess,) = element.within(scales).first_guesses(scales)
     assert guess["amount"] == pytest.approx(4.0 * scales.force)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "absent", "factor", "forbidden"),
+    [
+        ((0.0, math.inf), 0.0, -1.0, True),
+        ((0.0, math.inf), 0.0, 3.0, False),
+        ((-math.inf, 0.0), 0.0, 1.0, True),
+        ((-math.inf, math.inf), 0.0, -1.0, False),
+        ((0.0, math.inf), 1.0, -1.0, False),  # a gain may be more or less than one
+        ((0.0, math.inf), math.inf, -1.0, True),  # a limit that is not there is infinitely far
+        ((0.0, math.inf), math.inf, 1.0, False),
+    ],
+)
+def test_an_effect_whose_sizes_all_lie_on_one_side_has_no_other_sign(bounds, absent, factor, forbidden):
+    element = law(Parameter("size", "N", "how much", bounds=bounds), size="size", absent=absent)
+    assert element.forbids({"size": 2.0}, factor) is forbidden
+
+
+def test_an_effect_without_a_size_has_every_sign():
+    sized = law(Parameter("size", "N", "how much", bounds=(0.0, math.inf)))
+    assert not replace(sized, size="").forbids({"size": 2.0}, -1.0)

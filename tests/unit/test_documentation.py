@@ -10,8 +10,8 @@ import pytest
 
 import rhythmid
 from rhythmid.batch.manifest import Manifest
+from rhythmid.diagnose import rejections, verdict_rules
 from rhythmid.diagnose.answer.result import ANSWER, Diagnosis
-from rhythmid.diagnose.rejections import table
 from rhythmid.experiment import Experiment
 from rhythmid.identify.drive import controlled
 from rhythmid.model import Model
@@ -85,10 +85,13 @@ def test_links_lead_to_files_that_exist(document):
         assert (ROOT / document).parent.joinpath(target).exists(), target
 
 
-def test_the_table_of_rejections_is_the_one_that_the_code_goes_by():
+@pytest.mark.parametrize(
+    ("name", "table"), [("rejections", rejections.table), ("verdicts", verdict_rules.table)]
+)
+def test_the_tables_of_rejections_and_verdicts_are_the_ones_that_the_code_goes_by(name, table):
     page = (ROOT / "docs" / "diagnose.md").read_text(encoding="utf-8")
-    found = re.search(r"<!-- rejections -->\n(.*?)\n<!-- /rejections -->", page, re.DOTALL)
-    assert found is not None and found[1] == table()
+    found = re.search(rf"<!-- {name} -->\n(.*?)\n<!-- /{name} -->", page, re.DOTALL)
+    assert found is not None and found[1] == table(), f"python -m {table.__module__}"
 
 
 def test_the_answer_that_is_shown_has_the_fields_of_a_diagnosis_and_no_others():

@@ -1,17 +1,25 @@
 """The search by the recorded effort: what it names, what it leaves alone, and what it cannot be deceived by."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from axes import CATALOGUE, arm_model, axis, axis_model, frame, frame_model
 
+from rhythmid.diagnose.constants import PRACTICAL_EFFORT
+from rhythmid.diagnose.diagnosis import diagnose
+from rhythmid.diagnose.effort import search as module
 from rhythmid.diagnose.effort.held_out import HeldOut
 from rhythmid.diagnose.effort.reference import residual_with_map
 from rhythmid.diagnose.effort.remainder import remainder_of
 from rhythmid.diagnose.effort.search import EffortSearch, kin, search_effort
+from rhythmid.diagnose.rejections import RULES, SHAPES, Claim, Rejection, rejections_of
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import size_of
+
+KEPT = ("coulomb_friction", "quadratic_drag", "cubic_stiffness")
+FEW = CATALOGUE.without(*(name for name in CATALOGUE if name not in (*KEPT, "viscous_damper")))
 
 
 @pytest.fixture(scope="module")
@@ -140,3 +148,66 @@ def test_a_free_map_predicts_held_out_records_as_it_predicts_its_own(friction):
     mapped = residual_with_map(unseen.balance, seen, found.nominal, found.reference)
     plain = unseen.residual(found.nominal)
     assert np.sqrt(np.mean(mapped**2)) < 0.5 * np.sqrt(np.mean(plain**2))
+
+
+def searched(monkeypatch: pytest.MonkeyPatch, rules: tuple) -> tuple[EffortSearch, list[Claim]]:
+    """A search for friction among three effects by these rules, and what was claimed in it."""
+    claims: list[Claim] = []
+
+    def rejecting(claim: Claim) -> list[Rejection]:
+        claims.append(claim)
+        return rejections_of(claim, rules)
+
+    monkeypatch.setattr(module, "rejections_of", rejecting)
+    return search_effort([axis(length=10.0)], axis_model(), FEW, most=2), claims
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
+def test_any_row_of_the_table_ends_the_search(monkeypatch, rule):
+    unmet = replace(rule, threshold=lambda _: math.nan)
+    found, claims = searched(monkeypatch, (unmet,))
+    assert found.chosen.elements == () and len(claims) == 1
+    assert all(len(one.elements) <= 1 for one in found.hypotheses)
+
+
+def test_a_search_that_no_row_ends_goes_on_to_the_last_place(monkeypatch):
+    found, claims = searched(monkeypatch, ())
+    assert len(found.chosen.elements) == 2 and len(claims) == 2
+
+
+def test_a_further_effect_has_to_be_better_than_what_it_is_put_to_by_the_measures_of_the_effort(monkeypatch):
+    found, (first, second) = searched(monkeypatch, ())
+    assert first.hypothesis.elements == ("coulomb_friction",) and second.without.elements == (
+        "coulomb_friction",
+    )
+    for claim in (first, second):
+        assert claim.nominal.elements == () and claim.nominal.kind == "nominal"
+        assert claim.size == size_of(found.balance) and claim.practical == PRACTICAL_EFFORT
+    assert (first.candidates, second.candidates) == (found.candidates, found.candidates - 1)
+    assert first.without.elements == () and first.without.prediction.mean_square > 2.0 * first.floor > 0.0
+
+
+@pytest.mark.parametrize(("friction", "named"), [(0.004, ()), (0.06, ("coulomb_friction",))])
+def test_friction_of_a_share_of_the_effort_that_matters_is_named_and_of_less_is_not(friction, named):
+    answer = diagnose(
+        [axis(friction=friction, noise=0.002, length=10.0)], axis_model(), catalogue=FEW
+    ).diagnosis
+    assert tuple(effect.element for effect in answer.missing) == named
+    assert answer.verdict == ("missing_physics" if named else "consistent")
+    if not named:
+        assert "practical_size" in {row.name for row in answer.rejections}
+
+
+@pytest.mark.parametrize(("least", "named"), [(0.5, True), (0.9, False)])
+def test_an_actuators_effect_that_takes_more_of_the_effort_than_it_may_is_kept_and_rejected(
+    monkeypatch, least, named
+):
+    assert SHAPES["moves_the_machine"] == 0.5
+    monkeypatch.setitem(SHAPES, "moves_the_machine", least)
+    one = ("actuator_deadband",)  # which has to take a fourth of the effort for dry friction
+    only = CATALOGUE.without(*(name for name in CATALOGUE if name not in (*one, "viscous_damper")))
+    found = diagnose([axis(friction=3.0, amplitude=0.2, length=10.0)], axis_model(), catalogue=only).diagnosis
+    rejected = {row.hypothesis for row in found.rejections if row.name == "moves_the_machine"}
+    assert rejected == (set() if named else {one})
+    assert one in {hypothesis.elements for hypothesis in found.hypotheses}
+    assert (one[0] in {effect.element for effect in found.missing}) is named

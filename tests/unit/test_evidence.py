@@ -19,6 +19,7 @@ from rhythmid.diagnose.evidence import (
     Blocks,
     Linearised,
     cross_validate,
+    detectable,
     difference,
     gain_ahead,
     predict,
@@ -365,3 +366,14 @@ def test_a_gain_that_depends_on_few_blocks_leaves_the_names_open():
 
 def test_nothing_has_no_probabilities():
     assert len(probabilities([])) == 0 and predict([], Blocks.of(rows_of([50])), rows_of([50])) == []
+
+
+def test_what_adds_four_standard_deviations_to_the_mean_square_of_noise_is_detectable():
+    rng = np.random.default_rng(0)
+    squares = [np.mean((3.0 * rng.standard_normal(500)) ** 2) for _ in range(4000)]
+    noise = 3.0 * rng.standard_normal(500)
+    noise *= 3.0 / np.sqrt(np.mean(noise**2))
+    assert detectable(noise, 1.0) ** 2 == pytest.approx(4.0 * np.std(squares), rel=0.05)
+    assert detectable(noise, 16.0) == pytest.approx(
+        2.0 * detectable(noise, 1.0)
+    )  # a 16th of the samples counts

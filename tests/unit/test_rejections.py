@@ -6,8 +6,7 @@ from dataclasses import replace
 import pytest
 from contests import SIZE, predicted, supposed
 
-from rhythmid.diagnose.rejections import RULES, Claim, decisive, rejections_of, table
-from rhythmid.diagnose.selection import SHAPE_RULES
+from rhythmid.diagnose.rejections import RULES, SHAPES, Claim, decisive, rejections_of, table
 
 NOMINAL = supposed("", predicted(1.0))
 GOOD = Claim(supposed("friction", predicted(0.01)), NOMINAL, NOMINAL, 0.01, 30, SIZE, 0.01)
@@ -34,6 +33,11 @@ def test_nothing_speaks_against_an_effect_that_explains_all():
             replace(GOOD, hypothesis=replace(GOOD.hypothesis, shape={"acts_within_records": 0.0})),
         ),
         ("own_frequency", replace(GOOD, hypothesis=replace(GOOD.hypothesis, shape={"own_frequency": 0.1}))),
+        (
+            "moves_the_machine",
+            replace(GOOD, hypothesis=replace(GOOD.hypothesis, shape={"moves_the_machine": 0.4})),
+        ),
+        ("beats_simpler", replace(GOOD, simpler=supposed("plain", predicted(0.01), free=3))),
     ],
 )
 def test_each_row_rejects_what_it_is_for(name, claim):
@@ -75,7 +79,7 @@ def test_predictions_that_agree_to_the_last_digit_gain_nothing():
 
 def test_names_of_rows_are_their_own_and_the_documentation_has_them_all():
     names = [rule.name for rule in RULES]
-    assert len(set(names)) == len(names) and set(SHAPE_RULES) <= set(names)
+    assert len(set(names)) == len(names) and set(SHAPES) <= set(names)
     lines = table().splitlines()
     assert len(lines) == 2 + len(RULES)
     for rule, line in zip(RULES, lines[2:]):

@@ -1,14 +1,18 @@
 """The verdict that a user reads: every rule through it, once where it must act and once where it must not."""
 
 from dataclasses import replace
+from typing import get_args
 
 import pytest
-from contests import BLOCKS, SIZE, contest, decided, ends, predicted, supposed, verdict
+from contests import BLOCKS, SEEN, SIZE, contest, decided, ends, predicted, supposed, verdict
 
 from rhythmid.diagnose.answer.result import FitQuality, MissingEffect
 from rhythmid.diagnose.answer.wording import freed_value, summary_of
+from rhythmid.diagnose.constants import APART
+from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.rejections import RULES
 from rhythmid.diagnose.verdict import significance
+from rhythmid.diagnose.verdict_rules import VERDICT_RULES
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.identify import paper_hopper
 
@@ -104,12 +108,89 @@ def test_an_effect_that_has_lost_its_shape_is_no_name_and_the_next_best_comes_in
     assert verdict(contest(NOMINAL, kept, friction()))[1] == ("play",)
 
 
+@pytest.mark.parametrize(("left", "expected"), [(0.0, ()), (0.45, ()), (0.55, ("friction",))])
+def test_an_actuators_effect_that_takes_most_of_the_effort_away_is_no_name(left, expected):
+    assert verdict(contest(NOMINAL, replace(friction(), shape={"moves_the_machine": left})))[1] == expected
+
+
+def test_what_the_search_has_ruled_out_is_told_and_changes_nothing_else():
+    made = contest(NOMINAL, friction(0.2), maps={"velocity": predicted(0.1)})
+    taken = supposed("gain", predicted(1e-6), shape={"moves_the_machine": 0.1})
+    beside = replace(made, ruled_out=(taken, replace(taken, elements=("friction", "gain"))))
+    (plain, decision), (found, same) = decided(made), decided(beside)
+    assert same == decision and found.chosen is plain.chosen
+    told = [(row.hypothesis, row.name) for row in found.rejections if row not in plain.rejections]
+    assert told == [(("gain",), "moves_the_machine"), (("friction", "gain"), "moves_the_machine")]
+
+
+@pytest.mark.parametrize(("gain", "expected"), [(0.5, "plain"), (200.0, "friction")])
+def test_a_law_with_more_parameters_is_named_where_it_predicts_better_and_else_told_to_lose(gain, expected):
+    simple = supposed("plain", predicted(0.1001, 700.0), free=6)
+    found, decision = decided(contest(NOMINAL, friction(score=700.0 + gain, free=9), simple))
+    assert found.chosen.elements == (expected,)
+    lost = [row for row in found.rejections if row.name == "beats_simpler"]
+    assert [row.hypothesis for row in lost] == ([("friction",)] if expected == "plain" else [])
+    assert decision.verdict == ("missing_physics" if expected == "friction" else "undecided")
+
+
+@pytest.mark.parametrize(
+    ("gain", "left", "row"),
+    [(0.5 * APART, 0.05, "beats_simpler"), (4.0 * APART, 0.19, "share_of_rest"), (4.0 * APART, 0.05, None)],
+)
+def test_a_richer_law_takes_the_place_of_one_that_it_contains_where_it_is_far_better_and_else_is_told_to_lose(
+    gain, left, row
+):
+    contained = supposed("plain", predicted(0.2, 700.0), free=6, richer={"plain": ("friction",)})
+    rich = friction(left, score=700.0 + gain, free=7)
+    found, decision = decided(contest(NOMINAL, contained, rich, maps={"velocity": predicted(0.001, 100.0)}))
+    assert found.chosen.elements == (("friction",) if row is None else ("plain",))
+    assert [one.name for one in found.rejections if one.hypothesis == ("friction",)] == [row] * (
+        row is not None
+    )
+    assert decision.named == found.chosen.elements
+
+
 def test_every_rule_of_the_table_is_one_whose_effect_on_the_verdict_is_tested():
     tested = {
         "predicts_better", "predicts_ahead", "share_of_rest", "share_of_mismatch", "practical_size", "within_bounds",
-        "acts_within_records", "own_frequency",
+        "acts_within_records", "own_frequency", "moves_the_machine", "beats_simpler",
     }  # fmt: skip
     assert {rule.name for rule in RULES} == tested
+
+
+@pytest.mark.parametrize("rule", VERDICT_RULES, ids=lambda rule: rule.name)
+def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
+    late = supposed("input_delay.delay", predicted(0.01), "delay")
+    moved = supposed("lag_of_the_sensor", predicted(0.01), "location")
+    law = supposed("free_force_of_position", predicted(0.01), "free_map")
+    mass = supposed("inertia.mass", predicted(0.01), "freed_value")
+    pair = [supposed(name, predicted(0.1, 700.0, seed=i)) for i, name in enumerate("ab")]
+    near = supposed("stribeck", predicted(0.3, 1970.0))
+    cases = {
+        "unnamed_remainder": contest(NOMINAL, maps={"velocity": predicted(0.1)}),
+        "missed": contest(supposed("", predicted((0.5 * SIZE) ** 2))),
+        "nothing_missing": contest(NOMINAL),
+        "freed_value": contest(NOMINAL, mass),
+        "longer_delay": contest(NOMINAL, late),
+        "mostly_left": contest(NOMINAL, friction(0.6), maps={"velocity": predicted(1e-4)}),
+        "one_law": contest(NOMINAL, law),
+        "other_place": contest(NOMINAL, moved),
+        "stated": contest(NOMINAL, friction()),
+        "partly_left": contest(NOMINAL, friction(0.3), maps={"velocity": predicted(1e-4)}),
+        "rivals": contest(NOMINAL, *pair),
+        "hardly_told_apart": contest(NOMINAL, friction(0.2, score=2000.0), near),
+    }
+    made = cases.get(rule.name, contest(NOMINAL))
+    _, decision = decided(made, 0.8 if rule.name == "blind" else SEEN)
+    assert decision.verdict == rule.verdict
+    beginning = rule.reason.partition("{")[0]
+    assert decision.reason.startswith(beginning) and bool(decision.reason) == bool(rule.reason)
+
+
+def test_every_verdict_has_a_row_and_names_of_rows_are_their_own():
+    names = [rule.name for rule in VERDICT_RULES]
+    assert len(set(names)) == len(names)
+    assert {rule.verdict for rule in VERDICT_RULES} == set(get_args(Verdict))
 
 
 # names that compete

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.diagnose.baseline import INPUT_DELAY
+from rhythmid.diagnose.constants import LONGEST_DELAY, SERIES
 from rhythmid.diagnose.free_map import FREE_MAPS, first_guess
 from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.diagnose.search.refit import run_trials
@@ -27,13 +27,12 @@ from rhythmid.identify.series import Series, dominant_frequency, scales
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.simulation.compiled import compile_model
 from rhythmid.simulation.generated_source import DRIVES
+from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
 SIGNALS: tuple[Slot, ...] = ("command", "actuator", "sensor")  # what a law with times acts on
 CLOCKS: tuple[Slot, ...] = ("command", "timing")  # what has a delay that may drift
 LONGER = (2.0, 5.0, 12.0, 30.0)  # samples, at which a longer delay is sought
-SERIES = 3  # laws of one quantity that are more likely a series for one law than causes of their own; two of them real springs have
-LONGEST_DELAY = 0.25  # periods of the motion: a longer one is another minimum of the same
 
 
 def alternatives(

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rhythmid.diagnose.constants import EARLIEST, FOLLOWS, LATEST, NOT_HELD, NOT_HELD_LEAST, STANDS_IN
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import split
@@ -22,13 +23,14 @@ from rhythmid.simulation.signal import band_limited, first_order_hold
 from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 
 NO_ORIGIN = "No position was measured, so that its origin is arbitrary: the spring's rest length is kept as it was given."
-EARLIEST, LATEST = (
-    1.5,
-    2.5,
-)  # samples that the input's delay may be short of none, and of which a nuisance may be
 EVEN = 1e-3  # of the period; spread of the times between samples that still counts as even
-FOLLOWS = 0.3  # error, as a share of the motion, below which a model follows the machine
-STANDS_IN = 0.7  # share to which a delay far from its start has to lower the error, or it but stands in for what is missing
+SETTLED = 0.1  # error, as a share of the motion, up to which a fit is not begun again from short windows
+FAR_DELAYS = (
+    0.03,
+    0.08,
+    0.15,
+    0.25,
+)  # [s] at which another minimum is sought: from a few samples to a slow network
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,7 @@ def calibrate(
         best = estimate(model, series, pool=pool)
     except InputError as error:
         failure = error
-    if best is None or best.nrmse() > 0.1 or not best.converged:
+    if best is None or best.nrmse() > SETTLED or not best.converged:
         try:
             again = estimate(_shooting_start(model, series, pool), series, pool=pool)
             if best is None or sum(float(r @ r) for r in again.residuals) < sum(
@@ -154,7 +156,7 @@ def _scan_delays(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | 
     names = [name for name in (INPUT_DELAY, MEASUREMENT_DELAY) if name in fit.names]
     best = fit
     for name in names:
-        for delay in (0.03, 0.08, 0.15, 0.25):
+        for delay in FAR_DELAYS:
             if delay > fit.model.parameters[name].bounds[1]:
                 continue
             model = fit.model.with_values({name: delay})
@@ -192,7 +194,7 @@ def _hold(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None, t
     if INPUT_DELAY not in fit.names or not held or fit.nrmse() > FOLLOWS:
         return kept
     delay, std, period = fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY], held[0].period
-    if not math.isfinite(std) or delay > -max(4.0 * std, 0.05 * period):
+    if not math.isfinite(std) or delay > -max(NOT_HELD * std, NOT_HELD_LEAST * period):
         return kept
     late = -delay / period
     tell(f"the held input is late by {late:.2f} sample; reconstructing it between its samples")

@@ -1,6 +1,8 @@
-"""The constants of evidence, rejections and verdict: each with its reason and its source.
+"""The constants that decide what is believed: evidence, rejections, verdict, and the choice between answers.
 
-Nothing else in this folder decides anything by a number of its own.
+Each has its reason and, where there is one, its source. Numbers that stay beside their method, in this folder and below it, do
+not decide what is believed of a hypothesis: they say how hypotheses are sought (which are fitted, from where, for how long),
+how intervals are computed, and what is shown.
 """
 
 # --- how predictions are scored -------------------------------------------------------------------------------------
@@ -41,6 +43,13 @@ PRACTICAL_EFFORT = 0.005
 # standard errors within which a simpler or related law predicts as well (A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413)
 EQUIVALENT = 2.0
 
+# of a bound, or of an effect, within which a value is taken to be there: rounding of a descent that stopped at it
+EDGE = 1e-3
+# resolved lines between an effect's frequency and a multiple of the forcing's: closer than the width of a line they are one
+OWN_LINE = 1.0
+# share of the effort that an actuator's effect leaves to move the machine: one that takes more than half explains no motion
+MOVES = 0.5
+
 # --- what a verdict needs -------------------------------------------------------------------------------------------
 # joint probability of the names that an answer stands by
 STATED = 0.8
@@ -48,8 +57,6 @@ STATED = 0.8
 EXPLAINED = 0.8
 # the same, from which the names are the main part of it
 MAINLY = 0.5
-# of a bound, or of an effect, within which a value is taken to be there: rounding of a descent that stopped at it
-EDGE = 1e-3
 # chance that the catalogue holds the truth, as a function of what the names leave of all that anything explains: half at
 # `ADEQUATE`, falling with its power `STEEPNESS` (fitted to sealed cases whose truth was in the catalogue or not: docs/proof.md)
 ADEQUATE = 0.1
@@ -63,5 +70,43 @@ APART = ALIKE * (STATED / (1.0 - STATED)) ** (1.0 / SHARPNESS)
 # effect that the records would not show, as a share of what was measured, from which they decide nothing: as large as what
 # the refitted model of a machine may leave and still be called identified
 BLIND = 0.2
+# standard deviations of the mean square of noise, above which an effect would show in it: by chance once in 30 000 records
+SHOWS = 4.0
+
+# --- how records are scored -----------------------------------------------------------------------------------------
 # of the effort, up to which models of real machines leave it and no other way to score is tried (measured: 2 to 5 %, see `PRACTICAL`)
 LEFT = 0.05
+# effort, as a share of the inertial force, from which it is scored before windows are: it moves the machine against other forces.
+# Where it is smaller the machine swings by itself, and the effort shows little of what else acts
+DRIVES_IT = 1.0
+# error, as a share of the motion, below which a model follows the machine: a run that is lost altogether is wrong by 1 or more,
+# and the effects of the proof at full size leave less than this
+FOLLOWS = 0.3
+# error of a free run, the same share, along which a score says nothing: hardly less than that of no motion at all
+HOPELESS = 0.8
+# share to which a step to shorter windows has to lower the error, and steps without such a gain before no more are tried: windows
+# half as long have twice as many free starts, which lower it by less
+BETTER_STEP, PATIENCE = 0.9, 2
+# share to which all steps together have to: an error that adds up, not one made at once by noise or an effect
+BETTER_TOGETHER = 0.6
+
+# --- what calibration may take up -----------------------------------------------------------------------------------
+# samples by which the input's delay may come out short of none, as one that is reconstructed otherwise than by holding does (by
+# half of one), and up to which it is a nuisance that every log may have; a longer delay is a hypothesis of its own
+EARLIEST, LATEST = 1.5, 2.5
+# share to which a delay far from its start has to lower the error, or it but stands in for what is missing
+STANDS_IN = 0.7
+# standard deviations, and a share of a sample, by which a delay has to come out negative for the input not to have been held
+NOT_HELD, NOT_HELD_LEAST = 4.0, 0.05
+# standard deviations, and a share of the value, by which the records have to differ from a nominal value to contradict it
+CONTRADICTS, CONTRADICTS_LEAST = 4.0, 0.02
+
+# --- which other explanations compete -------------------------------------------------------------------------------
+# laws of one quantity that are more likely a series for one law than causes of their own; two of them real springs have
+SERIES = 3
+# periods of the motion that a delay of the input may be: half a turn looks like another sign, so that a longer one is another
+# minimum of the same
+LONGEST_DELAY = 0.25
+# times the ranges of the motion within which an effect has to be curved: no part of the motion exceeds them, nor what a limit
+# has cut off; and those where every kink shows
+REACH, FAR_RANGES = 1.2, 1e3

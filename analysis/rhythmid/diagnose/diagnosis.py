@@ -18,7 +18,7 @@ from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.baseline import causal, check_free
 from rhythmid.diagnose.case import Budget, Case
-from rhythmid.diagnose.constants import LEFT
+from rhythmid.diagnose.constants import DRIVES_IT, LEFT
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST_EFFECTS
 from rhythmid.diagnose.free_map import without_free_maps
@@ -221,7 +221,7 @@ def _answers(case: Case, effort: Applicability, notes: Sequence[str]) -> Iterato
     """
     warned = check_plausible(case.nominal, case.records, case.pool)
     notes = notes if warned is None else (*notes, warned)
-    driven = effort.applies and effort.effort_share >= 1.0
+    driven = effort.applies and effort.effort_share >= DRIVES_IT
     if effort.applies and not effort.free_run_means_something:
         answer = _by_effort(case, effort, notes)
         yield answer

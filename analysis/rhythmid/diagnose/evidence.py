@@ -26,6 +26,7 @@ from rhythmid.diagnose.constants import (
     FOLDS,
     REWEIGHTED,
     ROWS_OF_A_BLOCK,
+    SHOWS,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.varying_scale import block_densities
@@ -219,6 +220,12 @@ def chance_better(first: Prediction, second: Prediction, least: float) -> float:
     gain = first.log_density - second.log_density
     found = len(gain) * _resampled(len(gain)) @ gain - least
     return float(np.mean(expit(found)))
+
+
+def detectable(error: Array, time: float) -> float:
+    """The smallest rms that would show among errors (n,) of this autocorrelation time, in their unit: what adds `SHOWS` standard
+    deviations of their mean square to it."""
+    return math.sqrt(SHOWS * float(np.mean(error**2)) * math.sqrt(2.0 * time / max(len(error), 1)))
 
 
 def gain_ahead(first: Prediction, second: Prediction) -> float:

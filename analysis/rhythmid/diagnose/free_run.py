@@ -1,6 +1,5 @@
 """Diagnosis in free run or in windows: the search, its contenders and their evidence, and the fit that an answer is made from."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -21,7 +20,7 @@ from rhythmid.diagnose.contenders import (
     rows_of,
 )
 from rhythmid.diagnose.discrepancy import mean_product
-from rhythmid.diagnose.evidence import prediction
+from rhythmid.diagnose.evidence import detectable, prediction
 from rhythmid.diagnose.fine_steps import finely_stepped
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
 from rhythmid.diagnose.intervals import profiled
@@ -109,8 +108,8 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         selection = select(contest)
         trial = _trial_of(selection.chosen, contenders)
     found = _with_best(found, trial, case)
-    detectable = _detectable(contenders, selection.chosen, rows)
-    decision = decide(contest, selection, detectable)
+    least = _detectable(contenders, selection.chosen, rows)
+    decision = decide(contest, selection, least)
     if trial.added and selection.chosen.kind == "effects":
         found = ticks_followed(profiled(finely_stepped(found, case.pool), case.pool), case.pool)
     between = covariance_between(found.fit.names, selection.chosen, contest.hypotheses)
@@ -131,7 +130,7 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         contest,
         selection,
         decision,
-        detectable,
+        least,
     )
 
 
@@ -211,12 +210,9 @@ def _maps(found: Sequence[Dependence], contenders: Sequence[Contender], rows: Ro
 
 
 def _detectable(contenders: Sequence[Contender], chosen: Hypothesis, rows: Rows) -> float:
-    """The smallest rms that would show in these records, as a share of what errors are a share of: four standard deviations
-    of the mean square of the noise."""
+    """The smallest rms that would show in these records, as a share of what errors are a share of."""
     error = next(one.error for one in contenders if tuple(sorted(one.trial.added)) == chosen.key)
-    time = autocorrelation_time(error, rows.record)
-    square = float(np.mean(error**2)) * math.sqrt(2.0 * time / max(len(error), 1))
-    return math.sqrt(4.0 * square) / max(rows.size, 1e-300)
+    return detectable(error, autocorrelation_time(error, rows.record)) / max(rows.size, 1e-300)
 
 
 def _rerun(fit: Fit, unseen: Sequence[Series], found: Search) -> Fit | None:

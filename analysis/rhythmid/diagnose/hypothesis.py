@@ -84,3 +84,9 @@ def richer_of(model: Model, elements: Sequence[str]) -> dict[str, tuple[str, ...
     """By name, the laws that contain the effects with these labels as special cases."""
     terms = [model.term(label) for label in elements]
     return {term.element.name: term.element.special_case_of for term in terms if term is not None}
+
+
+def special_case(first: Hypothesis, second: Hypothesis) -> bool:
+    """Whether the first is the second but for one effect, of which its own is a special case."""
+    mine, other = set(first.names) - set(second.names), set(second.names) - set(first.names)
+    return len(mine) == len(other) == 1 and other <= set(first.richer.get(next(iter(mine)), ()))

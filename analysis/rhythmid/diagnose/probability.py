@@ -15,13 +15,14 @@ import numpy as np
 from rhythmid.diagnose.constants import ADEQUATE, ALIKE, SHARPNESS, STEEPNESS
 from rhythmid.diagnose.evidence import probabilities
 from rhythmid.diagnose.hypothesis import Hypothesis
+from rhythmid.diagnose.rejections import keeps_shape
 from rhythmid.diagnose.selection import Contest, Selection, equivalent
 
 
 def weights_of(contest: Contest, selection: Selection) -> dict[tuple[str, ...], float]:
     """Weight of each hypothesis, by its key, among those with no more effects than the chosen one."""
     most = len(selection.chosen.elements)
-    rivals = [one for one in contest.hypotheses if len(one.elements) <= most and selection.sound(one)]
+    rivals = [one for one in contest.hypotheses if len(one.elements) <= most and keeps_shape(one.shape)]
     return {one.key: float(weight) for one, weight in zip(rivals, probabilities(rivals))}
 
 
@@ -55,7 +56,7 @@ def margin_over_others(label: str, contest: Contest, selection: Selection) -> fl
         if len(one.elements) <= len(chosen.elements)
         and not accepted & set(one.names)
         and not any(name in richer for richer in one.richer.values())
-        and (selection.sound(one) or not one.elements)
+        and keeps_shape(one.shape)
         and not equivalent(one, chosen, contest)
     ]
     own = [

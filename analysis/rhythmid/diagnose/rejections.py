@@ -5,12 +5,22 @@ told. `python -m rhythmid.diagnose.rejections` prints the table as Markdown.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from rhythmid.diagnose.constants import EDGE, EQUIVALENT, FALSE_ALARM, MISMATCH, REST
+from rhythmid.diagnose.constants import (
+    APART,
+    EDGE,
+    EQUIVALENT,
+    FALSE_ALARM,
+    MAINLY,
+    MISMATCH,
+    MOVES,
+    OWN_LINE,
+    REST,
+)
 from rhythmid.diagnose.evidence import gain_ahead, weight_for
-from rhythmid.diagnose.hypothesis import Hypothesis
+from rhythmid.diagnose.hypothesis import Hypothesis, special_case
 
 
 @dataclass(frozen=True)
@@ -27,6 +37,7 @@ class Claim:
     candidates : number of effects that were looked at for this place.
     size : rms of what errors are a share of.
     practical : share of `size` below which an effect is of no practical matter.
+    simpler : a simpler hypothesis with as many effects, or one that this one contains, whose place it would take.
     """
 
     hypothesis: Hypothesis
@@ -36,6 +47,7 @@ class Claim:
     candidates: int
     size: float
     practical: float
+    simpler: Hypothesis | None = None
 
     @property
     def removed(self) -> float:
@@ -86,8 +98,49 @@ def _size(claim: Claim) -> float:
     return math.sqrt(max(claim.removed, 0.0)) / max(claim.size, 1e-300)
 
 
-def _of_shape(name: str) -> Callable[[Claim], float]:
-    return lambda claim: claim.hypothesis.shape.get(name, math.inf)
+def _over_simpler(claim: Claim) -> float:
+    if claim.simpler is None:
+        return math.inf
+    return weight_for(claim.hypothesis.prediction, claim.simpler.prediction)
+
+
+def _needed_over_simpler(claim: Claim) -> float:
+    if claim.simpler is None or not special_case(claim.simpler, claim.hypothesis):
+        return decisive(1)
+    return decisive(1) if _stands_for_nothing(claim, claim.simpler) else APART
+
+
+def _stands_for_nothing(claim: Claim, simpler: Hypothesis) -> bool:
+    """Whether a simpler law leaves most of the mismatch, most of which the richer one removes: it is no name for what is missing,
+    though the two may be hard to tell apart."""
+    left = simpler.prediction.mean_square - claim.floor
+    removed = simpler.prediction.mean_square - claim.hypothesis.prediction.mean_square
+    whole = claim.nominal.prediction.mean_square - claim.floor
+    return left > MAINLY * whole and removed >= MAINLY * left
+
+
+# least statistics of the fitted effects themselves: a hypothesis that falls short of one is no rival of any other
+SHAPES: Mapping[str, float] = {
+    "within_bounds": EDGE,
+    "acts_within_records": EDGE,
+    "own_frequency": OWN_LINE,
+    "moves_the_machine": MOVES,
+}
+
+
+def keeps_shape(shape: Mapping[str, float]) -> bool:
+    """Whether effects with these statistics still are what their names say."""
+    return all(shape.get(name, math.inf) >= least for name, least in SHAPES.items())
+
+
+def _shape_rule(name: str, says: str, reason: str) -> Rule:
+    return Rule(
+        name,
+        says,
+        reason,
+        lambda claim: claim.hypothesis.shape.get(name, math.inf),
+        lambda _: SHAPES[name],
+    )
 
 
 RULES: tuple[Rule, ...] = (
@@ -127,25 +180,32 @@ RULES: tuple[Rule, ...] = (
         lambda claim: claim.practical,
     ),
     Rule(
+        "beats_simpler",
+        "log odds against an explanation with as many effects that has fewer parameters, or that is a special case of it; no block "
+        "of data brings more than 20 to 1",
+        "a simpler explanation predicts as well",
+        _over_simpler,
+        _needed_over_simpler,
+    ),
+    _shape_rule(
         "within_bounds",
         "distance of the effect's parameters from the bounds of what its name means, as a share of the bound",
         "only a limit of its parameters is identifiable, where it is another effect",
-        _of_shape("within_bounds"),
-        lambda _: EDGE,
     ),
-    Rule(
+    _shape_rule(
         "acts_within_records",
         "whether the effect is curved where the motion has been (infinite), or only beyond (0)",
         "it would act only outside the range of the recorded motion",
-        _of_shape("acts_within_records"),
-        lambda _: EDGE,
     ),
-    Rule(
+    _shape_rule(
         "own_frequency",
         "distance of the effect's frequency from a multiple of the forcing's, in resolved lines",
         "at a multiple of the forcing's frequency it is indistinguishable from a change in the forcing's path",
-        _of_shape("own_frequency"),
-        lambda _: 1.0,
+    ),
+    _shape_rule(
+        "moves_the_machine",
+        "share of the effort that an actuator's effect leaves to move the machine",
+        "an actuator's effect that takes most of the effort away explains no motion",
     ),
 )
 
@@ -158,6 +218,19 @@ def rejections_of(claim: Claim, rules: Sequence[Rule] = RULES) -> list[Rejection
         if not statistic >= threshold:
             found.append(Rejection(claim.hypothesis.elements, rule.name, statistic, threshold, rule.reason))
     return found
+
+
+# rows that a hypothesis has to pass to take the place of a simpler one, and of one that it contains
+OVER_SIMPLER = tuple(rule for rule in RULES if rule.name == "beats_simpler")
+OVER_CONTAINED = tuple(
+    rule for rule in RULES if rule.name in ("beats_simpler", "share_of_rest", "share_of_mismatch")
+)
+
+
+def replaces(claim: Claim) -> bool:
+    """Whether a richer law is named in the place of one that it contains, `claim.without` and `claim.simpler`: it is told apart by
+    far, and removes more than a small share of what the other leaves above the floor and of the whole mismatch."""
+    return not rejections_of(claim, OVER_CONTAINED)
 
 
 def table() -> str:

@@ -29,8 +29,9 @@ def ledger(contest: Contest, detectable: float) -> dict[str, Any]:
                 "richer": {name: list(others) for name, others in one.richer.items()},
                 **_written(one.prediction),
             }
-            for one in contest.hypotheses
+            for one in (*contest.hypotheses, *contest.ruled_out)
         ],
+        "ruled_out": len(contest.ruled_out),
         "maps": {quantity: _written(one) for quantity, one in contest.maps.items()},
         "candidates": contest.candidates,
         "size": contest.size,
@@ -55,24 +56,27 @@ def _read(data: dict[str, Any]) -> Prediction:
 
 def contest_of(data: dict[str, Any]) -> Contest:
     """The contest that a ledger describes."""
+    hypotheses = tuple(
+        Hypothesis(
+            tuple(one["elements"]),
+            tuple(one["names"]),
+            one["kind"],
+            one["free"],
+            _read(one),
+            one["heldout_nrmse"],
+            one["shape"],
+            {name: tuple(others) for name, others in one["richer"].items()},
+        )
+        for one in data["hypotheses"]
+    )
+    competing = len(hypotheses) - data.get("ruled_out", 0)
     return Contest(
-        tuple(
-            Hypothesis(
-                tuple(one["elements"]),
-                tuple(one["names"]),
-                one["kind"],
-                one["free"],
-                _read(one),
-                one["heldout_nrmse"],
-                one["shape"],
-                {name: tuple(others) for name, others in one["richer"].items()},
-            )
-            for one in data["hypotheses"]
-        ),
+        hypotheses[:competing],
         {quantity: _read(one) for quantity, one in data["maps"].items()},
         data["candidates"],
         data["size"],
         data["practical"],
+        hypotheses[competing:],
     )
 
 

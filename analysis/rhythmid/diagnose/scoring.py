@@ -12,7 +12,8 @@ from functools import partial
 
 import numpy as np
 
-from rhythmid.diagnose.baseline import FOLLOWS, Calibration, calibrate, reconstructed
+from rhythmid.diagnose.baseline import Calibration, calibrate, reconstructed
+from rhythmid.diagnose.constants import BETTER_STEP, BETTER_TOGETHER, FOLLOWS, HOPELESS, PATIENCE
 from rhythmid.diagnose.hypothesis import ScoringKind
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
@@ -23,10 +24,6 @@ from rhythmid.identify.series import Series, hold_out_tail
 from rhythmid.model import Model
 from rhythmid.progress import Tell
 
-BETTER_STEP = 0.9  # share to which a step to shorter windows has to lower the error
-PATIENCE = 2  # steps without such a gain before no more are tried
-BETTER_TOGETHER = 0.6  # share to which all steps together have to: an error that adds up, not one made at once by noise or effect
-HOPELESS = 0.8  # error, as a share of the motion, of a free run along which a score says nothing
 SHORTER = 2.0  # factor from one length of windows to the next
 INTEGRATES = (
     "the model integrates or is unstable, so that a long free run would add up every small disturbance"

@@ -8,12 +8,18 @@ where no row of the table of rejections speaks against the best of them.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rhythmid.diagnose.constants import APART, MAINLY, MISMATCH, REST
 from rhythmid.diagnose.evidence import weight_for
-from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
-from rhythmid.diagnose.rejections import Claim, Rejection, decisive, rejections_of
-
-SHAPE_RULES = ("within_bounds", "acts_within_records", "own_frequency")
+from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, special_case
+from rhythmid.diagnose.rejections import (
+    OVER_CONTAINED,
+    OVER_SIMPLER,
+    Claim,
+    Rejection,
+    decisive,
+    keeps_shape,
+    rejections_of,
+    replaces,
+)
 
 
 @dataclass(frozen=True)
@@ -27,6 +33,8 @@ class Contest:
     candidates : number of effects that were looked at for each place.
     size : rms of what errors are a share of.
     practical : share of it below which an effect is of no practical matter.
+    ruled_out : hypotheses that the search has set aside because of their shape. They are rejected like others, and what they
+        predict is no measure for anything.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -34,6 +42,7 @@ class Contest:
     candidates: int
     size: float
     practical: float
+    ruled_out: tuple[Hypothesis, ...] = ()
 
     @property
     def nominal(self) -> Hypothesis:
@@ -48,10 +57,10 @@ class Contest:
 
     def of_size(self, count: int) -> list[Hypothesis]:
         """Hypotheses with so many effects, the one that predicts best first."""
-        found = [one for one in self.hypotheses if len(one.elements) == count]
+        found = [one for one in (*self.hypotheses, *self.ruled_out) if len(one.elements) == count]
         return sorted(found, key=lambda one: (-one.prediction.score, one.key))
 
-    def claim(self, hypothesis: Hypothesis, without: Hypothesis) -> Claim:
+    def claim(self, hypothesis: Hypothesis, without: Hypothesis, simpler: Hypothesis | None = None) -> Claim:
         """A hypothesis and what it has to be better than."""
         return Claim(
             hypothesis,
@@ -61,6 +70,7 @@ class Contest:
             self.candidates,
             self.size,
             self.practical,
+            simpler,
         )
 
 
@@ -73,12 +83,6 @@ class Selection:
     grown: tuple[Hypothesis, ...]
     rejections: tuple[Rejection, ...]
 
-    def sound(self, hypothesis: Hypothesis) -> bool:
-        """Whether a hypothesis' effects have kept their shape, so that it is a rival at all."""
-        return not any(
-            row.hypothesis == hypothesis.elements and row.name in SHAPE_RULES for row in self.rejections
-        )
-
 
 def select(contest: Contest) -> Selection:
     """Grant effects their places. Hypotheses whose effects have lost their shape take no part.
@@ -88,13 +92,12 @@ def select(contest: Contest) -> Selection:
     """
     told: list[Rejection] = []
     grown, smaller = [contest.nominal], contest.nominal
-    most = max(len(one.elements) for one in contest.hypotheses)
+    most = max(len(one.elements) for one in (*contest.hypotheses, *contest.ruled_out))
     for count in range(1, most + 1):
         sound: list[Hypothesis] = []
         for one in contest.of_size(count):
-            against = rejections_of(contest.claim(one, smaller))
-            told += against
-            if not any(row.name in SHAPE_RULES for row in against):
+            told += rejections_of(contest.claim(one, smaller))
+            if keeps_shape(one.shape):
                 sound.append(one)
         if not sound:
             continue
@@ -104,6 +107,7 @@ def select(contest: Contest) -> Selection:
         if granted:
             smaller = _simplest(granted)
             grown.append(smaller)
+            told += _beaten(smaller, granted, contest)
         else:
             # rounding decides nothing
             smaller = max(smaller, sound[0], key=lambda one: round(one.prediction.score, 6))
@@ -116,32 +120,25 @@ def _simplest(close: Sequence[Hypothesis]) -> Hypothesis:
     return min(plain or close, key=lambda one: (one.free, -_basic(one), -one.prediction.score, one.key))
 
 
+def _beaten(chosen: Hypothesis, granted: Sequence[Hypothesis], contest: Contest) -> list[Rejection]:
+    """What is said against hypotheses in whose place a simpler one is chosen, which predicts about as well."""
+    found: list[Rejection] = []
+    for one in granted:
+        if special_case(chosen, one):
+            found += rejections_of(contest.claim(one, chosen, chosen), OVER_CONTAINED)
+        elif chosen.free < one.free:
+            found += rejections_of(contest.claim(one, chosen, chosen), OVER_SIMPLER)
+    return found
+
+
 def _basic(one: Hypothesis) -> int:
     """How many richer laws contain the hypothesis' effects: the more, the more basic they are."""
     return sum(len(richer) for richer in one.richer.values())
-
-
-def special_case(first: Hypothesis, second: Hypothesis) -> bool:
-    """Whether the first is the second but for one effect, of which its own is a special case."""
-    mine, other = set(first.names) - set(second.names), set(second.names) - set(first.names)
-    return len(mine) == len(other) == 1 and other <= set(first.richer.get(next(iter(mine)), ()))
 
 
 def equivalent(other: Hypothesis, best: Hypothesis, contest: Contest) -> bool:
     """Whether another hypothesis predicts as well as the better one: the data do not decide, or the better one is a richer law that
     does not replace it."""
     if special_case(other, best):
-        whole = contest.nominal.prediction.mean_square - contest.floor
-        return not replaces(best.prediction, other.prediction, contest.floor, whole)
+        return not replaces(contest.claim(best, other, other))
     return weight_for(best.prediction, other.prediction) <= decisive(1)
-
-
-def replaces(richer: Prediction, plain: Prediction, floor: float, whole: float) -> bool:
-    """Whether a richer law is named in the place of one that it contains: it is told apart by far, and removes more than a small
-    share of what the other leaves above the `floor` and of the `whole` mismatch, both mean squared errors. Or it is told apart, and
-    the simpler one leaves most of the mismatch, which the richer one removes."""
-    removed, left = plain.mean_square - richer.mean_square, plain.mean_square - floor
-    weight = weight_for(richer, plain)
-    if weight > APART:
-        return removed >= max(REST * left, MISMATCH * whole)
-    return weight > decisive(1) and left > MAINLY * whole and removed >= MAINLY * left

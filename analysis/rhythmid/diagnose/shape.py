@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.diagnose.constants import FAR_RANGES, REACH
 from rhythmid.diagnose.search.score_tests import Trajectories
 from rhythmid.diagnose.static_law import SAME, curved
 from rhythmid.elements.element import Element, Scales
@@ -20,8 +21,6 @@ from rhythmid.simulation.effect import Path, effect_along
 
 Array = NDArray[np.float64]
 INSTANTS = 400  # instants at which an effect is tried
-REACH = 1.2  # times the ranges of the motion, which no part of it exceeds, nor of what a limit has cut off
-FAR_RANGES = 1e3  # times these ranges, where every kink shows
 DAMPING = "damping_ratio"  # of a resonance: it is as wide as this share of its frequency
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from scipy.stats import t as student
 
-from rhythmid.diagnose.constants import BLIND, EQUIVALENT, EXPLAINED, FALSE_ALARM, MAINLY, STATED
+from rhythmid.diagnose.constants import EQUIVALENT, FALSE_ALARM, STATED
 from rhythmid.diagnose.evidence import chance_better, difference, gain_ahead
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, Verdict
 from rhythmid.diagnose.probability import (
@@ -16,8 +16,9 @@ from rhythmid.diagnose.probability import (
     told_apart,
     weights_of,
 )
-from rhythmid.diagnose.rejections import decisive
+from rhythmid.diagnose.rejections import decisive, keeps_shape
 from rhythmid.diagnose.selection import Contest, Selection, equivalent
+from rhythmid.diagnose.verdict_rules import Outcome, rule_for
 from rhythmid.simulation.transport import INPUT_DELAY
 
 
@@ -140,7 +141,7 @@ def _groups(contest: Contest, selection: Selection) -> tuple[tuple[str, ...], ..
             and len(one.elements) == len(chosen.elements)
             and rest < set(one.elements)
             and one.key != chosen.key
-            and selection.sound(one)
+            and keeps_shape(one.shape)
             and equivalent(one, chosen, contest)
         ]
         if others:
@@ -161,7 +162,6 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
         labels = tuple(label for label in labels if label != chosen.elements[-1])
     if chosen.kind == "delay" and len(labels) > 1:  # a delay beside effects is told with the delays
         labels = tuple(label for label in labels if label != INPUT_DELAY)
-    explained = 1.0 - left.share
     sure = {
         label: adequacy(_own_share(shares[label], left.expected))
         * told_apart(margin_over_others(label, contest, selection))
@@ -174,62 +174,34 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
 
     each = {label: probability([label]) for label in labels}
     stated = _stated(labels, probability)
-    joint = probability(stated or labels)
     groups = _groups(contest, selection)
-
-    def answer(verdict: Verdict, reason: str, named: tuple[str, ...] = labels) -> Decision:
-        beside = tuple(names[label] for label in labels if label not in named)
-        return Decision(verdict, reason, named, shares, each, joint, weights, groups, left, explained, beside)
-
-    if not chosen.elements:
-        explainable = left.share * (contest.nominal.prediction.mean_square - contest.floor)
-        if left.significant and explainable > (contest.practical * contest.size) ** 2:
-            return answer(
-                "unknown_physics",
-                f"no effect of the catalogue explains the mismatch: it goes with {left.goes_with}",
-            )
-        missed = math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300)
-        if missed > BLIND:
-            return answer(
-                "undecided",
-                f"the refitted nominal model misses {100.0 * missed:.0f} % of what was measured, and nothing that was tried explains it",
-            )
-        if detectable > BLIND:
-            return answer(
-                "undecided",
-                f"these records would not show an effect below {100.0 * detectable:.0f} % of what was measured",
-            )
-        return answer("consistent", "")
-    if chosen.kind == "freed_value":
-        return answer(
-            "undecided", "a value that the nominal model holds fixed explains the records when it is free"
-        )
-    if chosen.kind == "delay" and (not stated or stated == (INPUT_DELAY,)):
-        return answer("undecided", "a longer delay of the input than was given explains the records")
-    if explained < MAINLY:
-        return answer(
-            "unknown_physics",
-            f"the named effects leave {100.0 * left.share:.0f} % of the mismatch, which goes with {left.goes_with}",
-        )
-    if chosen.kind == "free_map":
-        return answer("unknown_physics", "a free map explains the records as well as several names together")
-    if chosen.kind == "location":
-        return answer(
-            "undecided",
-            "the effect explains the records best in a slot for which the catalogue has no such element",
-        )
-    if stated:
-        return answer("missing_physics", "", stated)
-    if explained < EXPLAINED:
-        return answer(
-            "unknown_physics",
-            f"this effect is mainly what is missing, but {100.0 * left.share:.0f} % of the mismatch goes with {left.goes_with}",
-        )
-    if groups or joint_probability([names[label] for label in labels], contest, chosen, weights) < STATED:
-        return answer("undecided", "the evidence does not separate several explanations")
-    return answer(
-        "undecided",
-        "the records hardly tell this law from others, so it may stand for one that the catalogue lacks",
+    explainable = left.share * (contest.nominal.prediction.mean_square - contest.floor)
+    found = Outcome(
+        chosen.kind if chosen.elements else "nominal",
+        len(stated),
+        chosen.kind == "delay" and (not stated or stated == (INPUT_DELAY,)),
+        left.share,
+        left.goes_with,
+        math.sqrt(explainable) / max(contest.practical * contest.size, 1e-300) if left.significant else 0.0,
+        math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300),
+        detectable,
+        joint_probability([names[label] for label in labels], contest, chosen, weights),
+        bool(groups),
+    )
+    rule = rule_for(found)
+    named = stated if rule.verdict == "missing_physics" else labels
+    return Decision(
+        rule.verdict,
+        rule.reason_of(found),
+        named,
+        shares,
+        each,
+        probability(stated or labels),
+        weights,
+        groups,
+        left,
+        1.0 - left.share,
+        tuple(names[label] for label in labels if label not in named),
     )
 
 

@@ -27,7 +27,7 @@ A file in `elements/<slot>/` defines one `ELEMENT`. Exactly one of these says wh
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from math import inf, pi
+from math import inf, isinf, pi
 from typing import Any, Literal
 
 import numpy as np
@@ -242,6 +242,17 @@ class Element:
             if parameter.name == name:
                 return parameter
         raise KeyError(name)
+
+    def forbids(self, values: Mapping[str, float], factor: float) -> bool:
+        """Whether `factor` times the effect with these values has a sign that physics forbids: it would lie beyond a bound on the
+        other side of which all sizes are."""
+        if not self.size:
+            return False
+        if isinf(self.absent):
+            return factor < 0.0
+        low, high = self.parameter(self.size).bounds
+        size = self.absent + factor * (values[self.size] - self.absent)
+        return (size < low and low >= self.absent) or (size > high and high <= self.absent)
 
     def within(self, scales: Scales) -> "Element":
         """The element with its parameters' bounds, and its first guesses, narrowed to its `ranges` for these scales."""

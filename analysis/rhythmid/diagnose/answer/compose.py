@@ -38,7 +38,7 @@ WORTH = 10.0  # difference of the information criterion within which a rival is 
 
 def explanations(contest: Contest, decision: Decision) -> tuple[Explanation, ...]:
     """All hypotheses as the answer lists them, the best first."""
-    ranked = sorted(contest.hypotheses, key=lambda one: -one.prediction.score)
+    ranked = sorted((*contest.hypotheses, *contest.ruled_out), key=lambda one: -one.prediction.score)
     best = ranked[0].prediction
     found = []
     for one in ranked:
@@ -107,7 +107,10 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         delays=delays_of(fit),
         next_experiment=next_experiment(found, rivals, series, decision.verdict),
         scoring=Scored(result.scoring.kind, None, result.scoring.reason),
-        calibration=(*result.calibration.notes, *recalibrated(case.nominal, fit)),
+        calibration=(
+            *result.calibration.notes,
+            *recalibrated(case.nominal, fit.model, {name: fit.std[name] for name in fit.names}),
+        ),
         excluded=tuple(f"{' + '.join(added)}: {why}" for added, why in found.excluded),
         heldout=held,
         notes=tuple(notes),

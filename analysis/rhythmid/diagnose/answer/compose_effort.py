@@ -15,12 +15,11 @@ from rhythmid.diagnose.answer.result import (
     Remainder,
     Scored,
 )
-from rhythmid.diagnose.answer.wording import SENTENCES, freed_value, summary_of
+from rhythmid.diagnose.answer.wording import SENTENCES, freed_value, recalibrated, summary_of
 from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.run import EffortResult
 from rhythmid.identify.inverse_dynamics.estimate import size_of
-from rhythmid.report.quantity import rounded
 
 NO_SENSOR = "The measurement is assumed to be the motion: effects in the sensor and in the measurement's time are not among the candidates."
 FIXED_SCALE = "The recorded effort is taken to be true in scale."
@@ -66,7 +65,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         next_experiment=_next_experiment(result),
         scoring=Scored("effort", result.applicability.bandwidth, result.applicability.reason),
         assumptions=(FIXED_SCALE, NO_SENSOR),
-        calibration=_recalibrated(case, chosen),
+        calibration=recalibrated(case.nominal, chosen.fit.model, chosen.std()),
         excluded=tuple(f"{name}: {why}" for name, why in result.search.not_tried.items()),
         heldout=held if result.heldout is not None else "held out: every block of the records in its turn",
         notes=tuple(notes),
@@ -120,22 +119,6 @@ def effort_delays(fitted: Fitted) -> dict:
         "separable": False,
         "assumption": "of the delays only how much later than the effort the motion is recorded shows",
     }
-
-
-def _recalibrated(case: Case, fitted: Fitted) -> tuple[str, ...]:
-    """Nominal values that the effort contradicts, as sentences."""
-    said, std = [], fitted.std()
-    for name, value in case.nominal.parameters.items():
-        if name not in std or name not in fitted.model.parameters:
-            continue
-        new = fitted.model.value(name)
-        if math.isfinite(std[name]) and abs(new - value.value) > max(
-            4.0 * std[name], 0.02 * abs(value.value)
-        ):
-            said.append(
-                f"{name}: {value.value:.6g} in the nominal model, {rounded(new, std[name])} ± {std[name]:.2g} {value.unit} in the records"
-            )
-    return tuple(said)
 
 
 def _next_experiment(result: EffortResult) -> str:

@@ -1,14 +1,14 @@
 """A diagnosis in sentences: where, what, how much better, and which nominal values the records contradict."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from rhythmid.diagnose.answer.result import FitQuality, Location, MissingEffect
+from rhythmid.diagnose.constants import CONTRADICTS, CONTRADICTS_LEAST
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.verdict import Decision
-from rhythmid.identify.output_error import Fit
 from rhythmid.model import Model
 from rhythmid.report.quantity import rounded
 
@@ -114,15 +114,16 @@ def freed_value(nominal: Model, fitted: Model, elements: Sequence[str]) -> str:
     )
 
 
-def recalibrated(nominal: Model, fit: Fit) -> list[str]:
-    """Nominal parameters that the records contradict, as sentences."""
+def recalibrated(nominal: Model, fitted: Model, stds: Mapping[str, float]) -> tuple[str, ...]:
+    """Nominal values that the records contradict, as sentences; `stds` are standard deviations of what was estimated."""
     said = []
     for name, value in nominal.parameters.items():
-        if name not in fit.names:
+        if name not in stds or name not in fitted.parameters:
             continue
-        new, std = fit.model.value(name), fit.std[name]
-        if math.isfinite(std) and abs(new - value.value) > max(4.0 * std, 0.02 * abs(value.value)):
+        new, std = fitted.value(name), stds[name]
+        least = max(CONTRADICTS * std, CONTRADICTS_LEAST * abs(value.value))
+        if math.isfinite(std) and abs(new - value.value) > least:
             said.append(
                 f"{name}: {value.value:.6g} in the nominal model, {rounded(new, std)} ± {std:.2g} {value.unit} in the records"
             )
-    return said
+    return tuple(said)

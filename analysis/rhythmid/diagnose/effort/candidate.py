@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.diagnose.constants import LONGEST_DELAY
 from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
@@ -21,9 +22,6 @@ Array = NDArray[np.float64]
 SEEN = ("force", "actuator")  # slots whose elements the balance of effort sees
 LARGEST = 30.0  # times its first guess that an effect is started at, at most
 LEAST_START = 0.05  # of its first guess, at least: at nothing a shape has no derivative
-QUARTER = (
-    0.25  # of the motion's dominant period that a delay is looked for: half a turn looks like another sign
-)
 
 
 @dataclass(frozen=True)
@@ -141,7 +139,7 @@ def screen(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> list
             continue
         factor = -float(change @ left) / strength
         gain = 0.5 * factor**2 * strength
-        if start.element is not None and _impossible(start.element, start.values, factor):
+        if start.element is not None and start.element.forbids(start.values, factor):
             gain = 0.0
         one = Screened(start, gain, factor)
         key = (start.kind, start.name)
@@ -175,20 +173,9 @@ def _basis(columns: Array) -> Array:
     return left[:, singular > 1e-9 * singular[0]]
 
 
-def _impossible(element: Element, values: Mapping[str, float], factor: float) -> bool:
-    """Whether `factor` times the guessed effect has a sign that physics forbids."""
-    if not element.size:
-        return False
-    if math.isinf(element.absent):
-        return factor < 0.0
-    low, high = element.parameter(element.size).bounds
-    size = element.absent + factor * (values[element.size] - element.absent)
-    return (size < low <= element.absent) or (size > high >= element.absent)
-
-
 def late_start(balance: Balance, parent: EffortFit) -> tuple[Alignment, float]:
     """What a longer delay may be, and the one [s] that fits best beside the parent's parameters as they stand to first order."""
-    most = max(QUARTER / balance.bandwidth.dominant, 2.0 * balance.period)
+    most = max(LONGEST_DELAY / balance.bandwidth.dominant, 2.0 * balance.period)
     usual = Alignment.of(balance)
     required = balance.required(parent.model)
     shift = balance.shift(parent.model)

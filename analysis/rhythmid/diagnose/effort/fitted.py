@@ -1,11 +1,12 @@
 """A hypothesis about an effort, fitted, in the form that the evidence takes."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rhythmid.diagnose.evidence import Linearised
-from rhythmid.diagnose.hypothesis import Kind
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction, names_of, richer_of
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit
 from rhythmid.model import Model, Prior
@@ -17,7 +18,7 @@ class Fitted:
     """One explanation of the effort.
 
     `elements` are the labels of what was added (a freed value's name; `input_delay.delay` for a longer delay), `priors` what
-    its fit knew before the data.
+    its fit knew before the data, `shape` statistics of the effects themselves, by the name of the rule that looks at them.
     """
 
     elements: tuple[str, ...]
@@ -25,6 +26,7 @@ class Fitted:
     fit: EffortFit
     priors: dict[str, Prior]
     linearised: Linearised
+    shape: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, elements: tuple[str, ...], kind: Kind, fit: EffortFit, priors: dict[str, Prior]) -> "Fitted":
@@ -51,6 +53,21 @@ class Fitted:
     def size(self) -> int:
         """Number of parameters."""
         return len(self.fit.names)
+
+    def claimed(self, prediction: Prediction, nrmse: float | None = None) -> Hypothesis:
+        """The hypothesis with what it predicts, and its error on held-out data as a share of the effort."""
+        model = self.fit.model
+        return Hypothesis(
+            self.elements,
+            names_of(model, self.elements),
+            self.kind,
+            self.size,
+            prediction,
+            nrmse,
+            self.shape,
+            richer=richer_of(model, self.elements),
+            values={name: model.value(name) for name in self.fit.names},
+        )
 
     def std(self) -> dict[str, float]:
         """Standard deviations of the estimated parameters, inflated by the residual's autocorrelation."""

@@ -1,6 +1,5 @@
 """Diagnosis by the recorded effort: the search, its hypotheses on data that no fit has seen, and the decision."""
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,9 +20,10 @@ from rhythmid.diagnose.evidence import (
     CrossValidated,
     Linearised,
     cross_validate,
+    detectable,
     prediction,
 )
-from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, names_of, richer_of
+from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.model_uncertainty import covariance_between
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.verdict import Decision, decide
@@ -120,6 +120,7 @@ def effort_run(
     rows = _rows(case, found, unseen)
     size = size_of(found.balance)
     predicted = {one.elements: rows.predicted(found, one) for one in found.hypotheses}
+    ruled_out = {one.elements: rows.predicted(found, one) for one in found.ruled_out}
     mapped = {
         "the motion and the load": rows.predicted(found, found.chosen, found.beyond),
     }
@@ -132,36 +133,33 @@ def effort_run(
 
     errors = {
         tuple(sorted(elements)): float(np.sqrt(np.mean(one.error[rows.judged] ** 2)))
-        for elements, one in predicted.items()
+        for elements, one in (ruled_out | predicted).items()
     }
-    hypotheses = [
-        Hypothesis(
-            one.elements,
-            names_of(one.fit.model, one.elements),
-            one.kind,
-            one.size,
-            made(predicted[one.elements]),
-            errors[tuple(sorted(one.elements))] / size,
-            richer=richer_of(one.fit.model, one.elements),
-            values={name: one.fit.model.value(name) for name in one.fit.names},
-        )
-        for one in found.hypotheses
-    ]
+
+    def claimed(one: Fitted, errors_of: CrossValidated) -> Hypothesis:
+        return one.claimed(made(errors_of), errors[tuple(sorted(one.elements))] / size)
+
     left = remainder_of(found.balance, found.chosen)
     maps = {left.goes_with: made(mapped["the motion and the load"])}
-    contest = Contest(tuple(hypotheses), maps, places * found.candidates, size, PRACTICAL_EFFORT)
+    contest = Contest(
+        tuple(claimed(one, predicted[one.elements]) for one in found.hypotheses),
+        maps,
+        places * found.candidates,
+        size,
+        PRACTICAL_EFFORT,
+        tuple(claimed(one, ruled_out[one.elements]) for one in found.ruled_out),
+    )
     selection = select(contest)
     chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)
-    noise = predicted[chosen.elements].error
-    detectable = math.sqrt(4.0 * float(np.mean(noise**2)) * math.sqrt(2.0 * time / len(noise))) / size
+    least = detectable(predicted[chosen.elements].error, time) / size
     return EffortResult(
         applicability,
         found,
         rows.heldout,
         contest,
         selection,
-        decide(contest, selection, detectable),
-        detectable,
+        decide(contest, selection, least),
+        least,
         _among_models(chosen, case.catalogue, found.balance, contest, selection),
         found.nominal,
         left if chosen is found.chosen else remainder_of(found.balance, chosen),

@@ -6,13 +6,13 @@ addition takes the place of its kin instead of standing beside it.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rhythmid.diagnose.case import Budget
-from rhythmid.diagnose.constants import MISMATCH, PRACTICAL_EFFORT, REST
+from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.effort.candidate import (
     INPUT_DELAY,
     Screened,
@@ -27,10 +27,9 @@ from rhythmid.diagnose.effort.candidate import (
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.reference import reference_of
 from rhythmid.diagnose.effort.scales import scales_of
-from rhythmid.diagnose.evidence import Blocks, Linearised, predict, weight_for
-from rhythmid.diagnose.hypothesis import Kind, Prediction
-from rhythmid.diagnose.rejections import decisive
-from rhythmid.diagnose.selection import replaces
+from rhythmid.diagnose.evidence import Blocks, Linearised, predict
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction, special_case
+from rhythmid.diagnose.rejections import Claim, keeps_shape, rejections_of, replaces
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -48,9 +47,6 @@ from rhythmid.record.record import Record
 
 MOST_EFFECTS = 4  # effects that are looked for: a fifth was never real on recordings that were tried
 REFINED = 10  # additions that are fitted in earnest in each round: the right one was among the first five of a score test always
-SWALLOWED = (
-    0.5  # of the effort that an actuator's effect has to leave: one that takes more explains no motion
-)
 GAP = 3  # rows between blocks: as far as the filter of effort mixes neighbours (its impulse lasts about 1 / cut-off, 2.5 rows)
 
 
@@ -64,6 +60,7 @@ class EffortSearch:
     nominal : the nominal model, its free values fitted.
     hypotheses : all that were fitted, the nominal among them, best prediction first.
     predictions : of each of them.
+    ruled_out : what was fitted, too, and explains no motion.
     reference, beyond : the nominal model, and the chosen one, with a free map beside them; and what the first predicts.
     chosen : the hypothesis with which the search ended.
     condition : of the nominal model's scaled columns.
@@ -76,6 +73,7 @@ class EffortSearch:
     nominal: Fitted
     hypotheses: tuple[Fitted, ...]
     predictions: tuple[Prediction, ...]
+    ruled_out: tuple[Fitted, ...]
     chosen: Fitted
     reference: Linearised
     reference_prediction: Prediction
@@ -136,7 +134,8 @@ def search_effort(
     )
     order = sorted(range(len(search.found)), key=lambda index: -made[index].score)
     return EffortSearch(
-        balance, search.blocks, nominal, tuple(search.found[i] for i in order), tuple(made[i] for i in order), chosen,
+        balance, search.blocks, nominal, tuple(search.found[i] for i in order), tuple(made[i] for i in order),
+        search.set_aside, chosen,
         reference, made[-2], beyond, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)), len(search.tried),
     )  # fmt: skip
 
@@ -152,9 +151,16 @@ class _Search:
     found: list[Fitted]
     promising: float | None = None
     tried: set[str] = field(default_factory=set)
+    ruled_out: list[Fitted] = field(default_factory=list)
+
+    @property
+    def set_aside(self) -> tuple[Fitted, ...]:
+        """What was ruled out, one of each structure; none that was fitted in another way and not ruled out."""
+        kept = {tuple(sorted(one.elements)): one for one in self.ruled_out if not self._known(one)}
+        return tuple(kept.values())
 
     def further(self, parent: Fitted, reference: Linearised) -> Fitted | None:
-        """The best model with one effect more, or with a kin in the place of one; None where nothing is worth it."""
+        """The best model with one effect more, or with a kin in the place of one; None where the table rejects that."""
         model = parent.fit.model
         starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
         screened = screen(self.balance, parent.fit, starts)
@@ -164,23 +170,30 @@ class _Search:
         for one in self._promising(_shortlist(screened), parent):
             for base in self._bases(parent, one.start):
                 fitted = self.fitted(base, one)
-                if fitted is not None and not self._known(fitted):
-                    new.append(fitted)
+                if fitted is None or self._known(fitted):
+                    continue
+                (new if keeps_shape(fitted.shape) else self.ruled_out).append(fitted)
         self.found.extend(new)
         if not new:
             return None
-        made = predict([f.linearised for f in (*new, parent)] + [reference], self.blocks, self.balance.record)
-        *others, before, free = made
+        fits = [one.linearised for one in (*new, parent, self.nominal)]
+        *others, before, start, free = predict([*fits, reference], self.blocks, self.balance.record)
         order = sorted(range(len(new)), key=lambda index: -others[index].score)
         best = order[0]
-        whole = float(np.mean(self.nominal.fit.residual**2)) - free.mean_square
+        claimed = [one.claimed(prediction) for one, prediction in zip(new, others)]
+
+        def claim(index: int, without: Hypothesis, simpler: Hypothesis | None = None) -> Claim:
+            return Claim(
+                claimed[index], without, self.nominal.claimed(start), free.mean_square, tried, size_of(self.balance),
+                PRACTICAL_EFFORT, simpler,
+            )  # fmt: skip
+
         # of forms of one thing the simplest that is not replaced stands for all of them
         for index in order[1:]:
-            if self._simpler(new[index], new[best]) and not replaces(
-                others[best], others[index], free.mean_square, whole
-            ):
+            plain = claimed[index]
+            if special_case(plain, claimed[best]) and not replaces(claim(best, plain, plain)):
                 best = index
-        return new[best] if self._worth(others[best], before, free, tried) else None
+        return None if rejections_of(claim(best, parent.claimed(before))) else new[best]
 
     def _promising(self, shortlist: Sequence[Screened], parent: Fitted) -> list[Screened]:
         """The additions that are worth a fit; a longer delay is where the alignment has gone further than stamps are rounded."""
@@ -189,18 +202,6 @@ class _Search:
         least = self.promising * parent.fit.correlation
         late = abs(parent.fit.alignment) > Alignment.of(self.balance).std
         return [one for one in shortlist if (late if one.start.kind == "delay" else one.gain > least)]
-
-    def _worth(self, new: Prediction, old: Prediction, free: Prediction, tried: int) -> bool:
-        """Whether a further effect is more than chance and of practical size."""
-        removed = old.mean_square - new.mean_square
-        explainable = max(old.mean_square - free.mean_square, 0.0)
-        start = float(np.mean(self.nominal.fit.residual**2))
-        return bool(
-            weight_for(new, old) > decisive(tried)
-            and removed > REST * explainable
-            and removed > MISMATCH * start
-            and removed > (PRACTICAL_EFFORT * size_of(self.balance)) ** 2
-        )
 
     def _bases(self, parent: Fitted, start: Start) -> list[Fitted]:
         """What an addition is put to: the parent, or where that holds its kin, the parent without it."""
@@ -268,19 +269,17 @@ class _Search:
         if any(not math.isfinite(prior.std) or prior.std <= 0.0 for prior in priors.values()):
             return None
         made = self._fit((*base.elements, label), model, priors, aligned, alignment)
-        swallows = (
-            start.element is not None
-            and start.element.slot == "actuator"
-            and self._swallows(made, base, label)
-        )
-        return None if swallows else made
+        if start.element is None or start.element.slot != "actuator":
+            return made
+        return replace(made, shape={"moves_the_machine": self._left(made, base, label)})
 
-    def _swallows(self, made: Fitted, base: Fitted, label: str) -> bool:
-        """Whether an actuator's effect takes most of the effort away, so that hardly any is left to move the machine."""
+    def _left(self, made: Fitted, base: Fitted, label: str) -> float:
+        """Share of the effort that an actuator's effect leaves to move the machine."""
         left, before = (
-            self.balance.predicted(model, 0.0) for model in (made.fit.model.without(label), base.fit.model)
+            float(np.linalg.norm(self.balance.predicted(model, 0.0)))
+            for model in (made.fit.model.without(label), base.fit.model)
         )
-        return bool(np.linalg.norm(left) < SWALLOWED * np.linalg.norm(before))
+        return left / before if before > 0.0 else math.inf
 
     def _priors(self, model: Model, label: str, element: Element, alignment: float) -> dict[str, Prior]:
         """An addition's effect is below the effort; its shape may be anything that changes it by no more than that."""
@@ -313,17 +312,6 @@ class _Search:
 
     def _known(self, fitted: Fitted) -> bool:
         return any(set(one.elements) == set(fitted.elements) for one in self.found)
-
-    def _simpler(self, first: Fitted, second: Fitted) -> bool:
-        """Whether two hypotheses differ in one effect only, and that of the first is a special case of the other's."""
-        one = set(first.elements) - set(second.elements)
-        other = set(second.elements) - set(first.elements)
-        if len(one) != 1 or len(other) != 1:
-            return False
-        terms = first.fit.model.term(one.pop()), second.fit.model.term(other.pop())
-        if terms[0] is None or terms[1] is None:
-            return False
-        return terms[1].element.name in terms[0].element.special_case_of
 
 
 def _kind_of(elements: Sequence[str], model: Model) -> Kind:

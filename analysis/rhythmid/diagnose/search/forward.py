@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.diagnose.baseline import FOLLOWS
 from rhythmid.diagnose.case import Budget
-from rhythmid.diagnose.constants import PRACTICAL
+from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
 from rhythmid.diagnose.search.backward import eliminate
 from rhythmid.diagnose.search.order import in_best_order
 from rhythmid.diagnose.search.refit import (

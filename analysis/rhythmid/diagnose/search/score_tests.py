@@ -318,17 +318,6 @@ def _kept(outputs: Sequence[Array]) -> tuple[Array, ...]:
     return tuple(cast(Array, one.astype(np.float32)) for one in outputs)
 
 
-def _impossible(element: Element, values: Mapping[str, float], factor: float) -> bool:
-    """Whether `factor` times the guessed effect has a sign that physics forbids."""
-    if not element.size:
-        return False
-    if math.isinf(element.absent):
-        return factor < 0.0
-    low, high = element.parameter(element.size).bounds
-    size = element.absent + factor * (values[element.size] - element.absent)
-    return (size < low and low >= element.absent) or (size > high and high <= element.absent)
-
-
 def score(fit: Fit, changes: Sequence[Change]) -> list[Score]:
     """Scores of all changes under the fit's noise model, best first."""
     left, made_by = parameter_basis(fit)
@@ -345,7 +334,7 @@ def score(fit: Fit, changes: Sequence[Change]) -> list[Score]:
             continue  # the nominal parameters do the same
         size = -float(change @ residual) / strength
         statistic = size**2 * strength
-        if _impossible(one.element, one.values, size):
+        if one.element.forbids(one.values, size):
             statistic = 0.0
         proportional = one.element.size and math.isfinite(one.element.absent)
         beside = dict(zip(fit.names, -made_by @ (left.T @ joined))) if proportional else {}

@@ -1,0 +1,197 @@
+"""Verdict rules: what the evidence comes to, one row each of one table; the first row that applies gives verdict and reason.
+
+A row has a statistic, and applies where that is above its threshold. `python -m rhythmid.diagnose.verdict_rules` prints the table
+as Markdown.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rhythmid.diagnose.constants import BLIND, EXPLAINED, MAINLY, STATED
+from rhythmid.diagnose.hypothesis import Kind, Verdict
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a verdict depends on.
+
+    Parameters
+    ----------
+    kind : of the chosen hypothesis; that of the nominal model where nothing was added to it.
+    stated : number of its effects, those with the largest shares first, that are probable enough together to be stated.
+    delay_alone : whether of a longer delay and effects no effect is stated.
+    left : share of the mismatch that it leaves and something else predicts.
+    goes_with : what that goes with.
+    remainder : rms of what it leaves and something else predicts by more than chance, over the size that is of practical matter.
+    missed : rms error of the chosen hypothesis, as a share of what was measured.
+    detectable : smallest effect that the records would show, the same.
+    evidence : share of the evidence for hypotheses that hold all of its names.
+    alike : whether other names predict as well in the place of one of them.
+    """
+
+    kind: Kind
+    stated: int
+    delay_alone: bool
+    left: float
+    goes_with: str | None
+    remainder: float
+    missed: float
+    detectable: float
+    evidence: float
+    alike: bool
+
+
+@dataclass(frozen=True)
+class VerdictRule:
+    """One row: it applies to an outcome whose `statistic` is above the `threshold`; fields of the outcome stand in its `reason`."""
+
+    name: str
+    says: str
+    threshold: float
+    verdict: Verdict
+    reason: str
+    statistic: Callable[[Outcome], float]
+
+    def reason_of(self, found: Outcome) -> str:
+        """The reason in words and figures."""
+        return self.reason.format(
+            goes_with=found.goes_with,
+            left=100.0 * found.left,
+            missed=100.0 * found.missed,
+            detectable=100.0 * found.detectable,
+        )
+
+
+def _alone(statistic: Callable[[Outcome], float]) -> Callable[[Outcome], float]:
+    """The statistic where nothing was added to the nominal model, else 0."""
+    return lambda found: statistic(found) if found.kind == "nominal" else 0.0
+
+
+def _is(kind: Kind) -> Callable[[Outcome], float]:
+    return lambda found: float(found.kind == kind)
+
+
+VERDICT_RULES: tuple[VerdictRule, ...] = (
+    VerdictRule(
+        "unnamed_remainder",
+        "no effect is accepted: rms that a free function or further effects predict beyond chance, over the size of practical matter",
+        1.0,
+        "unknown_physics",
+        "no effect of the catalogue explains the mismatch: it goes with {goes_with}",
+        _alone(lambda found: found.remainder),
+    ),
+    VerdictRule(
+        "missed",
+        "no effect is accepted: error of the refitted nominal model, as a share of what was measured",
+        BLIND,
+        "undecided",
+        "the refitted nominal model misses {missed:.0f} % of what was measured, and nothing that was tried explains it",
+        _alone(lambda found: found.missed),
+    ),
+    VerdictRule(
+        "blind",
+        "no effect is accepted: smallest effect that the records would show, as a share of what was measured",
+        BLIND,
+        "undecided",
+        "these records would not show an effect below {detectable:.0f} % of what was measured",
+        _alone(lambda found: found.detectable),
+    ),
+    VerdictRule("nothing_missing", "no effect is accepted (1)", 0.0, "consistent", "", _alone(lambda _: 1.0)),
+    VerdictRule(
+        "freed_value",
+        "a value that the file holds fixed is set free in the chosen hypothesis (1)",
+        0.0,
+        "undecided",
+        "a value that the nominal model holds fixed explains the records when it is free",
+        _is("freed_value"),
+    ),
+    VerdictRule(
+        "longer_delay",
+        "the chosen hypothesis has a longer delay, and no effect beside it can be stated (1)",
+        0.0,
+        "undecided",
+        "a longer delay of the input than was given explains the records",
+        lambda found: float(found.delay_alone),
+    ),
+    VerdictRule(
+        "mostly_left",
+        "share of the mismatch that the effects leave and something else predicts",
+        1.0 - MAINLY,
+        "unknown_physics",
+        "the named effects leave {left:.0f} % of the mismatch, which goes with {goes_with}",
+        lambda found: found.left,
+    ),
+    VerdictRule(
+        "one_law",
+        "a free function in the place of several effects is chosen (1)",
+        0.0,
+        "unknown_physics",
+        "a free map explains the records as well as several names together",
+        _is("free_map"),
+    ),
+    VerdictRule(
+        "other_place",
+        "an effect in a place of the path where the catalogue has none is chosen (1)",
+        0.0,
+        "undecided",
+        "the effect explains the records best in a slot for which the catalogue has no such element",
+        _is("location"),
+    ),
+    VerdictRule(
+        "stated",
+        f"number of effects, those with the largest shares first, whose joint probability is at least {STATED:g}",
+        0.0,
+        "missing_physics",
+        "",
+        lambda found: float(found.stated),
+    ),
+    VerdictRule(
+        "partly_left",
+        "share of the mismatch that the effects leave and something else predicts",
+        1.0 - EXPLAINED,
+        "unknown_physics",
+        "this effect is mainly what is missing, but {left:.0f} % of the mismatch goes with {goes_with}",
+        lambda found: found.left,
+    ),
+    VerdictRule(
+        "rivals",
+        "share of the evidence for hypotheses that lack one of the names; 1 where another name predicts as well in its place",
+        1.0 - STATED,
+        "undecided",
+        "the evidence does not separate several explanations",
+        lambda found: 1.0 if found.alike else 1.0 - found.evidence,
+    ),
+    VerdictRule(
+        "hardly_told_apart",
+        "all else (1)",
+        0.0,
+        "undecided",
+        "the records hardly tell this law from others, so it may stand for one that the catalogue lacks",
+        lambda _: 1.0,
+    ),
+)
+
+
+def rule_for(found: Outcome) -> VerdictRule:
+    """The first row that applies."""
+    return next(rule for rule in VERDICT_RULES if rule.statistic(found) > rule.threshold)
+
+
+def table() -> str:
+    """The rules as a Markdown table."""
+    rows = ["| name | statistic | above | verdict | because |", "| --- | --- | --- | --- | --- |"]
+    rows += [
+        f"| `{rule.name}` | {rule.says} | {rule.threshold:.3g} | `{rule.verdict}` | {_words(rule.reason)} |"
+        for rule in VERDICT_RULES
+    ]
+    return "\n".join(rows)
+
+
+def _words(reason: str) -> str:
+    """A reason as it is told, with an ellipsis for each figure."""
+    figures = {"goes_with": "…", "left": "…", "missed": "…", "detectable": "…"}
+    return reason.replace(":.0f", "").format(**figures)
+
+
+if __name__ == "__main__":
+    print(table())
