@@ -2,9 +2,12 @@
 
 import gzip
 import io
+import os
 import resource
 import sqlite3
 import struct
+import subprocess
+import sys
 import tempfile
 import time
 import zipfile
@@ -15,7 +18,7 @@ from pathlib import Path
 import lz4.frame
 import numpy as np
 import pytest
-from fuzz import MEMORY_LIMIT, Watch, attempt
+from fuzz import MEMORY_LIMIT, Watch, attempt, load_units
 from fuzz_bags import OWN
 from fuzz_targets import TARGETS
 from hypothesis import given, settings
@@ -39,11 +42,13 @@ from rhythmid.record.signals import Signals
 from rhythmid.record.table import Table
 
 SECONDS = 10.0  # of the processor that a few hostile kB may take: without the limits it would be hours
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 ZEROS = b"\0" * (1 << 20)
 
 
 @pytest.fixture(scope="module")
 def watch() -> Watch:
+    load_units()
     return Watch()
 
 
@@ -57,6 +62,27 @@ def bounded():
     yield
     resource.setrlimit(resource.RLIMIT_AS, before)
     assert time.process_time() - begun < SECONDS
+
+
+IN_GRAMS = """
+import math, sys
+from dataclasses import replace
+from pathlib import Path
+from fuzz import campaign
+from fuzz_targets import TARGETS
+target = replace(TARGETS["model"], spoil=lambda rng, data: data.replace(b"unit: kg", b"unit: g"))
+tally = campaign(target, 0, 0, 1, math.inf, Path(sys.argv[1]))
+print(tally.refused, tally.failures)
+"""
+
+
+def test_what_the_first_foreign_unit_loads_is_not_taken_for_a_pickle_in_the_file(tmp_path):
+    # in a process of its own: in this one a unit may have been asked for before
+    path = os.pathsep.join([str(BENCHMARKS), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, "-c", IN_GRAMS, str(tmp_path)], env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True
+    )  # fmt: skip
+    assert done.stdout == "1 {}\n", done.stderr
 
 
 @pytest.mark.parametrize("name", TARGETS)
