@@ -32,6 +32,7 @@ from typing import Any
 from fuzz_targets import TARGETS, Target
 
 from rhythmid.errors import InputError
+from rhythmid.units import Units
 
 TIME_LIMIT = 5.0  # s of the processor for one input, of which none is larger than some kB
 PATIENCE = 60.0  # s by the clock: the machine may be busy with other things
@@ -40,6 +41,10 @@ ADDRESS_SPACE = (
     8 << 30
 )  # bytes, beyond which the process gets no memory: this machine has to survive its findings
 WARM_UP = 6  # valid inputs that are read before
+KNOWN_UNIT, UNKNOWN_UNIT = (
+    "mm",
+    "furlings",
+)  # neither is the machine's: the first is converted for the message
 BATCH = 1000  # inputs that one process reads
 LONGEST_LINE = 1500  # characters of a refusal that still is one clear line
 KEPT = 20  # failures of one kind that are listed by number
@@ -227,8 +232,16 @@ def watched(
     return tally, number + 1
 
 
+def load_units() -> None:
+    """Load the registry of units, as the first foreign unit does: a library behind it reads a pickle of its own while it is loaded."""
+    for unit in (KNOWN_UNIT, UNKNOWN_UNIT):
+        with suppress(InputError):
+            Units().check(unit, "m", "warm-up")
+
+
 def campaign(target: Target, seed: int, first: int, count: int, until: float, scratch: Path) -> Tally:
     """At most `count` inputs from number `first` on, until the clock reads `until`."""
+    load_units()
     for spare in range(WARM_UP):  # what is loaded and compiled once is no input's time or memory
         (folder := scratch / f"warm{spare}").mkdir(exist_ok=True)
         with suppress(Exception):

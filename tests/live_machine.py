@@ -30,7 +30,13 @@ CHANGED = {
 
 
 def at_work(
-    model: Model, start: float, end: float, state: Array | None = None, seed: int = 0, noise: float = 1e-4
+    model: Model,
+    start: float,
+    end: float,
+    state: Array | None = None,
+    seed: int = 0,
+    noise: float = 1e-4,
+    forced: bool = True,
 ) -> Stretch:
     """The lift from `start` to `end` [s], from a state or from rest, its position measured with white noise [m]."""
     delay = model.value("measurement_delay.delay")
@@ -40,7 +46,7 @@ def at_work(
     time = np.arange(round(start * RATE), round(end * RATE) + 1) / RATE
     known = np.arange(round(start * RATE) - 50, round(end * RATE) + 1) / RATE
     command = EXCITATION(np.mod(known, EXCITATION.period))
-    forcing = 6.0 * np.cos(2.0 * np.pi * 1.4 * known)
+    forcing = (6.0 if forced else 0.0) * np.cos(2.0 * np.pi * 1.4 * known)
     run = simulate(free, time, zero_order_hold(known, command), spline(known, forcing), state)
     measured = run.output + noise * np.random.default_rng(seed).standard_normal(len(time))
     return Stretch(time, command[50:], forcing[50:], time + delay, measured, run.states[-1])

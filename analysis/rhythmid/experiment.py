@@ -4,6 +4,7 @@
 function that turns it into nodes with parameters; `perform` is the same run without ROS.
 """
 
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -360,7 +361,7 @@ def _experiment(
         document.fail("'model:' is missing")
     else:
         model_path = folder / given.model
-        if not model_path.is_file():
+        if not os.path.isfile(model_path):  # also where the name is too long for any file
             document.at("model").fail(f"no such file: {model_path}")
     model = Model.load(model_path, load_catalogue(elements))
     place = document.at("excitation")

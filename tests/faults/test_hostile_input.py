@@ -2,9 +2,12 @@
 
 import gzip
 import io
+import os
 import resource
 import sqlite3
 import struct
+import subprocess
+import sys
 import tempfile
 import time
 import zipfile
@@ -15,15 +18,16 @@ from pathlib import Path
 import lz4.frame
 import numpy as np
 import pytest
-from fuzz import MEMORY_LIMIT, Watch, attempt
+from fuzz import MEMORY_LIMIT, Watch, attempt, load_units
 from fuzz_bags import OWN
-from fuzz_targets import TARGETS
+from fuzz_targets import EXPERIMENT, TARGETS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
 from rhythmid import document
 from rhythmid.errors import LONGEST, InputError
+from rhythmid.experiment import Experiment
 from rhythmid.record import compression
 from rhythmid.record.bag import Bag
 from rhythmid.record.bag_writer import write_bag
@@ -39,11 +43,13 @@ from rhythmid.record.signals import Signals
 from rhythmid.record.table import Table
 
 SECONDS = 10.0  # of the processor that a few hostile kB may take: without the limits it would be hours
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 ZEROS = b"\0" * (1 << 20)
 
 
 @pytest.fixture(scope="module")
 def watch() -> Watch:
+    load_units()
     return Watch()
 
 
@@ -57,6 +63,27 @@ def bounded():
     yield
     resource.setrlimit(resource.RLIMIT_AS, before)
     assert time.process_time() - begun < SECONDS
+
+
+IN_GRAMS = """
+import math, sys
+from dataclasses import replace
+from pathlib import Path
+from fuzz import campaign
+from fuzz_targets import EXPERIMENT, TARGETS
+target = replace(TARGETS["model"], spoil=lambda rng, data: data.replace(b"unit: kg", b"unit: g"))
+tally = campaign(target, 0, 0, 1, math.inf, Path(sys.argv[1]))
+print(tally.refused, tally.failures)
+"""
+
+
+def test_what_the_first_foreign_unit_loads_is_not_taken_for_a_pickle_in_the_file(tmp_path):
+    # in a process of its own: in this one a unit may have been asked for before
+    path = os.pathsep.join([str(BENCHMARKS), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, "-c", IN_GRAMS, str(tmp_path)], env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True
+    )  # fmt: skip
+    assert done.stdout == "1 {}\n", done.stderr
 
 
 @pytest.mark.parametrize("name", TARGETS)
@@ -204,6 +231,35 @@ def test_a_database_whose_definitions_are_no_texts_is_refused(cell, tmp_path):
     assert "holds no texts" in refusal(lambda: list(Bag(bag).blocks()))
 
 
+def leaves(data: bytes, root: int, page: int) -> list[int]:
+    """Where the leaves of a table's tree begin (https://sqlite.org/fileformat.html#b_tree_pages), for a tree of two levels."""
+    at = (root - 1) * page
+    assert data[at] == 5
+    (cells,) = struct.unpack_from(">H", data, at + 3)
+    places = struct.unpack_from(f">{cells}H", data, at + 12)
+    return [(struct.unpack_from(">I", data, at + place)[0] - 1) * page for place in places]
+
+
+def test_a_database_that_leads_to_the_same_row_again_and_again_comes_to_an_end(tmp_path, bounded):
+    times = 10 * np.arange(400)
+    topics = {"/a": Messages(times, times * 1.0), "/b": Messages(times[1:] + 5, times[1:] * 1.0)}
+    path = write_bag(tmp_path / "bag", topics, storage="sqlite3") / "bag.db3"
+    with closing(sqlite3.connect(path)) as open_:
+        (page,), (root,) = (
+            open_.execute("PRAGMA page_size").fetchone(),
+            open_.execute("SELECT rootpage FROM sqlite_master WHERE name = 'messages'").fetchone(),
+        )
+    data = bytearray(path.read_bytes())
+    first, second, *_ = leaves(data, root, page)
+    (cells,) = struct.unpack_from(">H", data, first + 3)
+    data[first + 8 : first + 8 + 2 * cells] = data[first + 8 : first + 10] * cells  # each row is the first
+    data[second] = 0xFF  # and behind them is nothing that could be read
+    path.write_bytes(data)
+    bag = Bag(path)
+    assert sum(map(len, bag.blocks(lambda topic: topic.name == "/b"))) > 100
+    assert any("are lost" in note for note in bag.notes)
+
+
 # Messages
 
 
@@ -261,6 +317,16 @@ def test_a_truth_value_of_any_byte_is_one_or_zero_by_either_way_of_reading():
     field = Field.parse("on")
     for direct in (True, False):
         assert read_columns([block], {topic.name: [field]}, direct)[topic.name].values[field] == [1.0]
+
+
+def test_a_signalling_nan_is_a_nan_without_a_warning(recwarn):
+    topic, data = own("float32 angle\n"), b"\0\1\0\0" + struct.pack("<I", 0x7F800001)
+    place = np.array([0])
+    block = Block(topic, data, place, place + len(data), place)
+    field = Field.parse("angle")
+    for direct in (True, False):
+        assert np.isnan(read_columns([block], {topic.name: [field]}, direct)[topic.name].values[field])
+    assert not recwarn.list
 
 
 # Tables
@@ -335,3 +401,32 @@ def test_a_forcing_too_fast_to_be_followed_is_refused(tmp_path, bounded):
         tmp_path / "signals.yaml",
     )
     assert "cannot be followed" in refusal(lambda: read_record(tmp_path / "run.csv", signals))
+
+
+TABLE = "t,y,u\n" + "".join(f"{k},{k % 7},{k % 5}\n" for k in range(50))
+
+
+def stated(tmp_path: Path, forcing: str, scale: str) -> Signals:
+    """Signals of TABLE with a forcing by formula and a factor of the command."""
+    (tmp_path / "run.csv").write_text(TABLE)
+    text = f"time: {{column: t}}\ninput: {{column: u, scale: {scale}}}\noutput: {{column: y}}\nforcing: {forcing}"
+    return Signals.from_text(text, tmp_path / "signals.yaml")
+
+
+def test_a_forcing_without_amplitude_is_none(tmp_path):
+    signals = stated(tmp_path, "{amplitude: 0.0, frequency: 61.4}", "1.0")
+    forcing = read_record(tmp_path / "run.csv", signals).forcing
+    assert forcing is not None and not forcing.value.any()
+
+
+def test_a_factor_beyond_the_largest_number_is_refused_without_a_warning(tmp_path, recwarn):
+    signals = stated(tmp_path, "{amplitude: 1.0, frequency: 0.5}", "1.0e308")
+    assert "are infinite" in refusal(lambda: read_record(tmp_path / "run.csv", signals))
+    assert not recwarn.list
+
+
+def test_the_name_of_a_model_may_be_longer_than_any_file_s(tmp_path):
+    text = EXPERIMENT.decode().replace("model.yaml", "m" * 300)
+    (tmp_path / "experiment.yaml").write_text(text)
+    (tmp_path / "delays.csv").write_text("time,delay\n0,0.01\n5,0.02\n")
+    assert "no such file" in refusal(lambda: Experiment.load(tmp_path / "experiment.yaml"))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from live_machine import CHANGED, LIFT, at_work
 from machines_at_work import RATE, Stretch
+from watch import Outcome
 
 from rhythmid.commands.watch import watch
 from rhythmid.elements.catalogue import load_catalogue
@@ -16,11 +17,13 @@ from rhythmid.model import Model
 from rhythmid.record.convert import write_record
 from rhythmid.record.record import Channel, Record
 from rhythmid.twin.calibration import Calibration
-from rhythmid.twin.changes import watched, without_own_forcing
+from rhythmid.twin.changes import Change, watched, without_own_forcing
+from rhythmid.twin.detector import Healthy
 from rhythmid.twin.diagnosis import Diagnosing
+from rhythmid.twin.isolation import isolate
 from rhythmid.twin.kept import load, save
 from rhythmid.twin.samples import Samples
-from rhythmid.twin.score import inverse
+from rhythmid.twin.score import Score, inverse
 from rhythmid.twin.settings import Settings
 from rhythmid.twin.twin import Status, Twin
 
@@ -35,7 +38,8 @@ def feed(twin: Twin, signals: Stretch, step: int = 250) -> list[Status]:
     for first in range(0, len(signals.time), step):
         part = slice(first, first + step)
         for role, time, value in signals.channels:
-            twin.push(role, time[part], value[part])
+            if role in twin.samples:
+                twin.push(role, time[part], value[part])
         said += twin.advance()
     return said
 
@@ -93,6 +97,61 @@ def test_a_change_of_physics_is_told_with_its_slot_and_size(change, slot, name, 
     if slot in ("command", "sensor"):
         delay = last.delays["input" if slot == "command" else "measurement"].value
         assert delay == pytest.approx((0.010 if slot == "command" else 0.005) + 0.005, abs=5e-4)
+
+
+def told(believed: Model, forced: bool, change: str, path: Path) -> tuple[Calibration, list[Status]]:
+    """What a twin that starts from `believed` learns of the healthy lift, and says seven seconds after a change, its calibration read from a file."""
+    signals = at_work(model(), 0.0, HEALTHY + 1.5, forced=forced)
+    twin = Twin(believed, SETTINGS, forced)
+    feed(twin, signals)
+    assert twin.calibration is not None
+    save(twin.calibration, path)
+    calibration = load(path, believed, SETTINGS, forced, load_catalogue())
+    at = signals.time[-1] + 11.0
+    before = at_work(model(), signals.time[-1], at, signals.end, seed=1, forced=forced)
+    later = at_work(CHANGED[change](model()), at, at + 7.0, before.end, seed=2, forced=forced)
+    return calibration, feed(Twin(believed, SETTINGS, forced, calibration), before.then(later))
+
+
+@pytest.mark.parametrize(("change", "slot"), [("command", "command"), ("measurement", "sensor")])
+def test_a_model_whose_position_of_rest_is_off_tells_which_delay_has_grown(change, slot, tmp_path):
+    off = 0.004  # m, a third of the motion's standard deviation
+    calibration, said = told(
+        model().with_values({"linear_spring.rest_length": off}), True, change, tmp_path / "healthy.json"
+    )
+    assert calibration.constant_force == pytest.approx(-800.0 * off, rel=0.02)
+    assert said[-1].isolation.slot == slot and said[-1].isolation.rivals == ()
+    assert said[-1].isolation.changes[0].size == pytest.approx(0.005, rel=0.15)
+
+
+@pytest.mark.parametrize("change", ["command", "measurement"])
+def test_delays_that_nothing_tells_apart_are_named_together(change, tmp_path):
+    _, said = told(model(), False, change, tmp_path / "healthy.json")
+    late = [status.isolation for status in said[-20:]]
+    assert all({one.slot, *one.rivals} == {"command", "sensor"} for one in late)
+
+
+@pytest.mark.parametrize(
+    ("explained", "correlation", "rivals"), [(2e3, 0.9, ()), (20.0, 0.9, ("sensor",)), (2e4, 0.999, ("sensor",))]
+)  # fmt: skip
+def test_a_slot_is_named_alone_where_it_leads_by_odds_and_by_more_than_effects_are_known_to(
+    explained, correlation, rivals
+):
+    information = np.array([[1.0, correlation], [correlation, 1.0]])
+    score = Score(np.sqrt(explained) * information[0], information, 0.0, 0)  # as the first change makes it
+    healthy = Healthy(np.zeros(2), np.zeros((2, 2)), (), 0.0)
+    changes = [Change("input_delay.delay", "command", "s"), Change("measurement_delay.delay", "sensor", "s")]
+    found = isolate(score, healthy, changes, 1.0)
+    assert found.slot == "command" and found.rivals == rivals
+
+
+def test_the_benchmark_counts_a_delay_of_a_machine_without_forcing_only_where_both_slots_are_named():
+    def right(machine: str, slot: str, *rivals: str) -> bool:
+        return Outcome(machine, 0, "measurement delay", 1.0, slot, rivals, False).right
+
+    assert right("joint", "command", "sensor") and right("joint", "sensor", "command")
+    assert not right("joint", "sensor") and not right("joint", "sensor", "command", "force")
+    assert right("lift", "sensor") and not right("lift", "command", "sensor")
 
 
 def test_a_mismatch_that_lasts_becomes_an_error_and_ends_ten_seconds_after_the_last_sign_of_it():

@@ -16,6 +16,7 @@ record: {path: bag}
 """
 
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -247,7 +248,7 @@ def _experiment(document: Node, path: Path) -> JointExperiment:
         for joint, node in entries.items()
     }
     model = None if given.model is None else path.parent / given.model
-    if model is not None and not model.is_file():
+    if model is not None and not os.path.isfile(model):
         document.at("model").fail(f"no such file: {model}")
     time = TimeMode(given.time.mode, round(given.rate), given.time.window, given.time.layout)
     return JointExperiment(

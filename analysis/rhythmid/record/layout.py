@@ -158,7 +158,8 @@ class Layout:
     @staticmethod
     def read(block: Block, number: Number) -> NDArray[np.float64]:
         """The number in all messages of the block, float64[n]."""
-        return gather(block.buffer, block.start + number.at, number.dtype).astype(np.float64)
+        with np.errstate(invalid="ignore"):  # a signalling NaN, which is read as any other
+            return gather(block.buffer, block.start + number.at, number.dtype).astype(np.float64)
 
 
 def _position(name: str, above: list[dict[str, Any]]) -> tuple[int, list[Text]]:

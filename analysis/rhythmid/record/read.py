@@ -153,7 +153,10 @@ def read_tables(signals: Signals) -> Record:
             raise InputError(
                 f"{source.place}{table.path}: time is not finite in row {int(np.argmin(np.isfinite(time)))}"
             )
-        made[role] = Samples(source, time, value * source.scale + source.offset)
+        with np.errstate(
+            over="ignore", invalid="ignore"
+        ):  # what is infinite is refused later, with its place
+            made[role] = Samples(source, time, value * source.scale + source.offset)
     assert signals.path is not None
     name = table_name(signals.path)
     if name == "signals":
@@ -306,7 +309,9 @@ def _finish(record: Record, signals: Signals) -> Record:
         )
     if record.forcing_law is None:
         return record
-    step = min(record.output.period, 1.0 / (SAMPLES_PER_CYCLE * frequency))
+    step = record.output.period
+    if frequency > 0.0:
+        step = min(step, 1.0 / (SAMPLES_PER_CYCLE * frequency))
     ends = [(channel.time[0], channel.time[-1]) for channel in record.channels.values()]
     start, end = min(first for first, _ in ends), max(last for _, last in ends)
     count = np.ceil((end - start) / step) + 1

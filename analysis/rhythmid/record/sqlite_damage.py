@@ -6,6 +6,13 @@ import struct
 from rhythmid.record.sqlite_writer import checksum
 
 
+def in_order(number: object, before: int) -> int:
+    """The number of a row behind the row `before`. A damaged tree may lead to rows that it has led to already, without end: an error then."""
+    if not isinstance(number, int) or number <= before:
+        raise sqlite3.DatabaseError("its table 'messages' is out of order")
+    return number
+
+
 def next_readable(database: sqlite3.Connection, after: int) -> int | None:
     """The first row of `messages` behind `after` that can be read; None if there is none."""
 
@@ -13,7 +20,7 @@ def next_readable(database: sqlite3.Connection, after: int) -> int | None:
         row = database.execute(
             "SELECT id, topic_id, timestamp, data FROM messages WHERE id > ? ORDER BY id LIMIT 1", (low,)
         ).fetchone()
-        return None if row is None else row[0]
+        return None if row is None else in_order(row[0], low)
 
     try:
         last = database.execute("SELECT max(id) FROM messages").fetchone()[0]

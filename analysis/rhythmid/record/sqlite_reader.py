@@ -14,7 +14,7 @@ import numpy as np
 
 from rhythmid.errors import InputError
 from rhythmid.record.block import Block, Topic, Wanted, by_topic
-from rhythmid.record.sqlite_damage import next_readable, wrong_checksums
+from rhythmid.record.sqlite_damage import in_order, next_readable, wrong_checksums
 
 _ROWS = 50_000  # rows fetched at once,
 _BYTES = 64 << 20  # and bytes, behind which no further one is fetched
@@ -96,7 +96,7 @@ class SqliteReader:
         while True:
             try:
                 for number, *row in database.execute(query, (self._last,)):
-                    self._last = number
+                    self._last = in_order(number, self._last)
                     yield row[0], row[1], row[2]
                 return
             except sqlite3.DatabaseError as error:

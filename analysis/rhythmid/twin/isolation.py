@@ -12,6 +12,9 @@ from rhythmid.twin.score import Score, inverse
 
 Array = NDArray[np.float64]
 ODDS = 2.0 * np.log(20.0)  # in χ²: a slot is named alone when it is twenty times as likely as every other
+# Of the square of what a change does, below which two changes do the same. Effects are computed in proportion to a change's size, and a delay
+# of 5 ms moves a signal of 5 Hz by 8 % otherwise, 0.6 % of the square.
+ALIKE = 0.01
 SHOWN = 0.5  # of the score statistic that the best change explains at least, or the physics is none of those known
 
 
@@ -48,6 +51,9 @@ def isolate(score: Score, healthy: Healthy, changes: Sequence[Change], excess: f
 
     `excess` is the overdispersion of the score in healthy operation. What the best change leaves counts, too: a change so large that
     its effects are no longer proportional to its size leaves more than noise.
+
+    A slot is a rival where its best change is within the odds, or does the same to the innovations as the best of all: what then
+    puts one before the other is the model's error.
     """
     centred = healthy.centred(score)
     information = np.diag(score.information)
@@ -63,14 +69,27 @@ def isolate(score: Score, healthy: Healthy, changes: Sequence[Change], excess: f
             std = float(1.0 / np.sqrt(information[index]))
             best[change.slot] = Sized(change.name, change.slot, size, std, change.unit, explained)
     ranked = sorted(best.values(), key=lambda one: -one.explained)
+    names = [change.name for change in changes]
+    places = [names.index(one.name) for one in ranked]
     if ranked:
         excess = max(excess, (whole - ranked[0].explained) / max(rank - 1, 1))
     ranked = [replace(one, std=one.std * excess**0.5) for one in ranked]
     share = {one.slot: min(1.0, one.explained / whole) for one in ranked}
     if not ranked or share[ranked[0].slot] < SHOWN:
         return Isolation("unknown", tuple(share), share, tuple(ranked), excess)
-    rivals = tuple(one.slot for one in ranked[1:] if ranked[0].explained - one.explained < ODDS * excess)
+    rivals = tuple(
+        one.slot
+        for one, place in zip(ranked[1:], places[1:])
+        if ranked[0].explained - one.explained < ODDS * excess
+        or _apart(score.information, places[0], place) < ALIKE
+    )
     return Isolation(ranked[0].slot, rivals, share, tuple(ranked), excess)
+
+
+def _apart(information: Array, one: int, other: int) -> float:
+    """The share of what a change explains that another change cannot: 0 where their effects are alike, 1 where orthogonal."""
+    alike = float(information[one, other]) ** 2 / float(information[one, one] * information[other, other])
+    return max(0.0, 1.0 - alike)
 
 
 @dataclass(frozen=True)

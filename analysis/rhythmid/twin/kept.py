@@ -11,13 +11,13 @@ from rhythmid.errors import InputError
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.model import Model
 from rhythmid.output import write_json
-from rhythmid.twin.calibration import Calibration
+from rhythmid.twin.calibration import CONSTANT, Calibration
 from rhythmid.twin.changes import watched, without_own_forcing
 from rhythmid.twin.detector import Healthy, Threshold
 from rhythmid.twin.observer import Filter
 from rhythmid.twin.settings import Settings
 
-VERSION = 1
+VERSION = 2
 
 
 def save(calibration: Calibration, path: Path) -> None:
@@ -26,6 +26,7 @@ def save(calibration: Calibration, path: Path) -> None:
     write_json(path, {
         "version": VERSION,
         "changes": [change.name for change in calibration.changes],
+        "constant_force": calibration.constant_force,
         "period": calibration.period,
         "filter": vars(filter),
         "speed": filter.scatter[1],
@@ -55,6 +56,8 @@ def load(path: Path, model: Model, settings: Settings, forced: bool, catalogue: 
         )
         if [change.name for change in changes] != kept["changes"]:
             raise InputError(f"{path}: is a calibration of another model; make it anew")
+        if CONSTANT in extended.parameters:
+            extended = extended.with_values({CONSTANT: float(kept["constant_force"])})
         noise, healthy = kept["noise"], kept["healthy"]
         return Calibration(
             extended,
