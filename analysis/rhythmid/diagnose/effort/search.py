@@ -125,9 +125,10 @@ def search_effort(
         if better is None:
             break
         chosen = better
-    for label in chosen.elements if len(chosen.elements) > 1 else ():
-        search.without(chosen, label)
-        search.simplify(chosen, label)
+    made = predict([one.linearised for one in search.found], search.blocks, balance.record)
+    best = search.found[max(range(len(made)), key=lambda index: made[index].score)]
+    for one in (chosen, best) if best is not chosen else (chosen,):
+        search.reduce(one)
     beyond = reference_of(balance, chosen, search.blocks)
     made = predict(
         [one.linearised for one in search.found] + [reference, beyond], search.blocks, balance.record
@@ -235,23 +236,32 @@ class _Search:
         }
         return self._fit(rest, model, priors, self._aligned(rest), fitted.fit.alignment)
 
-    def simplify(self, fitted: Fitted, label: str) -> None:
-        """Fit the hypothesis with each law that one of its effects contains in the place of that effect: beside what was found later
-        the simpler law may do."""
-        term = fitted.fit.model.term(label)
-        if term is None:
-            return
-        base = self.without(fitted, label)
+    def reduce(self, fitted: Fitted) -> None:
+        """Fit a hypothesis of several effects without each of them, and with each law that one of them contains in its place: beside
+        what was found later the simpler law may do."""
+        for label in fitted.elements if len(fitted.elements) > 1 else ():
+            base = self.without(fitted, label)
+            self._keep(base)
+            term = fitted.fit.model.term(label)
+            if term is not None:
+                self._simplify(base, term.element)
+
+    def _keep(self, fitted: Fitted) -> None:
+        if not self._known(fitted):
+            self.found.append(fitted)
+
+    def _simplify(self, base: Fitted, element: Element) -> None:
+        """Fit the base with each law that the element contains."""
         model = base.fit.model
         simpler = [
             start
             for start in starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
-            if start.element is not None and term.element.name in start.element.special_case_of
+            if start.element is not None and element.name in start.element.special_case_of
         ]
         for one in screen(self.balance, base.fit, simpler):
             made = self.fitted(base, one)
-            if made is not None and not self._known(made):
-                self.found.append(made)
+            if made is not None:
+                self._keep(made)
 
     def fitted(self, base: Fitted, one: Screened) -> Fitted | None:
         """The base with an addition, everything refitted from its first guess."""
