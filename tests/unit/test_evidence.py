@@ -141,6 +141,13 @@ def test_errors_that_are_all_zero_have_a_scale_whose_square_is_a_number():
     assert 0.0 < scale_of(np.zeros(50)) ** 2 < 1e-200
 
 
+@pytest.mark.parametrize("rest", [0.0, 1e-200, 1e-12])
+def test_errors_most_of_which_are_none_have_the_scale_of_the_others_or_less(rest):
+    error = np.random.default_rng(3).standard_t(4, 1000)
+    error[:600] = rest
+    assert 0.0 < scale_of(error) < 1.0
+
+
 def resting(error_at_rest, least):
     """Log density of errors of unit scale with one block at rest, where the model errs by this."""
     error = np.random.default_rng(5).standard_t(4, 600)

@@ -13,6 +13,7 @@ from scipy.special import gammaln
 Array = NDArray[np.float64]
 DEGREES = 4.0  # degrees of freedom: the lowest for which the fourth moment is not finite; Lange et al. use 4 where it is not estimated
 SETTLES = 20  # passes for the scale at most
+HARDLY = 1e-9  # of the root mean square, below which a median says only that most errors are none
 NO_ERROR = 1e-150  # scale where there is no error: its square is a number still
 MEDIAN = 0.741  # of |t| for 4 degrees of freedom and unit scale
 
@@ -20,11 +21,15 @@ MEDIAN = 0.741  # of |t| for 4 degrees of freedom and unit scale
 def scale_of(error: Array) -> float:
     """Maximum-likelihood scale of errors (n,); `NO_ERROR` where there is none."""
     square = error**2
-    scale = float(np.median(np.abs(error)) / MEDIAN) or float(np.sqrt(np.mean(square)))
-    if scale == 0.0:
+    rms = float(np.sqrt(np.mean(square)))
+    if rms < NO_ERROR:
         return NO_ERROR
+    scale = float(np.median(np.abs(error)) / MEDIAN)
+    if scale < HARDLY * rms:  # most of the errors are none: the others have a scale
+        scale = rms
     for _ in range(SETTLES):
         new = math.sqrt(float(np.mean((DEGREES + 1.0) * square / (DEGREES + square / scale**2))))
+        new = max(new, NO_ERROR)
         if abs(new - scale) < 1e-3 * scale:
             return new
         scale = new
