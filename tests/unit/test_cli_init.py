@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,14 +31,18 @@ def table(tmp_path):
     return path
 
 
-def test_three_commands_lead_from_a_foreign_table_to_a_verdict(table, rhythmid):
-    begun = rhythmid("init", "run.csv")
+def test_the_three_commands_of_the_readme_lead_from_a_foreign_table_to_a_verdict(table, rhythmid):
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    section = readme.partition("\n## Only bags\n")[2].partition("\n## ")[0]
+    shown = [line.split()[1:] for line in section.splitlines() if line.startswith("    rhythmid ")]
+    assert [one[0] for one in shown] == ["init", "check", "diagnose"]
+    begun = rhythmid(*shown[0])
     assert (begun.returncode, begun.stderr) == (0, "")
-    commands = [line.split()[1:] for line in begun.stdout.splitlines() if line.startswith("  rhythmid ")]
-    assert [one[0] for one in commands] == ["check", "diagnose"]
-    checked = rhythmid(*commands[0])
+    told = [line.split()[1:] for line in begun.stdout.splitlines() if line.startswith("  rhythmid ")]
+    assert told == shown[1:]
+    checked = rhythmid(*shown[1])
     assert checked.returncode == 0 and "note" not in checked.stdout
-    done = rhythmid(*commands[1], "--json", "answer.json", timeout=250.0)
+    done = rhythmid(*shown[2], "--json", "answer.json", timeout=250.0)
     assert done.returncode == 0, done.stderr
     answer = json.loads((table.parent / "answer.json").read_text())
     assert answer["verdict"] == "missing_physics" and answer["missing"][0]["element"] == "coulomb_friction"
