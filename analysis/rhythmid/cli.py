@@ -58,7 +58,7 @@ for _module in pkgutil.iter_modules(commands.__path__):
     if _module.name not in PARTS:
         _name = _module.name
         _code = importlib.import_module(f"rhythmid.commands.{_name}")
-        app.command(name=_name, epilog=epilog(getattr(_code, "EXAMPLES", ())))(getattr(_code, _name))
+        app.command(name=_name, epilog=epilog(_code.EXAMPLES))(getattr(_code, _name))
 
 
 def main() -> None:

@@ -17,6 +17,7 @@ from rhythmid.record.outlier import without_outliers
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import clipped_samples
 from rhythmid.record.record import Record
+from rhythmid.report.quantity import number
 
 Array = NDArray[np.float64]
 MOSTLY = 0.5  # share of clipped samples beyond which a record is useless
@@ -78,7 +79,7 @@ def without_clipped(record: Record) -> tuple[Record, tuple[str, ...]]:
     # the samples beside a limit are often half clipped by the sensor's own averaging
     near = bad | np.concatenate([[False], bad[:-1]]) | np.concatenate([bad[1:], [False]])
     kept = replace(channel, time=channel.time[~near], value=channel.value[~near])
-    note = f"{record.name}: {int(bad.sum())} samples of the output ({100 * share:.2g} %) are clipped at {limits} {channel.unit} and left out"
+    note = f"{record.name}: {int(bad.sum())} samples of the output ({number(100 * share, 2)} %) are clipped at {limits} {channel.unit} and left out"
     return replace(record, output=kept), (note,)
 
 
