@@ -67,17 +67,24 @@ naming: install ## Compare the naming of missing physics with PySINDy and a Gaus
 docs: install ## Build the documentation site into site/, without warnings
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 
-picture: install ## Draw the pictures of the README
+picture: install ## Draw the pictures of README and docs (needs Chromium)
 	$(BIN)/python docs/signal_path.py
 	$(BIN)/python docs/delay_noise.py
+	$(BIN)/python docs/report_picture.py
 
 docker: install ## Build the image and run the graph in containers, with buildah and without any engine
 	$(BIN)/python docker/without_engine.py
 
-dist: install ## Build the package's wheel and sdist into dist/ and check them
+dist: install ## Build the package's wheel and sdist into dist/, check them, and run the wheel in an empty environment
+	rm -rf dist
 	$(BIN)/python -m pip install --quiet build twine
 	$(BIN)/python -m build --outdir dist analysis
 	$(BIN)/python -m twine check --strict dist/*
+	$(PYTHON) -m venv --clear build/empty
+	build/empty/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	cd build && empty/bin/rhythmid simulate $(CURDIR)/analysis/rhythmid/models/paper_hopper.yaml \
+		--experiment $(CURDIR)/ros_ws/src/rhythmid_bringup/config/lockstep.yaml --out empty/bag
+	cd build && empty/bin/rhythmid check empty/bag
 
 vendor: ## Fetch the library that draws the figures of reports (needs npm)
 	cd $(UPLOT) && npm pack --silent uplot@$(UPLOT_VERSION) && \

@@ -1,4 +1,4 @@
-"""rhythmid identifies rhythmic robots: harmonic transfer functions, parameters, delays and missing physics, from bags.
+"""rhythmid finds out why a simulation disagrees with a robot: missing physics, parameters, delays and transfer functions, from recordings.
 
 Start with `load`, `Model.load`, `identify` and `diagnose`; docs/python.md shows the whole way. Everything is imported where it is
 first used, so that `import rhythmid` itself is fast.

@@ -18,7 +18,7 @@ NAME = "rhythmid"
 NARROW = 80  # columns below which framed help would cut off the options' names
 app = typer.Typer(
     name=NAME,
-    help="Identify rhythmic robots from their recordings, and name the physics that a model lacks.",
+    help="Find out why a simulation disagrees with a robot: name the physics that a model lacks, and identify parameters and delays, from recordings.",
     epilog=epilog(["rhythmid diagnose bag --model model.yaml", "rhythmid COMMAND --help"]),
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -58,7 +58,7 @@ for _module in pkgutil.iter_modules(commands.__path__):
     if _module.name not in PARTS:
         _name = _module.name
         _code = importlib.import_module(f"rhythmid.commands.{_name}")
-        app.command(name=_name, epilog=epilog(getattr(_code, "EXAMPLES", ())))(getattr(_code, _name))
+        app.command(name=_name, epilog=epilog(_code.EXAMPLES))(getattr(_code, _name))
 
 
 def main() -> None:

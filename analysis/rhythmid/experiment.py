@@ -58,7 +58,48 @@ def plant_model(model: Model, forcing: Forcing, noise: Noise, catalogue: Catalog
 
 @dataclass(frozen=True)
 class Experiment:
-    """A run, completely described."""
+    """A run, completely described.
+
+    Attributes
+    ----------
+    model, model_path
+        The machine, and the file that it was read from.
+    excitation, excitation_spec
+        The command over time, and how the file describes it.
+    forcing
+        Made on the machine: amplitude [N], frequency [Hz], phase [rad].
+    input_delay, measurement_delay
+        Of command and measurement [s], or profiles of them.
+    noise
+        Of the measurement: standard deviation [m or rad], colour, quantisation.
+    time
+        Real time or lockstep, rate [Hz], layout of the nodes.
+    duration
+        Of the run [s].
+    seed
+        Of noise and random excitations.
+    initial
+        Position and velocity at the start; None begins on the limit cycle.
+    safety
+        Limits of effort, position and speed.
+    record
+        The bag, and which topics it holds.
+    namespace, joint
+        Under which names the nodes speak.
+    folder
+        From which relative paths start.
+    elements
+        Folders with elements of one's own.
+
+    Examples
+    --------
+    `Experiment.load` reads a file; a mapping does where a function takes an experiment.
+
+    >>> import rhythmid as rh
+    >>> run = rh.simulate(rh.paper_hopper(), {"excitation": {"type": "chirp", "amplitude": 0.01, "sweep": 2.0}})
+    >>> run.experiment.duration, run.experiment.count
+    (2.0, 2000)
+    """
 
     model: Model
     model_path: Path
@@ -71,7 +112,7 @@ class Experiment:
     time: TimeMode = TimeMode()
     duration: float = 0.0
     seed: int = 0
-    initial: tuple[float, float] | None = None  # None: on the limit cycle
+    initial: tuple[float, float] | None = None
     safety: Safety = Safety()
     record: Recording = Recording()
     namespace: str = "/hopper"

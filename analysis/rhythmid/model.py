@@ -70,6 +70,21 @@ class Model:
         The elements in the order of the path.
     units
         In which forces and positions are counted.
+
+    Examples
+    --------
+    >>> model = Model.from_text(
+    ...     '''
+    ... inertia: {mass: {value: 1.0, unit: kg, fixed: true}}
+    ... force:
+    ...   - linear_spring: {stiffness: {value: 200.0, unit: N/m}, rest_length: {value: 0.0, unit: m, fixed: true}}
+    ...   - viscous_damper: {damping: {value: 1.0, unit: N*s/m}}
+    ... '''
+    ... )
+    >>> sorted(model.free)
+    ['linear_spring.stiffness', 'viscous_damper.damping']
+    >>> model.with_values({"viscous_damper.damping": 1.5}).value("viscous_damper.damping")
+    1.5
     """
 
     mass: Value

@@ -33,6 +33,13 @@ class OfflineRun(Result):
         As it was run.
     messages
         What each topic carries, by its name within the namespace; the true motion is `plant/joint_states`.
+
+    Examples
+    --------
+    >>> import rhythmid as rh
+    >>> run = rh.simulate(rh.paper_hopper(), {"excitation": {"type": "chirp", "amplitude": 0.01, "sweep": 2.0}})
+    >>> sorted(run.record.channels)
+    ['forcing', 'input', 'output']
     """
 
     experiment: Experiment

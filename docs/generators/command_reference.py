@@ -11,7 +11,7 @@ HEAD = """# The command line
 
 This page is generated from the commands; `rhythmid COMMAND --help` prints the same.
 
-Exit code 0: an answer was reached, also when nothing is missing. 2: bad usage or bad input, told in one line. 1: a failure of
+Exit code 0: an answer was reached, also when nothing is missing. 2: bad usage or bad input, with one line that says what. 1: a failure of
 rhythmid. 130: interrupted. Nothing that exists is overwritten.
 """
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from axes import axis, axis_model
+from legible import DRAWINGS, FAINT, OVER_THE_EDGE
 
 from rhythmid.diagnose.answer.present import present
 from rhythmid.diagnose.diagnosis import diagnose
@@ -15,7 +16,7 @@ from rhythmid.report.page import write_page
 
 CANDIDATES = {"coulomb_friction", "cubic_stiffness", "flight_damping", "sensor_lag"}
 SECTIONS = (
-    "Where model and machine part", "What is missing", "How much better it fits", "What is left unexplained",
+    "Where model and machine differ", "What is missing", "How much better it fits", "What is left unexplained",
     "Harmonics of the cycle and transfer functions", "The hypotheses", "What is not believed, and why", "Parameters", "Delays", "What remains unknown",
     "The next experiment", "Calibration", "What was assumed",
     "Quality of the records", "How to reproduce this",
@@ -85,11 +86,7 @@ def test_nothing_runs_over_the_edge(browser, report: Path, width: int) -> None:
     browser.open(report, width)
     browser.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
     assert browser.evaluate("document.documentElement.scrollWidth") <= width
-    over = browser.evaluate(
-        "[...document.querySelectorAll('main *:not(svg *)')].filter(e => e.getBoundingClientRect().right > innerWidth + 1"
-        " && getComputedStyle(e).position !== 'absolute' && !e.closest('thead')).map(e => e.outerHTML.slice(0, 80))"
-    )
-    assert over == []
+    assert browser.evaluate(OVER_THE_EDGE) == []
 
 
 def test_a_report_by_effort_stays_within_the_page_too(browser, tmp_path: Path) -> None:
@@ -120,22 +117,13 @@ def test_every_drawing_is_drawn_and_its_text_stays_inside_and_legible(
     browser.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
     browser.evaluate("document.querySelector('.drawings').click()")
     assert browser.evaluate("[...document.images].every(i => i.complete && i.naturalWidth > 0)")
-    drawn = browser.evaluate(
-        """[...document.querySelectorAll('figure svg[role=img]')].filter(s => s.checkVisibility()).map(s => {
-            const frame = s.getBoundingClientRect();
-            const texts = [...s.querySelectorAll('text')].map(t => t.getBoundingClientRect());
-            return {
-                label: s.getAttribute('aria-label'), width: frame.width, height: frame.height,
-                outside: texts.filter(t => t.left < frame.left - 1 || t.right > frame.right + 1 || t.top < frame.top - 1
-                                           || t.bottom > frame.bottom + 1).length,
-                size: Math.min(...texts.map(t => t.height)),
-            }})"""
-    )
+    drawn = browser.evaluate(DRAWINGS)
     assert len(drawn) >= 12
     for one in drawn:
         assert one["width"] > 250 and one["height"] > 50, one
         assert one["outside"] == 0, one
         assert one["size"] >= 9.0, one
+        assert one["touching"] == [], one
 
 
 def test_the_faulty_slot_is_marked_in_the_path_that_is_shown(browser, report: Path) -> None:
@@ -152,31 +140,7 @@ def test_the_faulty_slot_is_marked_in_the_path_that_is_shown(browser, report: Pa
 def test_text_stands_out_from_its_background(browser, report: Path, dark: bool) -> None:
     """WCAG 2.1, success criterion 1.4.3: a contrast of at least 4.5 for text, drawings' text included."""
     browser.open(report, 1200, dark)
-    faint = browser.evaluate(
-        """(() => {
-            const rgb = c => c.match(/[\\d.]+/g).map(Number);
-            const light = c => rgb(c).slice(0, 3).map(v => v / 255).map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
-                .reduce((s, v, i) => s + v * [0.2126, 0.7152, 0.0722][i], 0);
-            const behind = e => { for (; e; e = e.parentElement) { const c = getComputedStyle(e).backgroundColor;
-                if (rgb(c).length < 4 || rgb(c)[3] > 0) return c } return 'rgb(255,255,255)' };
-            const found = [];
-            for (const e of document.querySelectorAll('main p, main td, main th, main li, figcaption, h1, h2, .kicker, dt, dd, svg text,'
-                + '.legend button, .tools button, .hint, .hint button, .y-label, .tip')) {
-                if (!e.checkVisibility() || e.classList.contains('flag-text')) continue;
-                const svg = e instanceof SVGElement;
-                const [a, b] = [light(svg ? getComputedStyle(e).fill : getComputedStyle(e).color), light(behind(e))].sort((x, y) => y - x);
-                if ((a + 0.05) / (b + 0.05) < 4.5) found.push([(a + 0.05) / (b + 0.05), e.textContent.slice(0, 40)]);
-            }
-            // 1.4.11: curves are told from their ground at a contrast of 3
-            const style = name => { const p = document.createElement('p'); p.style.color = `var(--${name})`; document.body.append(p);
-                const c = getComputedStyle(p).color; p.remove(); return light(c) };
-            for (const name of ['measured', 'before', 'after', 'third']) {
-                const [a, b] = [style(name), style('paper')].sort((x, y) => y - x);
-                if ((a + 0.05) / (b + 0.05) < 3) found.push([(a + 0.05) / (b + 0.05), name]);
-            }
-            return found })()"""
-    )
-    assert faint == []
+    assert browser.evaluate(FAINT) == []
 
 
 def test_in_print_everything_folded_is_unfolded(browser, report: Path) -> None:

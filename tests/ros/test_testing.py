@@ -1,4 +1,4 @@
-"""`rhythmid.testing`: what the README shows runs as printed, and a node that fails makes the test fail with what it said."""
+"""`rhythmid.testing`: what its page shows runs as printed, and a node that fails makes the test fail with what it said."""
 
 import os
 import re
@@ -28,9 +28,9 @@ def run_tests(folder: Path, text: str, *options: str) -> subprocess.CompletedPro
     )  # fmt: skip
 
 
-def test_the_example_of_the_readme_runs_as_printed(tmp_path):
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    shown = re.search(r"```python\n(# test_my_filter.py\n.*?)```", readme, re.DOTALL)
+def test_the_example_of_the_page_runs_as_printed(tmp_path):
+    page = (ROOT / "docs" / "testing.md").read_text(encoding="utf-8")
+    shown = re.search(r"```python\n(# test_my_filter.py\n.*?)```", page, re.DOTALL)
     assert shown is not None
     done = run_tests(tmp_path, shown[1])
     assert done.returncode == 0, done.stdout

@@ -32,6 +32,18 @@ def table(tmp_path):
     return path
 
 
+def test_the_readme_shows_the_commands_that_init_prints(table, rhythmid):
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    section = readme.partition("\n## Only bags\n")[2].partition("\n## ")[0]
+    shown = [line.split()[1:] for line in section.splitlines() if line.startswith("    rhythmid ")]
+    assert [one[0] for one in shown] == ["init", "check", "diagnose"]
+    begun = rhythmid(*shown[0])
+    assert (begun.returncode, begun.stderr) == (0, "")
+    assert [
+        line.split()[1:] for line in begun.stdout.splitlines() if line.startswith("  rhythmid ")
+    ] == shown[1:]
+
+
 @pytest.fixture
 def bag(tmp_path):
     """A robot's bag: states of three joints, and their torques in one array without names or stamps; the knee has dry friction."""

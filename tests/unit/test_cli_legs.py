@@ -61,7 +61,7 @@ def test_friction_that_was_concealed_in_a_knee_is_named_there(bags: Path):
     assert friction["probability"] > 0.8 and friction["heldout_gain"] > 0.02
     assert found["joints"]["hip"]["verdict"] == "consistent"
     page = (bags / "report.html").read_text()
-    assert "Missing physics: coulomb friction at knee" in page
+    assert "Missing physics: Coulomb friction at knee" in page
     assert page.count('class="slot faulty"') == 1 and "Parameters at knee" in page
     assert "Effort at knee over time" in page and "hip: consistent" in page
     assert "knee" in printed and "coulomb_friction" in better.read_text()
@@ -89,7 +89,7 @@ def test_a_leg_is_answered_in_a_batch_as_alone(bags: Path):
     assert not answered.failure and task.machine
     values = {one.name: one for one in answered.values}
     assert values["knee.coulomb_friction.force"].value == pytest.approx(0.3, abs=0.02)
-    assert "knee: coulomb friction" in (bags / "batch" / "answers" / f"{task.file}.html").read_text()
+    assert "knee: Coulomb friction" in (bags / "batch" / "answers" / f"{task.file}.html").read_text()
 
 
 def test_an_exported_leg_in_a_loop_of_mujocos_own_is_nearer_to_the_recording_with_its_paths_applied(

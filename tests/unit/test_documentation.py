@@ -81,7 +81,7 @@ def test_the_files_of_other_machines_are_read_and_fit_together(machine, tmp_path
 )
 def test_links_lead_to_files_that_exist(document):
     text = (ROOT / document).read_text(encoding="utf-8")
-    for target in re.findall(r"\]\(([^)#]+)\)", text):
+    for target in re.findall(r"\]\((?!https?:)([^)#]+)", text) + re.findall(r"<img src=\"([^\"]+)", text):
         assert (ROOT / document).parent.joinpath(target).exists(), target
 
 

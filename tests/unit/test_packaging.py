@@ -101,7 +101,19 @@ def test_the_metadata_says_what_the_package_is(wheel):
     assert said["Requires-Python"] and "Programming Language :: Python :: 3.11" in said.get_all(
         "Classifier", []
     )
-    assert {"notebook", "parquet", "ros"} <= set(said.get_all("Provides-Extra", []))
+    assert {"batch", "legs", "notebook", "parquet", "report", "ros", "testing"} <= set(
+        said.get_all("Provides-Extra", [])
+    )
+    assert any("hdl.handle.net" in one for one in said.get_all("Project-URL", []))
+
+
+def test_the_python_on_the_package_page_runs_as_printed(tmp_path):
+    page = (ANALYSIS / "README.md").read_text(encoding="utf-8")
+    shown = re.search(r"```python\n(.*?)```", page, re.DOTALL)
+    assert shown is not None
+    (tmp_path / "shown.py").write_text(shown[1], encoding="utf-8")
+    said = run(sys.executable, "shown.py", cwd=tmp_path, PYTHONPATH=str(ANALYSIS))
+    assert "linear_spring.stiffness" in said and "Nothing of practical size is missing" in said
 
 
 def test_the_installed_wheel_runs_without_the_checkout(site, tmp_path):

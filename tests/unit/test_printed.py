@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+from rhythmid.commands.machines import left_words
 from rhythmid.diagnose.answer.printed import rejection_words, remainder_words, scoring_words, show
 from rhythmid.diagnose.answer.result import (
     Detection,
@@ -147,3 +148,16 @@ def test_the_verdict_is_not_said_twice():
 def test_several_names_come_with_their_joint_probability():
     lag = replace(FRICTION, element="actuator_lag")
     assert "joint probability of these names: 97 %" in printed(replace(ANSWER, missing=(FRICTION, lag)))
+
+
+@pytest.mark.parametrize(
+    ("verdict", "left", "words"),
+    [
+        ("missing_physics", Remainder(1.0, True, "velocity", None), "100 % of the mismatch"),
+        ("missing_physics", Remainder(0.034, True, "velocity", None), "3 % of the mismatch"),
+        ("missing_physics", Remainder(0.0, False, None, None), "noise"),
+        ("consistent", Remainder(1.0, True, "velocity", None), "—"),
+    ],
+)
+def test_what_is_left_at_a_joint_is_a_plain_share_and_nothing_where_nothing_is_missing(verdict, left, words):
+    assert left_words(replace(ANSWER, verdict=verdict, remainder=left)) == words

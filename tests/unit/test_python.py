@@ -30,6 +30,14 @@ FUNCTIONS = {
     "load": "rhythmid.record.load",
     "simulate": "rhythmid.offline_run",
 }
+CLASSES = {  # with an example of their own
+    "Experiment": "rhythmid.experiment",
+    "Identification": "rhythmid.identify.identification",
+    "JointCovariance": "rhythmid.identify.joint_covariance",
+    "Model": "rhythmid.model",
+    "OfflineRun": "rhythmid.offline_run",
+    "Record": "rhythmid.record.record",
+}
 IMPORT = 0.1  # s of processor time
 OSCILLATOR = """
 inertia: {mass: {value: 1.0, unit: kg, fixed: true}}
@@ -89,7 +97,13 @@ def test_a_function_has_its_signature_and_a_documented_example(name, module):
         assert section in inspect.getdoc(function), section
 
 
-@pytest.mark.parametrize("module", FUNCTIONS.values())
+@pytest.mark.parametrize(("name", "module"), CLASSES.items())
+def test_a_class_has_its_attributes_and_a_documented_example(name, module):
+    described = inspect.getdoc(getattr(importlib.import_module(module), name)) or ""
+    assert "Attributes\n" in described and "Examples\n" in described and ">>> " in described
+
+
+@pytest.mark.parametrize("module", sorted({*FUNCTIONS.values(), *CLASSES.values()}))
 def test_the_examples_of_the_docstrings_run(module):
     outcome = doctest.testmod(importlib.import_module(module))
     assert outcome.attempted > 0 and outcome.failed == 0

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rhythmid.report.chart import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Chart, Curve, draw, linear_ticks
+from rhythmid.report.evidence_chart import Evidence, draw_evidence
 from rhythmid.report.row_chart import Bar, Change, draw_bars, draw_changes
 from rhythmid.report.signal_path import SlotContent, draw_signal_path
 from rhythmid.report.state_map import draw_maps, state_map
@@ -131,3 +132,28 @@ def test_a_fault_in_the_clocks_is_marked() -> None:
     svg = draw_signal_path({"timing": SlotContent((), ("Clock skew",))}, True, "the path")
     assert svg.count("clocks faulty") == 2
     assert 'class="slot faulty"' not in svg
+
+
+@pytest.mark.parametrize("kind", ["bars", "changes", "evidence"])
+def test_names_of_rows_do_not_touch_however_many_lines_they_need(kind: str) -> None:
+    names = [
+        "short",
+        "a name that needs quite a few words more than others do",
+        "two lines of a name, no more",
+        "last",
+    ]
+    svg = {
+        "bars": lambda: draw_bars("", [Bar(name, 1.0, "1") for name in names]),
+        "changes": lambda: draw_changes("", [Change(name, 2.0, 1.0) for name in names], "x"),
+        "evidence": lambda: draw_evidence(
+            "", [Evidence(name, 1.0, 0.1, "1 %") for name in names], 3.7, "40 to 1", "p"
+        ),
+    }[kind]()
+    lines = [
+        [float(line.attrib["y"]) for line in text.iter(f"{SVG}tspan")]
+        for text in ElementTree.fromstring(svg).iter(f"{SVG}text")
+    ]
+    lines = [one for one in lines if one]
+    assert [len(one) for one in lines] == [1, 3, 2, 1]
+    for upper, lower in zip(lines, lines[1:], strict=False):
+        assert lower[0] - upper[-1] >= 13.0

@@ -83,7 +83,7 @@ def test_a_value_that_was_set_free_is_not_called_an_effect() -> None:
 def test_the_diagnosis_shows_all_that_it_promises() -> None:
     html = render(diagnosis_page(findings(result())))
     for promised in (
-        "Where model and machine part", "What is missing", "How much better it fits", "What is left unexplained",
+        "Where model and machine differ", "What is missing", "How much better it fits", "What is left unexplained",
         "Harmonics of the cycle", "The hypotheses", "What is not believed, and why", "What was assumed", "Parameters", "Delays", "What remains unknown", "The next experiment",
         "Calibration", "Quality of the records", "How to reproduce this", "What was not tried", "dwell at low speed",
         "the forcing acts undelayed", "1 (3 samples lost)", "rhythmid diagnose run 1", "friction force F<sub>c</sub>",
@@ -96,7 +96,7 @@ def test_the_parameters_table_shows_what_the_refit_had_bent() -> None:
     row = next(r for r in re.findall(r"<tr.*?</tr>", html) if "linear spring: stiffness" in r and "180" in r)
     text = re.sub("<[^>]+>", " ", row).replace("\u00a0", " ")
     assert "201.00 ± 0.20" in text and "200.00 ± 0.20" in text and "−0.5" in text
-    new = next(r for r in re.findall(r"<tr.*?</tr>", html) if "coulomb friction: force" in r and "new" in r)
+    new = next(r for r in re.findall(r"<tr.*?</tr>", html) if "Coulomb friction: force" in r and "new" in r)
     assert "marked" in new
 
 

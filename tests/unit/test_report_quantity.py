@@ -4,7 +4,16 @@ import math
 
 import pytest
 
-from rhythmid.report.quantity import estimate, number, percent, plain, plus_minus, pretty_unit, scaled
+from rhythmid.report.quantity import (
+    estimate,
+    in_words,
+    number,
+    percent,
+    plain,
+    plus_minus,
+    pretty_unit,
+    scaled,
+)
 
 
 @pytest.mark.parametrize(
@@ -68,3 +77,17 @@ def test_units_are_set_as_in_print() -> None:
 def test_names_of_the_command_line_become_words() -> None:
     said = plain("linear_spring.stiffness: 0 in the nominal model, 4.3e-05 by chi2 in run_2 of 1.5 s")
     assert said == "linear spring: stiffness: 0 in the nominal model, 4.3 × 10⁻⁵ by χ² in run 2 of 1.5 s"
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("asymmetric_coulomb_friction", "asymmetric Coulomb friction"),
+        ("bouc_wen_hysteresis", "Bouc-Wen hysteresis"),
+        ("lugre_friction", "LuGre friction"),
+        ("dc_motor", "DC motor"),
+        ("sensor_lag", "sensor lag"),
+    ],
+)
+def test_surnames_and_abbreviations_have_their_capitals(name: str, words: str) -> None:
+    assert in_words(name) == words

@@ -142,3 +142,39 @@ def test_the_figures_of_the_summary_are_those_of_the_pages_that_it_sums_up():
     real = (DOCS / "real.md").read_text(encoding="utf-8")
     for before, after in re.findall(r"([\d.]+) → ([\d.]+) %", summary):
         assert f"| {before} → {after} |" in real, before
+
+
+def counted(page: str, row: str) -> tuple[int, int]:
+    """How many, of how many cases, in the row of a table that begins so."""
+    found = re.search(rf"^\| {re.escape(row)} \|.*?\| (\d+) \| (\d+)\b", page, re.MULTILINE)
+    assert found is not None, row
+    return int(found[2]), int(found[1])
+
+
+def test_the_rates_on_the_first_page_and_in_the_texts_are_those_of_the_campaigns():
+    proof = (DOCS / "proof.md").read_text(encoding="utf-8")
+    first, of_first = counted(proof, "single, cluttered: dominant effect first")
+    wrong, of_wrong = counted(proof, "single, cluttered: stated with p ≥ 0.8 and wrong")
+    clean, of_clean = counted(proof, "null, clean: something named")
+    untidy, of_untidy = counted(proof, "null, cluttered: something named")
+    relative, of_relative = counted(proof, "left out, cluttered: stated with p ≥ 0.8 and wrong")
+    summary = (DOCS / "validation.md").read_text(encoding="utf-8")
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert of_wrong == of_first and wrong == clean == untidy == 0  # the texts below say "none"
+    assert (
+        f"first in {first} of {of_first} cases" in readme
+        and f"first in {first} of {of_first} cases" in summary
+    )
+    assert f"nothing named in {of_clean} clean cases, nor in {of_untidy} with untidy logs" in readme
+    assert f"in 0 of {of_clean} clean cases" in summary and f"in 0 of {of_untidy} with untidy logs" in summary
+    for page in (readme, summary, (DOCS / "missing_physics.md").read_text(encoding="utf-8")):
+        assert f"{relative} of {of_relative}" in page
+
+
+def test_the_real_recordings_on_the_first_page_are_those_of_the_summary():
+    summary = (DOCS / "validation.md").read_text(encoding="utf-8")
+    pairs = re.findall(
+        r"^\| (?:recordings of|simulated machines).*right in (\d+) of (\d+)", summary, re.MULTILINE
+    )
+    right, cases = (sum(map(int, column)) for column in zip(*pairs))
+    assert f"right in {right} of {cases}" in (ROOT / "README.md").read_text(encoding="utf-8")

@@ -428,8 +428,8 @@ def test_a_name_is_stated_only_where_the_records_tell_it_from_others_by_far(marg
     ("elements", "said"),
     [
         (("inertia.mass",), "comes out at 0.3, and that predicts"),
-        (("coulomb_friction", "inertia.mass"), "and that with coulomb friction predicts"),
-        (("inertia.mass", "coulomb_friction"), "and that with coulomb friction predicts"),
+        (("coulomb_friction", "inertia.mass"), "and that with Coulomb friction predicts"),
+        (("inertia.mass", "coulomb_friction"), "and that with Coulomb friction predicts"),
         (("inertia.mass", "linear_spring.stiffness"), "0.3. linear_spring.stiffness is held at 200 N/m"),
     ],
 )

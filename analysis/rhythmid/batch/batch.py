@@ -34,6 +34,10 @@ class Batch(Result):
     answers : every task of the manifest, in its order, with its answer, or with the reason why there is none.
     agreements : every parameter that several answers estimate, compared.
     folder : that keeps the answers, the table and the index page.
+
+    Examples
+    --------
+    `found.agreements` compares each parameter over the runs, `found.to_dataframe()` holds all values; see `batch`.
     """
 
     answers: tuple[tuple[Task, Answered], ...]

@@ -9,7 +9,7 @@ With a recording (a bag or a table):
     guesses channels and a model
   rhythmid check RECORDING \\
     --signals signals.yaml
-    tells whether it can be used
+    says whether it can be used
   rhythmid diagnose RECORDING \\
     --signals signals.yaml \\
     --model model.yaml

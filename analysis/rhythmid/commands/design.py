@@ -110,7 +110,7 @@ def design(
     json: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
-    """Design an experiment: the signal to play, as large as the machine bears, and every parameter's predicted uncertainty."""
+    """Design an experiment: the signal to play, as large as the limits allow, and every parameter's predicted uncertainty."""
     of_one_axis = {
         "kind": kind, "harmonics": harmonics, "longest_delay": longest_delay, "max_distortion": max_distortion, "shifts": shifts,
         "period": period, "spacing": spacing,

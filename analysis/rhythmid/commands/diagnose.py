@@ -63,9 +63,9 @@ def diagnose(
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Say where records and model part, which physics the model lacks, and how much better it fits with it.
+    """Say where records and model differ, which physics the model lacks, and how much better it fits with it.
 
-    With --sim, first where a simulation's record and the real one part; without --model, only that.
+    With --sim the simulation's record is compared with the real one first; without --model, nothing else is done.
     """
     from rhythmid.elements.catalogue import load_catalogue
     from rhythmid.model import Model

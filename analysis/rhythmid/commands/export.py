@@ -6,9 +6,15 @@ from typing import Annotated
 import typer
 
 from rhythmid.commands import machines
-from rhythmid.commands.options import Elements
+from rhythmid.commands.options import Elements, Quiet
 from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new
+
+EXAMPLES = (
+    "rhythmid export model.yaml --to mujoco",
+    "rhythmid export model.yaml --to urdf --joint knee --out knee.urdf",
+    "rhythmid export leg.yaml --to mujoco --out leg.xml",
+)
 
 
 def export(
@@ -22,6 +28,7 @@ def export(
     ] = None,
     joint: Annotated[str, typer.Option("--joint", help="Name of the joint in the target.")] = "joint",
     elements: Elements = None,
+    quiet: Quiet = False,
 ) -> None:
     """Write damping, friction, stiffness, gain, lag and delay of a model in the words of a simulator.
 
@@ -34,8 +41,9 @@ def export(
     from rhythmid.output import write_text
 
     require_new(out)
+    terminal = Terminal(quiet)
     if machines.is_machine(model):
-        machines.export_file(model, to, out, elements or (), Terminal(quiet=False))
+        machines.export_file(model, to, out, elements or (), terminal)
         return
     described = joint_of(Model.load(model, load_catalogue(tuple(elements or ()))), joint)
     text = exported([described], to, model.name)
@@ -43,4 +51,4 @@ def export(
         typer.echo(text, nl=False)
         return
     write_text(out, text)
-    typer.echo(f"{out}: {joint} for {to}")
+    terminal.say(f"{out}: {joint} for {to}")

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 from rhythmid.errors import InputError
 from rhythmid.output import write_json
-from rhythmid.report.quantity import rounded
+from rhythmid.report.quantity import NONE, number, rounded
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from rhythmid.body.machine import Machine
     from rhythmid.commands.terminal import Terminal
+    from rhythmid.diagnose.answer.result import Diagnosis
     from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
     from rhythmid.elements.catalogue import Catalogue
     from rhythmid.identify.joints.joint_identification import MachineIdentification
@@ -106,7 +107,7 @@ def show_diagnosis(found: "MachineDiagnosis", console: "Console") -> None:
         what = f"mass of {one.link}" if one.link else one.element
         console.print(
             f"[bold]{escape(one.joint)}: {escape(what)}[/]   {escape(one.equation)}   (probability {one.probability:.2f}, "
-            f"{100.0 * one.share:.3g} % of the joint's mismatch)"
+            f"{number(100.0 * one.share, 3)} % of the joint's mismatch)"
         )
         for name, value in one.parameters.items():
             std = "" if value.std is None else f" ± {value.std:.2g}"
@@ -118,10 +119,7 @@ def show_diagnosis(found: "MachineDiagnosis", console: "Console") -> None:
         table.add_column(column)
     for joint, one in found.joints.items():
         before, after = (one.fit[name].heldout_nrmse for name in ("refitted_nominal", "augmented"))
-        left = (
-            f"{100.0 * one.remainder.share:.2g} % of the mismatch" if one.remainder.significant else "noise"
-        )
-        table.add_row(joint, one.verdict.replace("_", " "), _share(before), _share(after), left)
+        table.add_row(joint, one.verdict.replace("_", " "), _share(before), _share(after), left_words(one))
     console.print(table)
     for joint, why in found.not_judged.items():
         console.print(f"not judged: {escape(joint)}: {escape(why)}")
@@ -131,8 +129,17 @@ def show_diagnosis(found: "MachineDiagnosis", console: "Console") -> None:
     console.print(f"next experiment: {escape(found.next_experiment)}")
 
 
+def left_words(one: "Diagnosis") -> str:
+    """What a joint's answer leaves of its mismatch, in words; a dash where there is no mismatch."""
+    if one.verdict == "consistent":
+        return NONE
+    if not one.remainder.significant:
+        return "noise"
+    return f"{100.0 * one.remainder.share:.0f} % of the mismatch"
+
+
 def _share(error: float | None) -> str:
-    return "—" if error is None else f"{100.0 * error:.3g} %"
+    return NONE if error is None else f"{number(100.0 * error, 3)} %"
 
 
 def saved(machine: "Machine", path: Path | None, terminal: "Terminal") -> None:
@@ -204,9 +211,9 @@ def show_identification(found: "MachineIdentification", console: "Console") -> N
             centre = ", ".join(f"{values[name] / values['m']:.4g}" for name in ("mx", "my", "mz"))
             console.print(f"{escape(link)}: mass {values['m']:.4g} kg, centre at ({centre}) m")
     for joint, error in found.effort_nrmse.items():
-        runs = ", ".join(f"{100.0 * one[joint]:.3g} % {name}" for name, one in found.free_run.items())
+        runs = ", ".join(f"{number(100.0 * one[joint], 3)} % {name}" for name, one in found.free_run.items())
         console.print(
-            f"{escape(joint)}: effort missed by {100.0 * error:.3g} %; free run, held out: {runs or 'none'}"
+            f"{escape(joint)}: effort missed by {number(100.0 * error, 3)} %; free run, held out: {runs or 'none'}"
         )
     for label, lines in (("not separable", found.not_separable), ("note", found.notes)):
         for line in lines:

@@ -21,11 +21,14 @@ def recover(
     quiet: Quiet = False,
 ) -> None:
     """Write every whole message of a damaged recording to a new bag, and list what was lost. BAG is left as it is."""
+    from rhythmid.progress_bar import progress
     from rhythmid.record.bag import Bag
     from rhythmid.record.recover import recover as write_recovered
 
     out = out or bag.with_name(f"{Bag(bag).name}_recovered")
     require_new(out)
     terminal = Terminal(quiet)
-    for line in write_recovered(bag, out).lines():
+    with progress(terminal.progress, log=False) as tell:
+        found = write_recovered(bag, out, tell=tell)
+    for line in found.lines():
         terminal.say(line)

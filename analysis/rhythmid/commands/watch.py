@@ -10,6 +10,7 @@ from rhythmid.commands.options import Elements, JsonFile, Quiet, SignalsFile
 from rhythmid.commands.terminal import Terminal
 from rhythmid.errors import InputError
 from rhythmid.output import require_new, write_json
+from rhythmid.report.quantity import number
 
 if TYPE_CHECKING:
     from rhythmid.twin.twin import Status
@@ -50,7 +51,7 @@ def watch(
     json: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
-    """Run a model beside its machine and say when, where and by how much the two part.
+    """Run a model beside its machine and say when, where and by how much the two differ.
 
     Without --bag the running machine is watched over ROS 2 until Ctrl-C.
     """
@@ -95,7 +96,7 @@ def watch(
     if not watching.events.found:
         console.print(f"[green]no mismatch[/] in {result['watched']:.0f} s")
     console.print(
-        f"innovations are {100.0 * result['nrmse']:.2g} % of the motion in healthy operation; "
+        f"innovations are {number(100.0 * result['nrmse'], 2)} % of the motion in healthy operation; "
         f"{false_alarms:g} false alarms a day are allowed"
     )
     if json is not None:

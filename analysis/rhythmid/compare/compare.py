@@ -27,7 +27,7 @@ from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.record import Channel, Record
 from rhythmid.report.comparison import LABELS
-from rhythmid.report.quantity import pretty_unit
+from rhythmid.report.quantity import number, pretty_unit
 from rhythmid.report.run import Run
 from rhythmid.result import Result, Row, axis_or_new, legend_above
 
@@ -153,7 +153,7 @@ class Comparison(Result):
         """The answer in a few sentences; the JSON's `summary`."""
         if not self.comparable:
             return f"Not comparable: different excitation ({self.alignment.mismatch}); with --model the model is run in the simulation's place."
-        size = f"{100 * self.nrmse:.3g} % of the motion"
+        size = f"{number(100 * self.nrmse, 3)} % of the motion"
         started = any(one.slot is None for one in self.explanations)
         if not self.parted:
             return (

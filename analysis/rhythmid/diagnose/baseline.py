@@ -92,7 +92,7 @@ def check_free(model: Model) -> None:
     """Raise InputError for a model of which nothing is estimated."""
     if not model.free:
         raise InputError(
-            "every parameter of the nominal model is fixed, so a wrong value could not be told from missing physics; "
+            "every parameter of the nominal model is fixed, so a wrong value could not be distinguished from missing physics; "
             "free those that are not known exactly (drop 'fixed: true')"
         )
 

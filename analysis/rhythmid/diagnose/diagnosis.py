@@ -36,6 +36,7 @@ from rhythmid.model import Model
 from rhythmid.parallel import cores
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
+from rhythmid.report.quantity import in_words
 from rhythmid.result import Result, Row, axis_or_new
 
 if TYPE_CHECKING:
@@ -55,6 +56,10 @@ class Answer(Result):
         The nominal model with what it lacked, refitted.
     result
         Everything behind the decision.
+
+    Examples
+    --------
+    `answer.diagnosis.verdict`, `answer.diagnosis.missing` and `answer.model` are what most callers read; see `diagnose`.
     """
 
     diagnosis: Diagnosis
@@ -268,6 +273,6 @@ def _compared(answer: Answer, other: Answer) -> Answer:
     ]
     if not all(stated) or stated[0] & stated[1]:
         return answer
-    words = " and ".join(sorted(stated[1])).replace("_", " ")
+    words = in_words(" and ".join(sorted(stated[1])))
     note = f"Scored by effort the same records stand by another name: {words}. Believe neither without another experiment."
     return replace(answer, diagnosis=replace(first, notes=(*first.notes, note)))

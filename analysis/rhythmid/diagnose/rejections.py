@@ -161,7 +161,7 @@ RULES: tuple[Rule, ...] = (
     Rule(
         "share_of_rest",
         "share of the squared error which anything explains, free maps included, that the effect removes",
-        "its share of the remainder is too small to be told from other effects",
+        "its share of the remainder is too small to distinguish it from other effects",
         _share_of_rest,
         lambda _: REST,
     ),

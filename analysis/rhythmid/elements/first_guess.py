@@ -46,7 +46,7 @@ def generic_guesses(element: "Element", scales: "Scales") -> list[dict[str, floa
     """
     if math.isinf(element.absent):
         raise NoGuess(
-            f"its {element.size} is absent at infinity: what size shows cannot be told from its unit"
+            f"its {element.size} is absent at infinity: its unit does not say from what size on it shows"
         )
     cases = (
         [1.0, FURTHER] if any(_open(element, p) and p.unit in SHAPES for p in element.parameters) else [1.0]

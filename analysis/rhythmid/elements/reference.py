@@ -149,7 +149,7 @@ def describe(element: Element) -> str:
     facts.append("- Candidate." if element.candidate else "- Not a candidate.")
     if element.special_case_of:
         facts.append(f"- Special case of {_names(element.special_case_of)}.")
-    facts += [f"- Told from `{name}`: {how}." for name, how in element.confusable.items()]
+    facts += [f"- Confusable with `{name}`: {how}." for name, how in element.confusable.items()]
     facts.append(f"- Reference: {element.reference}.")
     return "\n".join([*lines, *facts, ""])
 

@@ -32,7 +32,22 @@ POINTS = 600  # of an HTF that are written out at most
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with its standard deviation; `value` None where the question has no answer."""
+    """A value with its standard deviation.
+
+    Attributes
+    ----------
+    value
+        None where the records do not determine it.
+    std
+        Standard deviation; None where it is not known.
+    unit
+        Of both.
+
+    Examples
+    --------
+    >>> Estimate(200.1, 0.4, "N/m").to_dict()
+    {'value': 200.1, 'std': 0.4, 'unit': 'N/m'}
+    """
 
     value: float | None
     std: float | None
@@ -44,8 +59,19 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Observables:
-    """What the records show of the delays [s]: the limit cycle's `phase` A = τ_y + δ_f, the `slope` B = τ_u + τ_y, the
-    sidebands' `offset` C = τ_u − δ_f, and `z`, the closure A + C − B in its standard deviations."""
+    """What the records show of the delays.
+
+    Attributes
+    ----------
+    phase
+        Of the limit cycle, A = τ_y + δ_f [s].
+    slope
+        Of the response's phase, B = τ_u + τ_y [s].
+    offset
+        Of the sidebands' phases, C = τ_u − δ_f [s].
+    z
+        The closure A + C − B in its standard deviations.
+    """
 
     phase: Estimate
     slope: Estimate
@@ -58,8 +84,19 @@ class Observables:
 
 @dataclass(frozen=True)
 class InnerDelay:
-    """A dead time inside the machine [s]. Where it is not `separable` it has no value, `reason` says why, and `sums` are those
-    with other delays that are determined, by their elements' labels."""
+    """A dead time inside the machine.
+
+    Attributes
+    ----------
+    delay
+        The dead time [s]; without a value where it is not `separable`.
+    separable
+        Whether the records determine it alone.
+    reason
+        Why not, where they do not.
+    sums
+        With other delays, by their elements' labels, that are determined [s].
+    """
 
     delay: Estimate
     separable: bool = True
@@ -76,13 +113,27 @@ class InnerDelay:
 
 @dataclass(frozen=True)
 class Delays:
-    """Input delay τ_u, measurement delay τ_y and their sum [s].
+    """Delays of command and measurement.
 
-    `separable` tells whether the two can be told apart; if not they have no value. `assumption` is what the split rests
-    on. `closure` is (limit-cycle phase + sideband offset − slope of G_0) in its standard deviations, which a right model
-    keeps near zero; None where one of the three cannot be had. `aliases` are further pairs that fit as well.
-    `intervals` (95 %) are what can be said of delays that cannot be told apart; `undetermined` says in words which
-    changes of parameters the records do not notice. `inner` are dead times inside the machine, by their elements' labels.
+    Attributes
+    ----------
+    input, measurement, sum
+        τ_u, τ_y and τ_u + τ_y [s]. The two have no value where they are not `separable`.
+    separable
+        Whether the records separate the two.
+    assumption
+        What the split rests on.
+    closure
+        Limit-cycle phase + sideband offset − slope of G_0 in its standard deviations, which a right model keeps near zero; None
+        where one of the three is not identifiable.
+    aliases
+        Further pairs that fit as well.
+    intervals
+        95 % intervals of delays that are not separable [s].
+    undetermined
+        In words, the changes of parameters that the records do not show.
+    inner
+        Dead times inside the machine, by their elements' labels.
     """
 
     input: Estimate
@@ -150,6 +201,18 @@ class Identification(Result):
         What the user should know, one line each.
     cautions
         What should keep a user from believing the estimates.
+
+    Examples
+    --------
+    >>> import rhythmid as rh
+    >>> chirp = {"type": "chirp", "amplitude": 0.02, "sweep": 4.0, "repetitions": 2}
+    >>> found = rh.identify(rh.simulate(rh.paper_hopper(), {"excitation": chirp, "time": {"rate": 250}}).record)
+    >>> found.usable, found.delays.separable
+    (True, True)
+    >>> round(found.parameters["linear_spring.stiffness"].value)
+    200
+    >>> len(found.covariance.names) == len(found.covariance.matrix)
+    True
     """
 
     model: Model

@@ -30,6 +30,13 @@ class JointCovariance:
     units : of each.
     matrix : float64[p, p] covariance in the products of their units; rows and columns of a parameter that the records do not
         determine hold infinity on the diagonal and NaN elsewhere.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> found = JointCovariance.of(("k", "c"), ("N/m", "N*s/m"), np.array([[4.0, 1.0], [1.0, 1.0]]))
+    >>> found.correlation.tolist()
+    [[1.0, 0.5], [0.5, 1.0]]
     """
 
     names: tuple[str, ...]

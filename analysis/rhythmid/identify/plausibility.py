@@ -24,6 +24,7 @@ from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.series import Series, dominant_frequency, prepare
 from rhythmid.model import INERTIA, Model
 from rhythmid.record.record import Record
+from rhythmid.report.quantity import number
 
 STRETCH = 15.0  # periods that are looked at: enough for a resonance of 2 % damping to ring down
 SHORT = 4.0  # the same where a search may lose its way over a longer stretch, such as in large swings
@@ -304,7 +305,7 @@ def _words(record: Record, model: Model, declared: Trial, alike: Sequence[Trial]
         said += f" (or {others[0]}: the record does not tell which)"
     if declared.unexplained >= POOR_MOTION:
         before = f"{100 * declared.unexplained:.0f} %" if declared.unexplained < 1.0 else "all of it"
-        return f"{said}; with it the nominal model misses {100 * best.unexplained:.2g} % of the motion, without it {before}"
+        return f"{said}; with it the nominal model misses {number(100 * best.unexplained, 2)} % of the motion, without it {before}"
     return (
         f"{said}; without it the model's values come out {math.exp(declared.shift):.3g} times larger or smaller than given, "
         f"with it within a factor of {math.exp(best.shift):.2g}"

@@ -35,5 +35,5 @@ def digest(path: Path) -> str:
 def unseal(path: Path, told: str) -> dict[str, Any]:
     """The truth. Raises InputError when it is not the one whose hash was told."""
     if digest(path) != told:
-        raise InputError(f"{path}: the seal is broken, its hash is not the one told before the diagnosis")
+        raise InputError(f"{path}: the seal is broken, its hash is not the one written before the diagnosis")
     return json.loads(path.read_text(encoding="utf-8"))

@@ -29,7 +29,26 @@ NEAR = 0.1  # periods; samples that follow another sooner are left out of an int
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """Samples of one signal: `time` [s] relative to the record's start, increasing, and `value` [unit]; float64[n]."""
+    """Samples of one signal.
+
+    Attributes
+    ----------
+    time
+        Float64[n], increasing, relative to the record's start [s].
+    value
+        Float64[n], in `unit`.
+    unit
+        SI unit, such as "m" or "N".
+    source
+        Topic and field, or column, that the samples come from.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> channel = Channel(np.arange(5) * 0.25, np.zeros(5), "m")
+    >>> len(channel), channel.period
+    (5, 0.25)
+    """
 
     time: Array
     value: Array
@@ -107,6 +126,18 @@ class Record(Result):
         What parameters of the model, by "element.parameter", were in this record, where that is declared.
     whole
         Name of the record that this one is a stretch of; empty for a whole one.
+
+    Examples
+    --------
+    A record of arrays at hand; `rhythmid.load` makes one of a bag or a table.
+
+    >>> import numpy as np
+    >>> time = np.arange(0.0, 10.0, 0.01)
+    >>> record = Record("swing", Channel(time, 0.1 * np.cos(time), "rad"), Channel(time, np.zeros(1000), "N*m"))
+    >>> list(record.channels)
+    ['input', 'output']
+    >>> record.headline
+    'swing: 9.99 s of position at 100 Hz'
     """
 
     name: str

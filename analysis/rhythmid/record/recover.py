@@ -1,5 +1,6 @@
 """Recovery of a recording whose recorder was killed: what is readable becomes a complete bag."""
 
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import groupby
@@ -11,6 +12,7 @@ from rosbags.rosbag2 import ReaderError
 from rosbags.rosbag2.metadata import parse_qos
 
 from rhythmid.errors import InputError
+from rhythmid.progress import Tell, silent
 from rhythmid.record.bag import Bag
 from rhythmid.record.bag_writer import BagWriter, Storage, new_bag
 from rhythmid.record.block import Topic
@@ -38,16 +40,20 @@ class Recovered:
         return [f"{self.path}: {sum(self.counts.values())} messages recovered", *found]
 
 
-def recover(path: str | Path, out: str | Path, storage: Storage = "mcap") -> Recovered:
+TELLING = 1.0  # s between two words on how many messages have been written
+
+
+def recover(path: str | Path, out: str | Path, storage: Storage = "mcap", tell: Tell = silent) -> Recovered:
     """Write every whole message of the bag `path`, broken off or damaged as it may be, to the new bag `out`.
 
-    Topics, types, receive times and QoS are kept; the old bag is not touched. Raises InputError when nothing can be
-    read, or `out` exists or cannot be written.
+    Topics, types, receive times and QoS are kept; the old bag is not touched. `tell` is told now and then how many messages
+    have been written. Raises InputError when nothing can be read, or `out` exists or cannot be written.
     """
     bag = Bag(path, verify=True)
     connections: dict[str, Connection] = {}
     counts: dict[str, int] = {}
     left_out: dict[str, str] = {}
+    told = time.monotonic()
     with new_bag(out, storage) as writer:
         # blocks of one buffer belong together: their messages are put back in the order of recording
         for _, together in groupby(bag.blocks(), key=lambda block: id(block.buffer)):
@@ -60,15 +66,18 @@ def recover(path: str | Path, out: str | Path, storage: Storage = "mcap") -> Rec
                     except InputError as error:
                         left_out[name] = f"left out: {error}"
             messages = [
-                (start, block.topic.name, time, data)
+                (start, block.topic.name, stamp, data)
                 for block in blocks
                 if block.topic.name in connections
-                for start, time, data in zip(block.start.tolist(), block.log_ns.tolist(), block)
-                if time >= 0  # no clock reads less: such a message is damaged
+                for start, stamp, data in zip(block.start.tolist(), block.log_ns.tolist(), block)
+                if stamp >= 0  # no clock reads less: such a message is damaged
             ]
-            for _, name, time, data in sorted(messages, key=itemgetter(0)):
-                writer.write(connections[name], time, data)
+            for _, name, stamp, data in sorted(messages, key=itemgetter(0)):
+                writer.write(connections[name], stamp, data)
                 counts[name] = counts.get(name, 0) + 1
+            if time.monotonic() - told >= TELLING:
+                told = time.monotonic()
+                tell(f"{sum(counts.values())} messages recovered so far")
         if not counts:
             raise InputError(f"{path}: holds no readable message; nothing was recovered")
     return Recovered(Path(out), counts, (*bag.notes, *left_out.values()), bag.lost(counts))

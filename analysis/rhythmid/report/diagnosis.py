@@ -184,13 +184,17 @@ def _families(found: Findings) -> list[Block]:
     groups = found.result["indistinguishable"]
     if not groups:
         return [Paragraph("No other single element explains these records equally well.", "note")]
-    blocks: list[Block] = [Heading("What these records cannot tell apart")]
+    blocks: list[Block] = [Heading("What these records do not separate")]
     for group in groups:
         names = [found.title(name) for name in group]
-        hints = dict.fromkeys(words for a, b, words in found.hints if {a, b} <= set(group))
-        blocks.append(Paragraph(f"{' or '.join(names)}: one of these."))
+        hints = {
+            (frozenset((a, b)), words): f"{found.title(a)} and {found.title(b)}: {words}"
+            for a, b, words in found.hints
+            if {a, b} <= set(group)
+        }
+        blocks.append(Paragraph(f"One of these: {', '.join(names[:-1])} or {names[-1]}."))
         if hints:
-            blocks.append(Bullets(tuple(f"to tell them apart: {words}" for words in hints)))
+            blocks.append(Bullets(tuple(hints.values())))
     return blocks
 
 

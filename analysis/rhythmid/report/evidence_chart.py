@@ -7,7 +7,7 @@ from html import escape
 
 from rhythmid.report.chart import WIDTH, opening
 from rhythmid.report.quantity import number
-from rhythmid.report.row_chart import row_label, row_label_width
+from rhythmid.report.row_chart import row_heights, row_label, row_label_width
 
 ROW = 34.0
 NUMBERS = 88.0  # width of the column with probabilities
@@ -42,7 +42,8 @@ def draw_evidence(alt: str, rows: Sequence[Evidence], level: float, level_label:
         return left + 4.0 + _compressed(max(value, 0.0)) / most * (right - left - 16.0)
 
     top = 30.0
-    bottom = top + ROW * len(rows)
+    heights = row_heights([row.label for row in rows], ROW)
+    bottom = top + sum(heights)
     parts = [opening(WIDTH, bottom + 38.0, alt)]
     for tick in _ticks(most, right - left):
         at = place(tick)
@@ -59,9 +60,10 @@ def draw_evidence(alt: str, rows: Sequence[Evidence], level: float, level_label:
     parts.append(
         f'<text class="note" x="{WIDTH - 2:.1f}" y="{top - 8:.1f}" text-anchor="end">{escape(heading)}</text>'
     )
-    parts += [
-        part for index, row in enumerate(rows) for part in _row(row, top + ROW * (index + 0.5), left, place)
-    ]
+    below = top
+    for row, tall in zip(rows, heights, strict=True):
+        parts += _row(row, below + 0.5 * tall, left, place)
+        below += tall
     return "".join([*parts, "</svg>"])
 
 

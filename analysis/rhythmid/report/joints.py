@@ -22,7 +22,17 @@ from rhythmid.report.blocks import (
 )
 from rhythmid.report.chart import Chart, Curve
 from rhythmid.report.page import Page, Tone
-from rhythmid.report.quantity import NONE, number, percent, plain, pretty_name, sentence, with_unit
+from rhythmid.report.quantity import (
+    NONE,
+    number,
+    percent,
+    plain,
+    pretty_name,
+    pretty_unit,
+    probability,
+    sentence,
+    with_unit,
+)
 from rhythmid.report.robot_figure import DrawnJoint, robot_svg
 from rhythmid.report.sections import reproduce_section
 
@@ -60,7 +70,7 @@ def joints_page(
         title=f"rhythmid diagnosis: {verdict}",
         kicker=f"Diagnosis of {source}",
         verdict=verdict,
-        words=str(result["summary"]),
+        words=plain(str(result["summary"])),
         tone=tone,
         tiles=Tiles(()),
         sections=(
@@ -77,7 +87,7 @@ def joints_page(
 def _robot(robot: Sequence[DrawnJoint]) -> Block:
     faulty = [f"{one.name} ({one.fault})" for one in robot if one.fault]
     alt = f"The robot's joints; marked: {', '.join(faulty) or 'none'}"
-    words = "Circles turn, squares slide. Marked joints lack physics: ! has a name, ? has none."
+    words = "Circles are revolute joints, squares prismatic ones. At red joints physics is missing: ! with a name, ? without."
     return Drawing("The robot", robot_svg(robot, alt), words, wide=True)
 
 
@@ -87,7 +97,8 @@ def _table(result: Mapping[str, Any]) -> Table:
         missing = [pretty_name(m["element"]) for m in result["missing"] if m["joint"] == joint]
         errors = [one["fit"][name]["heldout_nrmse"] for name in ("refitted_nominal", "augmented")]
         rest = one["remainder"]
-        left = f"{percent(rest['share'])} of the mismatch" if rest["significant"] else "noise"
+        left = f"{100.0 * rest['share']:.0f}\u202f% of the mismatch" if rest["significant"] else "noise"
+        left = NONE if one["verdict"] == "consistent" else left
         shown = [NONE if error is None else percent(error) for error in errors]
         rows.append((joint, one["verdict"].replace("_", " "), ", ".join(missing) or NONE, *shown, left))
         if one["verdict"] != "consistent":
@@ -105,7 +116,8 @@ def _missing(result: Mapping[str, Any]) -> list[Block]:
         where = f"{one['joint']}, slot {one['slot']}: {pretty_name(one['element'])}"
         blocks.append(
             Paragraph(
-                f"{where}. Probability {number(one['probability'], 2)}; {percent(one['share'])} of the joint's mismatch."
+                f"{where}. It explains {percent(one['share'])} of the joint's mismatch; the probability of the name is "
+                f"{probability(one['probability'])}."
             )
         )
         blocks.append(Equation(one["equation"]))
@@ -127,7 +139,7 @@ def _efforts(result: Mapping[str, Any], curves: Mapping[str, JointCurves]) -> li
         chart = Chart(
             f"Effort at {joint} over time, measured and predicted",
             "time [s]",
-            f"effort [{one.unit}]",
+            f"effort [{pretty_unit(one.unit)}]",
             (
                 Curve(time, one.measured[part], "measured", "measured"),
                 Curve(time, one.nominal[part], "nominal", "before", dashed=True),
@@ -135,7 +147,7 @@ def _efforts(result: Mapping[str, Any], curves: Mapping[str, JointCurves]) -> li
             ),
         )
         shown = drawing(
-            joint, chart, "Filtered as the evidence is; the nominal path is refitted.",
+            joint, chart, "Both are filtered as for the evidence. Nominal: the joint's path, refitted.",
         )  # fmt: skip
         faulty = result["joints"][joint]["verdict"] != "consistent"
         blocks.append(shown if faulty else Fold(f"{joint}: consistent", (shown,)))

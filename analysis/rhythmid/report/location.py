@@ -1,4 +1,4 @@
-"""Where model and machine part, and what stays unexplained: sections of a diagnosis' report."""
+"""Where model and machine differ, and what stays unexplained: sections of a diagnosis' report."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -61,7 +61,7 @@ def location_section(found: Findings) -> Section:
         factor, unit = scaled(abs(place.position), found.output_unit)
         blocks.append(
             Paragraph(
-                f"Model and record part most in “{place.run.name}”, around {number(place.time, 3)} s{phase}, at x = "
+                f"Model and record differ most in “{place.run.name}”, around {number(place.time, 3)} s{phase}, at x = "
                 f"{with_unit(number(factor * place.position, 3), unit)} and v = "
                 f"{with_unit(number(place.velocity, 2), f'{found.output_unit}/s')}; the mismatch is strongest at "
                 f"{number(place.frequency, 3)} Hz, which carries {percent(place.share)} of its power."
@@ -73,7 +73,7 @@ def location_section(found: Findings) -> Section:
     evidence = tuple(result["location"]["evidence"])
     if evidence:
         blocks.append(Fold("The evidence in words", (Bullets(tuple(map(plain, evidence))),)))
-    return Section("Where model and machine part", tuple(blocks))
+    return Section("Where model and machine differ", tuple(blocks))
 
 
 def _slot_scores(found: Findings, slot: str | None) -> Drawing | None:

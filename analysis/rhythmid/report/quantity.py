@@ -11,6 +11,13 @@ DECIMALS = 12  # printed at most: a double has no more near 1
 RARE = 1e-3  # probability below which only that is told
 PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 PREFIXED = {"m", "s", "N", "rad", "V", "A", "Hz", "N*m"}
+_SPELT = {
+    "coulomb": "Coulomb",
+    "stribeck": "Stribeck",
+    "bouc wen": "Bouc-Wen",
+    "lugre": "LuGre",
+    "dc motor": "DC motor",
+}
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -23,14 +30,22 @@ def pretty_unit(unit: str) -> str:
     return unit.replace("*", "·")
 
 
+def in_words(names: str) -> str:
+    """Names of elements in words, surnames with capitals: "coulomb_friction" is "Coulomb friction"."""
+    words = names.replace("_", " ")
+    for plain, spelt in _SPELT.items():
+        words = re.sub(rf"\b{plain}\b", spelt, words)
+    return words
+
+
 def pretty_name(name: str) -> str:
-    """An element's or parameter's name in words: "coulomb_friction.force" is "coulomb friction: force"."""
-    return name.replace(".", ": ").replace("_", " ")
+    """An element's or parameter's name in words: "coulomb_friction.force" is "Coulomb friction: force"."""
+    return in_words(name.replace(".", ": "))
 
 
 def plain(text: str) -> str:
     """A line of the command's output as the page says it: names without underscores, χ² and powers of ten spelled out."""
-    text = re.sub(r"\b[a-z][a-z0-9]*(?:_[a-z0-9]+)+\b", lambda found: found[0].replace("_", " "), text)
+    text = re.sub(r"\b[a-z][a-z0-9]*(?:_[a-z0-9]+)+\b", lambda found: in_words(found[0]), text)
     text = re.sub(r"(?<=[a-z0-9])\.(?=[a-z])", ": ", text)
     text = re.sub(r"(?<=[A-Za-z])\*(?=[A-Za-z])", "·", text)  # units: N·s/m
     return re.sub(r"\b\d+(?:\.\d+)?e[+-]?\d+\b", lambda found: number(float(found[0])), text).replace(

@@ -60,7 +60,7 @@ def _words(result: Mapping[str, Any], remarks: Sequence[str]) -> str:
     roles = ", ".join(result["channels"])
     if not remarks:
         return f"The channels {roles} have no gaps, no duplicates, no clipped samples and no damage."
-    return f"The channels {roles} can be read; {len(remarks)} {'remarks tell' if len(remarks) > 1 else 'remark tells'} what to know before trusting them."
+    return f"The channels {roles} can be read; {len(remarks)} {'remarks say' if len(remarks) > 1 else 'remark says'} what to know before trusting them."
 
 
 def _tiles(result: Mapping[str, Any]) -> Tiles:

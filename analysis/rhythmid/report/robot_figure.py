@@ -8,6 +8,7 @@ from textwrap import shorten
 from rhythmid.report.chart import opening
 
 COLUMN, ROW, LEFT, TOP = 130.0, 84.0, 110.0, 46.0  # pixels between joints, between chains, and of the margins
+BELOW = 42.0  # room under the lowest joint, for its fault
 RADIUS = 15.0
 ELBOW = 16.0  # from the edge of what carries a joint to where the line to it turns
 LETTERS = 18  # of a label under a joint
@@ -29,7 +30,7 @@ def robot_svg(joints: Sequence[DrawnJoint], alt: str) -> str:
     place = _places(joints)
     columns = 1 + max(column for column, _ in place.values())
     rows = 1 + max(row for _, row in place.values())
-    width, height = LEFT + COLUMN * columns + 20.0, TOP + ROW * rows
+    width, height = LEFT + COLUMN * columns + 20.0, TOP + ROW * (rows - 1) + BELOW
     middle = TOP + ROW * (rows - 1) / 2.0
     parts = [opening(width, height, alt)]
     at = {name: (LEFT + COLUMN * (column + 0.4), TOP + ROW * row) for name, (column, row) in place.items()}

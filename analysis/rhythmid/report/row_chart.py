@@ -46,6 +46,11 @@ def row_label_height(text: str) -> float:
     return 5.0 + 13.0 * len(wrap(text, WRAP))
 
 
+def row_heights(labels: Sequence[str], least: float) -> list[float]:
+    """Height of each row, so that no name touches the next."""
+    return [max(least, row_label_height(label)) for label in labels]
+
+
 def row_label(text: str, x: float, middle: float, strong: str = "") -> str:
     """A row's name, right-aligned at x, on as many lines as it needs."""
     lines = wrap(text, WRAP) or [""]
@@ -65,10 +70,13 @@ def draw_bars(
     most = max([bar.value for bar in bars] + [level or 0.0, full, 1e-300])
     axis = Axis(0.0, most, left, WIDTH - 62.0)
     top = 18.0 if level is not None else 4.0
-    height = top + ROW * len(bars) + 4.0
+    heights = row_heights([bar.label for bar in bars], ROW)
+    height = top + sum(heights) + 4.0
     parts = [opening(WIDTH, height, alt)]
-    for index, bar in enumerate(bars):
-        y = top + ROW * index
+    below = top
+    for bar, tall in zip(bars, heights, strict=True):
+        y = below + 0.5 * (tall - ROW)
+        below += tall
         end = float(axis(max(bar.value, 0.0)))
         strong = " strong" if bar.marked else ""
         parts.append(row_label(bar.label, left - 8.0, y + 12.5, strong))
@@ -95,7 +103,8 @@ def draw_changes(alt: str, rows: Sequence[Change], label: str) -> str:
     left = row_label_width([row.label for row in rows])
     values = [v for row in rows for v in (row.before, row.after, row.floor) if v is not None and v > 0.0]
     axis = Axis(*extent([np.array(values)], log=True), left + 8.0, WIDTH - 14.0, log=True)
-    bottom = 6.0 + ROW * len(rows)
+    heights = row_heights([row.label for row in rows], ROW)
+    bottom = 6.0 + sum(heights)
     parts = [opening(WIDTH, bottom + 38.0, alt)]
     for tick in axis.ticks(5):
         at = float(axis(tick))
@@ -106,8 +115,10 @@ def draw_changes(alt: str, rows: Sequence[Change], label: str) -> str:
     parts.append(
         f'<text class="label" x="{(left + WIDTH) / 2:.1f}" y="{bottom + 31:.1f}" text-anchor="middle">{escape(label)}</text>'
     )
-    for index, row in enumerate(rows):
-        y = 6.0 + ROW * (index + 0.5)
+    below = 6.0
+    for row, tall in zip(rows, heights, strict=True):
+        y = below + 0.5 * tall
+        below += tall
         parts.append(row_label(row.label, left - 4.0, y))
         start = float(axis(row.before))
         if row.floor is not None and row.floor > 0.0:

@@ -68,7 +68,7 @@ def compared_parameters(
     if augmented is not None:
         columns += ("final model", "change")
         caption += (
-            " The last column tells by how much the refit of the nominal model had been bent to make up for what it "
+            " The last column is how far the refit of the nominal model was off to make up for what it "
             "lacks. Shaded rows are new."
         )
     return Table(caption, columns, tuple(rows), tuple(marked))

@@ -18,6 +18,7 @@ ROLES = {
 }
 LINE = 16.0
 WRAP = 25  # letters in a line of a box
+FLAG_LETTER = 7.6  # width of a bold letter on a flag
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ def _box(
             f'<text class="{kind}" x="{middle:.0f}" y="{at:.0f}" text-anchor="middle">{escape(text)}</text>'
         )
     if slot.faulty:
-        wide = 6.6 * len(note) + 16
+        wide = FLAG_LETTER * len(note) + 18
         parts.append(
             f'<rect class="flag" x="{middle - wide / 2:.0f}" y="{y - 15:.0f}" width="{wide:.0f}" height="20" rx="10"/>'
         )
@@ -103,7 +104,7 @@ def _clocks(slot: SlotContent, x: float, y: float, width: float, note: str) -> s
         f'<text class="{"missing" if slot.faulty else "faint"}" x="{x + width / 2:.0f}" y="{y + 19:.0f}" text-anchor="middle">{escape(said)}</text>',
     ]
     if slot.faulty:
-        wide = 6.6 * len(note) + 16
+        wide = FLAG_LETTER * len(note) + 18
         parts.append(
             f'<rect class="flag" x="{x + width - wide - 10:.0f}" y="{y - 11:.0f}" width="{wide:.0f}" height="20" rx="10"/>'
         )

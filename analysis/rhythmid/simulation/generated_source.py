@@ -123,7 +123,7 @@ def _right_hand_side(terms: tuple[Term, ...], variant: Variant) -> _Writer:
     excited, disturbed = variant.excited, variant.disturbed
     if excited == "base_acceleration" and (room := [term for term in terms if term.against == "room"]):
         raise InputError(
-            f"element {room[0].label!r} acts against the room, whose speed cannot be told where only the base's acceleration is "
+            f"element {room[0].label!r} acts against the room, whose speed is unknown where only the base's acceleration is "
             "known; give its displacement, or leave out 'against: room'"
         )
     writer = _Writer(variant.rational)

@@ -148,7 +148,7 @@ def _output_by_data(able: list[_Known], known: list[_Known], place: str) -> tupl
             r, ratio = derivative(first.one, second.one)
             if r > SURE_INTEGRAL and abs(ratio - 1.0) < RATIO:
                 choice = Choice(
-                    first.one, f"no name tells; it is the integral of {second.one} ({r:.2f} correlation)"
+                    first.one, f"no name says it; it is the integral of {second.one} ({r:.2f} correlation)"
                 )
                 changed = {id(first): "position", id(second): "velocity"}
                 return choice, [_said(one, changed[id(one)]) if id(one) in changed else one for one in known]
@@ -167,9 +167,9 @@ def _output_by_data(able: list[_Known], known: list[_Known], place: str) -> tupl
         scored.append((sum(lead(o.one, one.one) for o in others), one))
     (gain, best), *_ = sorted(scored, key=lambda pair: -pair[0])
     others = tuple(one.one for one in able if one is not best)
-    doubts = ("no name tells what it measures: set kind and unit",)
+    doubts = ("no name says what it measures: set kind and unit",)
     choice = Choice(
-        best.one, f"no name tells; the past of the others tells more of it than it tells of them ({gain:+.2f} in log variance)",
+        best.one, f"no name says it; the past of the others predicts it better than it predicts them ({gain:+.2f} in log variance)",
         others, doubts,
     )  # fmt: skip
     return choice, [_said(one, "position") if one is best else one for one in known]
@@ -327,4 +327,4 @@ def _rotary(choices: Mapping[str, Choice], output: Recorded, ask: Ask) -> tuple[
     answers = ["it turns (rad, N m)", "it slides (m, N)"]
     number = ask("Does the joint turn or slide?", answers if turns else answers[::-1])
     rotary = turns == (number == 0)
-    return rotary, "no name or unit tells; most joints turn" if turns else "no name or unit tells"
+    return rotary, "no name or unit says it; most joints turn" if turns else "no name or unit says it"

@@ -18,7 +18,7 @@ LISTED = 8  # alternatives that a comment names
 MEANS = {
     "input": "what drives the machine", "output": "the measured motion", "velocity": "its velocity, as recorded beside it",
     "effort": "the measured effort of the actuator", "reference": "what the controller is asked for",
-    "forcing": "what pushes besides the input",
+    "forcing": "what pushes in addition to the input",
 }  # fmt: skip
 
 

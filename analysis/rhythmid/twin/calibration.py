@@ -88,7 +88,7 @@ def calibrate(
     speed = _speed(output, period, settings)
     if not speed > 0.0:
         raise InputError(
-            "the healthy stretch shows no motion: a machine at rest tells nothing of its physics"
+            "the healthy stretch shows no motion: a machine at rest shows nothing of its physics"
         )
     block = block_length(output.value, period)
     size = max(round(SEGMENT / period), BLOCKS)

@@ -1,4 +1,4 @@
-"""The live twin: a model that runs beside the machine, corrected by what is measured, and says when the two part.
+"""The live twin: a model that runs beside the machine, corrected by what is measured, and says when the two differ.
 
 It is fed with samples as they come and judges them segment by segment. No ROS, no clock: time is that of the samples.
 """

@@ -9,6 +9,7 @@ from rich.markup import escape
 from rhythmid.diagnose.answer.result import Diagnosis, Remainder, Scored
 from rhythmid.diagnose.rejections import Rejection
 from rhythmid.report.hypotheses import grouped, most_weighed
+from rhythmid.report.quantity import number
 from rhythmid.report.terminal_table import print_estimates, print_table
 
 HYPOTHESES_SHOWN = 6
@@ -79,7 +80,7 @@ def _print_hypotheses(found: Diagnosis, console: Console) -> None:
     rows = []
     for one in shown:
         behind = "best" if one.score_difference == 0.0 else _worse(one.score_difference, one.standard_error)
-        held = NONE if one.heldout_nrmse is None else f"{100.0 * one.heldout_nrmse:.3g} %"
+        held = NONE if one.heldout_nrmse is None else f"{number(100.0 * one.heldout_nrmse, 3)} %"
         weight = _weight(one.probability, stands) if len(one.elements) <= weighed else NONE
         name = " + ".join(one.elements) or NOMINAL
         rows.append((name, one.kind.replace("_", " "), behind, weight, held))
@@ -146,4 +147,4 @@ def _weight(value: float, stands: bool) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"
+    return f"{number(100.0 * share, 3)} %"

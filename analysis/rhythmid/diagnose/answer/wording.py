@@ -10,7 +10,7 @@ from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.model import Model
-from rhythmid.report.quantity import rounded
+from rhythmid.report.quantity import in_words, rounded
 
 SENTENCES = {
     "command": "between the command u and the point where the forcing joins it",
@@ -61,8 +61,8 @@ def summary_of(
 
     `whole` is what errors are a share of; `freed` tells of the fixed value that the chosen hypothesis frees, if it does.
     """
-    names = " and ".join(effect.element.replace("_", " ") for effect in missing)
-    groups = [" or ".join(name.replace("_", " ") for name in group) for group in decision.equivalent]
+    names = " and ".join(in_words(effect.element) for effect in missing)
+    groups = [" or ".join(in_words(name) for name in group) for group in decision.equivalent]
     if freed is not None:
         return f"Undecided: {freed}"
     if decision.verdict == "consistent":
@@ -77,7 +77,7 @@ def summary_of(
             said += f" These records do not separate {'; '.join(groups)}."
         before, after = plain.heldout_nrmse, augmented.heldout_nrmse
         if before is not None and after is not None:
-            beside = " and ".join(decision.beside).replace("_", " ")
+            beside = in_words(" and ".join(decision.beside))
             if beside:
                 beside = f" and {beside}, which is too uncertain to be named"
             said += (
@@ -86,7 +86,7 @@ def summary_of(
             )
         left = decision.unexplained
         if left.significant and left.share > 0.0:
-            said += f" {100 * left.share:.2g} % of the mismatch is left and goes with {left.goes_with}."
+            said += f" {100 * left.share:.0f} % of the mismatch is left and goes with {left.goes_with}."
         return said
     if decision.verdict == "undecided":
         said = f"Undecided: {decision.reason}."
@@ -102,7 +102,7 @@ def freed_value(nominal: Model, fitted: Model, elements: Sequence[str]) -> str:
     """Sentences about the fixed values among the `elements`, which a hypothesis frees beside the others."""
     effects = [label for label in elements if fitted.term(label) is not None]
     freed = [name for name in elements if name not in effects]
-    beside = f" with {' and '.join(effects).replace('_', ' ')}" if effects else ""
+    beside = f" with {in_words(' and '.join(effects))}" if effects else ""
     values = [
         f"{name} is held at {nominal.parameters[name].value:g} {nominal.parameters[name].unit} as given. Freed it comes out at "
         f"{fitted.value(name):.4g}"

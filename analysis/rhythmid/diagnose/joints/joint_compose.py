@@ -11,6 +11,7 @@ from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, Ma
 from rhythmid.diagnose.joints.joint_case import JointResult, name_of
 from rhythmid.identify.inverse_dynamics.estimate import size_of
 from rhythmid.model import INERTIA
+from rhythmid.report.quantity import in_words
 from rhythmid.simulation.transport import INPUT_DELAY
 
 EQUATIONS = {  # of what is no element: its slot and what it says
@@ -144,13 +145,14 @@ def _summary(
 ) -> str:
     said = []
     for one in missing:
-        what = f"the mass of {one.link}" if one.link else one.element.replace("_", " ")
+        what = f"the mass of {one.link}" if one.link else in_words(one.element)
         said.append(f"{one.joint}: {what}")
     words = f"The model is wrong at {'; '.join(said)}." if said else ""
     if unknown:
         words += f" At {', '.join(unknown)} something is missing that the catalogue does not know."
     if undecided:
-        words += f" At {', '.join(undecided)} the evidence decides nothing: {answers[undecided[0]].summary}"
+        reason = answers[undecided[0]].summary.removeprefix("Undecided: ")
+        words += f" At {', '.join(undecided)} the records do not decide: {reason}"
     return words.strip() or "Nothing of practical size is missing at any joint."
 
 

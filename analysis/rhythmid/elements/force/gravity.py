@@ -1,6 +1,6 @@
 """Gravity along the axis of motion: F = -m g.
 
-Along one axis it cannot be told from a constant force or from the spring's rest length; it is a nominal element
+Along one axis it is indistinguishable from a constant force or from the spring's rest length; it is a nominal element
 with a known value.
 """
 

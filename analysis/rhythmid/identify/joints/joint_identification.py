@@ -220,7 +220,9 @@ def _not_separable(
     said = []
     for pair, value in correlations.items():
         first, second = (one.replace("_", " ") for one in pair.split(" ~ "))
-        said.append(f"{first} and {second}: only a combination of the two is told (correlation {value:.2f})")
+        said.append(
+            f"{first} and {second}: only a combination of the two is identifiable (correlation {value:.2f})"
+        )
     if computed:
         said.append(
             "armature and delay of the reference: without a recorded torque a later command looks like a heavier rotor"

@@ -39,7 +39,7 @@ def check_order(balances: JointBalances) -> None:
     ]
     raise InputError(
         f"{balances.bodies[0].stretch.name}: the joints seem to be recorded in another order: {', '.join(moved)}. The model then misses "
-        f"{100.0 * least:.0f} % of the efforts instead of {100.0 * error:.0f} %; mend 'joints:' in signals.yaml"
+        f"{100.0 * least:.0f} % of the efforts instead of {100.0 * error:.0f} %; correct 'joints:' in signals.yaml"
     )
 
 

@@ -51,7 +51,7 @@ def add(app: typer.Typer) -> None:
     ) -> None:
         """Run the graph of an experiment: starts, watches and stops its nodes and leaves a bag."""
         if node is not None and report is not None:
-            raise InputError("--node runs one node, and --report tells of a whole run: give one of the two")
+            raise InputError("--node runs one node, and --report describes a whole run: give one of the two")
         if node is not None and replace:
             raise InputError("--node runs a node of ours, --replace one of yours: give one of the two")
         if isolated:

@@ -52,4 +52,4 @@ def _nodes(figures: Mapping[str, Mapping[str, str]]) -> Table:
         for node, told in figures.items()
         for number, (key, value) in enumerate(told.items())
     )
-    return Table("What each node tells of its part.", ("node", "quantity", "value"), rows)
+    return Table("What each node reports.", ("node", "quantity", "value"), rows)
