@@ -208,7 +208,7 @@ def rehearsed(machine: Machine, experiment: JointExperiment) -> tuple[JointRecor
         records[joint] = replace(records[joint], input=asked, effort=effort, input_kind="reference")
     base = records.pop(machine.body.base) if machine.body.base in records else None
     peak = {joint: float(np.abs(records[joint].effort.value).max()) for joint in machine.joints}
-    return JointRecord("run", records, base, "after_actuator"), peak
+    return JointRecord("run", records, base, "after_actuator", "mean"), peak
 
 
 def predicted(
@@ -267,7 +267,7 @@ def save_joint_design(found: JointDesign, machine: Machine, model: Path, folder:
         "joints": list(machine.joints),
         "input": {"topic": f"{space}/command", "field": "position[*]"},
         "output": {"topic": f"{space}/joint_states", "field": "position[*]"},
-        "effort": {"field": "effort[*]", "taken": "after_actuator"},
+        "effort": {"field": "effort[*]", "taken": "after_actuator", "sampled": "mean"},
     }
     if machine.body.base in machine.body.joints:
         signals["base"] = {"field": f"position[{machine.body.base}]"}

@@ -31,6 +31,7 @@ def compose_machine(
     stated: Mapping[str, Sequence[str]],
     links: Mapping[str, Estimate],
     refused: Mapping[str, str],
+    notes: Sequence[str] = (),
 ) -> MachineDiagnosis:
     """The diagnosis; `links` are the masses that were put right, `stated` the labels by which the answer at each joint stands."""
     missing = [
@@ -76,6 +77,7 @@ def compose_machine(
         joints=dict(answers),
         not_judged=dict(refused),
         assumptions=_assumptions(machine, found, answers),
+        notes=tuple(notes),
     )
 
 

@@ -19,9 +19,11 @@ from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, nam
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.joints.held_reference import balances_of, with_likely_lead
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.joints.joint_order import check_order
 from rhythmid.identify.joints.reference_delay import reference_delay
+from rhythmid.identify.joints.reference_lead import told_of
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.joint_record import JointRecord
@@ -57,8 +59,9 @@ def diagnose_machine(
         raise InputError("no record is given; name at least one bag or table")
     known, spent = catalogue or load_catalogue(), Budget(budget)
     nominal, links = machine, {}
-    balances = JointBalances.of(machine, records)
+    balances = balances_of(machine, records)
     check_order(balances)
+    balances = with_likely_lead(balances, records)
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
     found, refused = _searched(balances, unseen, machine.joints, known, tell, spent)
     for _ in range(MOST_LINKS):
@@ -77,7 +80,8 @@ def diagnose_machine(
         raise InputError(f"no joint can be judged: {next(iter(refused.values()))}")
     answers = {joint: _answer(one) for joint, one in found.items()}
     stated = {joint: stated_at(one) for joint, one in found.items()}
-    diagnosis = compose_machine(nominal, found, answers, stated, links, refused)
+    notes = () if records[0].sampled else tuple(told_of(balances.leads))
+    diagnosis = compose_machine(nominal, found, answers, stated, links, refused, notes)
     return MachineAnswer(diagnosis, _augmented(machine, found, stated), found)
 
 

@@ -20,6 +20,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit, fit_effort, size_of
 from rhythmid.identify.joints.base_parameters import InertialEstimate, estimate_inertia
+from rhythmid.identify.joints.held_reference import balances_of, not_told
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.joints.joint_order import check_order
 from rhythmid.identify.joints.output_error import Knowledge, free_runs, refine
@@ -95,7 +96,7 @@ def identify_machine(
     if not records:
         raise InputError("no record is given; name at least one bag or table")
     seen, unseen = (records, holdout) if holdout else _split(records)
-    balances = JointBalances.of(machine, seen)
+    balances = balances_of(machine, seen)
     check_order(balances)
     fits: dict[str, tuple[Balance, EffortFit]] = {}
     found: dict[str, JointEstimate] = {}
@@ -135,7 +136,8 @@ def identify_machine(
     except InputError as error:
         notes.append(f"no free run: {error}")
     return MachineIdentification(
-        identified, found, correlations, _not_separable(machine, correlations, balances.computed), inertia, errors,
+        identified, found, correlations,
+        (*_not_separable(machine, correlations, balances.computed), *not_told(balances, seen)), inertia, errors,
         runs, True, tuple(notes),
     )  # fmt: skip
 
