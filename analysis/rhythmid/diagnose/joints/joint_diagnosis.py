@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from rhythmid.body.body import BODY
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.compose_effort import compose_effort
-from rhythmid.diagnose.answer.result import Diagnosis, Estimate
+from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import STATED
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
-from rhythmid.diagnose.joints.joint_compose import compose_machine
+from rhythmid.diagnose.joints.joint_compose import compose_machine, estimate_of
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.joints.held_reference import balances_of, with_likely_lead
@@ -58,7 +58,8 @@ def diagnose_machine(
     if not records:
         raise InputError("no record is given; name at least one bag or table")
     known, spent = catalogue or load_catalogue(), Budget(budget)
-    nominal, links = machine, {}
+    nominal = machine
+    links: dict[str, JointResult] = {}
     balances = balances_of(machine, records)
     check_order(balances)
     balances = with_likely_lead(balances, records)
@@ -69,8 +70,8 @@ def diagnose_machine(
         if best is None or spent.spent:
             break
         link, result = best
-        links[link] = _estimate(result, f"{BODY}.{link}")
-        machine = machine.with_inertial({link: links[link].value})
+        links[link] = result
+        machine = machine.with_inertial({link: estimate_of(result, f"{BODY}.{link}").value})
         balances = JointBalances.of(machine, records, balances)
         unseen = JointBalances.of(machine, holdout, balances) if holdout else None
         again = [joint for joint in machine.joints if link in balances.links(joint)]
@@ -152,12 +153,6 @@ def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, J
             if best is None or gain > best[0]:
                 best = gain, link, one
     return None if best is None else best[1:]
-
-
-def _estimate(one: JointResult, name: str) -> Estimate:
-    fitted = one.result.chosen
-    value = fitted.model.parameters[name]
-    return Estimate(value.value, fitted.std().get(name, 0.0), value.unit)
 
 
 def _answer(one: JointResult) -> Diagnosis:
