@@ -91,6 +91,7 @@ def test_what_signals_say_of_the_effort_is_believed():
     assert found.parameters["knee.viscous_damper.damping"].value == pytest.approx(0.05, abs=0.005)
     assert found.parameters["body.knee.armature"].value == pytest.approx(0.006, abs=2e-4)
     assert not any("sampled" in one for one in found.not_separable)
+    assert not found.worse and not found.notes
     assert not leads(leg(), replace(record, sampled="mean"))
 
 
@@ -98,6 +99,14 @@ def test_an_identification_says_that_it_cannot_tell_how_efforts_were_sampled():
     found = identify_machine([hopped(leg(), held=True)], leg(), free=False)
     (said,) = [one for one in found.not_separable if "sampled" in one]
     assert "damping is up to 0.06 and the armature up to 0.0012 less" in said
+    assert found.worse == ("hip", "knee") == tuple(found.to_dict()["quality"]["worse"])
+    assert any("knee: the identified values predict the motion worse" in note for note in found.notes)
+    joints = found.correlations.names
+    assert "body.knee.armature" in joints and "hip.viscous_damper.damping" in joints
+    np.testing.assert_allclose(np.diag(found.correlations.matrix), 1.0)
+    for one in found.to_dict()["parameters"].values():
+        low, high = one["interval"]
+        assert high - low == pytest.approx(2.0 * 1.96 * one["std"], rel=1e-3)
 
 
 def test_efforts_that_are_not_in_step_with_a_reference_are_on_average_right():

@@ -190,10 +190,11 @@ def show_identification(found: "MachineIdentification", console: "Console") -> N
     from rich.table import Table
 
     table = Table(title="parameters")
-    for column in ("name", "value", "std", "unit"):
+    for column in ("name", "value", "95 % interval", "unit"):
         table.add_column(column)
     for name, one in found.parameters.items():
-        table.add_row(name, rounded(one.value, one.std), f"{one.std:.2g}", escape(one.unit))
+        low, high = (rounded(end, one.std) for end in one.interval)
+        table.add_row(name, rounded(one.value, one.std), f"{low} to {high}", escape(one.unit))
     console.print(table)
     if found.inertia is not None:
         seen = found.inertia
