@@ -20,7 +20,7 @@ from typing import Literal
 
 from pydantic import TypeAdapter
 
-from rhythmid.document import Node, read
+from rhythmid.document import Node, parse, read
 from rhythmid.record.read import read_record, read_tables
 from rhythmid.record.record import Record
 from rhythmid.record.signals import Signals
@@ -50,6 +50,11 @@ class JointSignals:
         """The signals.yaml at `path`. Raises InputError naming line and key of what is wrong."""
         return _joint_signals(read(path), Path(path))
 
+    @classmethod
+    def from_text(cls, text: str, path: str | Path = "signals.yaml") -> "JointSignals":
+        """The signals in a YAML text that stands for the file `path`."""
+        return _joint_signals(parse(text, str(path)), Path(path))
+
 
 @dataclass(frozen=True, eq=False)
 class JointRecord:
@@ -62,6 +67,11 @@ class JointRecord:
     taken: Taken = "before_actuator"
     sampled: Sampled | None = None
 
+    @property
+    def every(self) -> dict[str, Record]:
+        """The record of every joint, and of the base as `base`."""
+        return dict(self.joints) if self.base is None else {**self.joints, "base": self.base}
+
     def cut(self, start: float, end: float) -> "JointRecord":
         """What lies within [start, end) seconds."""
         joints = {name: record.cut(start, end) for name, record in self.joints.items()}
@@ -72,6 +82,12 @@ class JointRecord:
         """First and last time [s] at which every joint's position was recorded."""
         times = [record.output.time for record in self.joints.values()]
         return max(float(one[0]) for one in times), min(float(one[-1]) for one in times)
+
+
+def names_joints(signals: str | Path) -> bool:
+    """Whether a signals.yaml is of several joints. Raises InputError where it cannot be read."""
+    value = read(signals).value
+    return isinstance(value, dict) and "joints" in value
 
 
 def load_joint_records(paths: Iterable[str | Path], signals: JointSignals | str | Path) -> list[JointRecord]:

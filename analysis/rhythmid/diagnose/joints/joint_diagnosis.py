@@ -7,6 +7,7 @@ it are searched again.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from rhythmid.body.body import BODY
 from rhythmid.body.machine import Machine
@@ -27,7 +28,11 @@ from rhythmid.identify.joints.reference_lead import told_of
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.joint_record import JointRecord
+from rhythmid.result import Result, Row
 from rhythmid.simulation.transport import INPUT_DELAY
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 MOST_LINKS = 2  # links whose masses are put right, at most
 LIGHTEST = 0.1  # of the mass that the file gives a link, below which another effect has swallowed it
@@ -35,12 +40,39 @@ MATTERS = 0.02  # of a mass or an inertia, below which it is as right as a balan
 
 
 @dataclass(frozen=True)
-class MachineAnswer:
+class MachineAnswer(Result):
     """A diagnosis, the augmented machine, and what was found at each joint."""
 
     diagnosis: MachineDiagnosis
     machine: Machine
     results: Mapping[str, JointResult]
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        return self.diagnosis.summary
+
+    def show(self, console: "Console") -> None:
+        from rhythmid.diagnose.joints.printed import show_diagnosis
+
+        show_diagnosis(self.diagnosis, console)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The diagnosis as plain data."""
+        return self.diagnosis.to_dict()
+
+    def tables(self) -> Mapping[str, Sequence[Row]]:
+        """The `joints` with their verdicts and errors, and what is `missing`."""
+        joints = [
+            {"joint": joint, "verdict": one.verdict}
+            | {name: one.fit[name].heldout_nrmse for name in ("refitted_nominal", "augmented")}
+            for joint, one in self.diagnosis.joints.items()
+        ]
+        missing = [
+            {"joint": one.joint, "element": one.element, "probability": one.probability, "share": one.share}
+            for one in self.diagnosis.missing
+        ]
+        return {"joints": joints, "missing": missing}
 
 
 def diagnose_machine(

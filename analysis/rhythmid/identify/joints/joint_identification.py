@@ -9,7 +9,7 @@ inverse dynamics being what is known before.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from threadpoolctl import threadpool_limits
 
@@ -28,7 +28,11 @@ from rhythmid.identify.joints.reference_delay import reference_delay
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.joint_record import JointRecord
+from rhythmid.result import Result, Row
 from rhythmid.statistics import NORMAL_95
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 WORSE = (
     1.1  # times the error of free runs with the given values, from which the identified ones are warned of
@@ -61,7 +65,7 @@ class JointEstimate:
 
 
 @dataclass(frozen=True)
-class MachineIdentification:
+class MachineIdentification(Result):
     """What was found.
 
     `parameters` by "joint.element.parameter" and "body.joint.armature"; `effort_nrmse` of each joint's predicted effort, `free_run`
@@ -79,6 +83,29 @@ class MachineIdentification:
     unseen: bool
     worse: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
+
+    @property
+    def headline(self) -> str:
+        """How well the efforts are predicted."""
+        worst = max(self.effort_nrmse, key=lambda joint: self.effort_nrmse[joint])
+        return f"{len(self.parameters)} parameters; efforts missed by {100.0 * self.effort_nrmse[worst]:.3g} % at most, at {worst}"
+
+    def show(self, console: "Console") -> None:
+        from rhythmid.identify.joints.printed import show_identification
+
+        show_identification(self, console)
+
+    def tables(self) -> Mapping[str, Sequence[Row]]:
+        """The `parameters`, and of each joint the `errors`."""
+        rows = [
+            {"name": name, "value": one.value, "std": one.std, "unit": one.unit}
+            for name, one in self.parameters.items()
+        ]
+        errors = [
+            {"joint": joint, "effort": error} | {name: run[joint] for name, run in self.free_run.items()}
+            for joint, error in self.effort_nrmse.items()
+        ]
+        return {"parameters": rows, "errors": errors}
 
     def to_dict(self) -> dict[str, Any]:
         """The identification as plain data."""
