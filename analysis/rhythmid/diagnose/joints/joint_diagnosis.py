@@ -5,6 +5,7 @@ all joints. A link whose mass is wrong shows at every joint that carries it: whe
 it are searched again.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -196,6 +197,7 @@ def _augmented(
 ) -> Machine:
     """The machine with what was fitted, and with what the answer stands by."""
     inertial: dict[str, float] = {}
+    spreads: dict[str, float] = {}
     for joint, one in found.items():
         fitted = one.result.chosen if stated[joint] else one.result.nominal
         path = machine.paths[joint]
@@ -203,6 +205,10 @@ def _augmented(
         if INERTIA in fitted.fit.names:
             before = machine.body.parameters[f"{joint}.armature"]
             inertial[f"{joint}.armature"] = max(before + rotor, 0.0)
+        for label, std in fitted.std().items():  # a free mass is as the joint says that tells it best
+            link = label.removeprefix(f"{BODY}.")
+            if label.startswith(f"{BODY}.") and std < spreads.get(link, math.inf):
+                inertial[link], spreads[link] = fitted.model.value(label), std
         machine = machine.with_path(joint, _without_body(fitted.model, path))
     return machine.with_inertial(inertial) if inertial else machine
 
