@@ -11,7 +11,7 @@ from rhythmid.body.machine import Machine
 from rhythmid.body.simulate import simulate
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.record import Channel, Record
-from rhythmid.simulation.signal import spline
+from rhythmid.simulation.signal import continuous, spline
 
 MODELS = Path(str(files("rhythmid"))) / "models" / "legs"
 Array = NDArray[np.float64]
@@ -73,13 +73,20 @@ def recorded(
     torque_noise: float = 0.01,
     with_effort: bool = True,
     lost: float = 0.002,
+    held: bool = False,
 ) -> JointRecord:
     """A run of the plant as a logger has it: stamps that jitter [s], an encoder's steps [rad], noise of the torque as a share of its
-    rms, and messages that were lost (share)."""
+    rms, and messages that were lost (share). A reference that is `held` from stamp to stamp is in the torque as it is at that instant."""
     stamps = np.arange(float(time[0]), float(time[-1]), 1.0 / rate)
     late = np.abs(rng.normal(0.0, jitter, len(stamps)))
     at = np.maximum.accumulate(stamps + late)
-    command = {joint: spline(time, values) for joint, values in asked.items()}
+    if held:
+        asked = {joint: np.interp(stamps, time, values) for joint, values in asked.items()}
+        time = stamps
+    command = {
+        joint: continuous(time, values, "zero") if held else spline(time, values)
+        for joint, values in asked.items()
+    }
     start = {joint: float(values[0]) for joint, values in asked.items()}
     run = simulate(plant, at, command, start=start)
     kept = rng.uniform(size=len(stamps)) >= lost
@@ -88,7 +95,9 @@ def recorded(
     for place, joint in enumerate(plant.joints):
         position = encoder * np.round(run.output[:, place] / encoder)
         effort = (
-            np.zeros(len(stamps)) if not with_effort else asked_effort(plant, joint, run, place, asked, time)
+            np.zeros(len(stamps))
+            if not with_effort
+            else asked_effort(plant, joint, run, place, asked, time, held)
         )
         effort = effort + torque_noise * np.sqrt(np.mean(effort**2)) * rng.normal(size=len(stamps))
         given = np.interp(stamps, time, asked[joint])
@@ -109,12 +118,14 @@ def recorded(
 
 
 def asked_effort(
-    plant: Machine, joint: str, run, place: int, asked: Mapping[str, Array], time: Array
+    plant: Machine, joint: str, run, place: int, asked: Mapping[str, Array], time: Array, held: bool
 ) -> Array:
     """The torque that the joint's drive reports: what its controller asked for."""
     model = plant.paths[joint]
     late = model.value("input_delay.delay") if "input_delay.delay" in model.parameters else 0.0
-    held = 0.5 * plant.body.step  # a step takes the mean of its command
-    reference = np.interp(run.time - late + held, time, asked[joint])
+    middle = run.time - late + 0.5 * plant.body.step  # a step takes the mean of its command
+    reference = np.interp(middle, time, asked[joint])
+    if held:
+        reference = asked[joint][np.searchsorted(time, run.time - late + 1e-9, side="right") - 1]
     kp, kd = model.value("position_control.proportional"), model.value("position_control.derivative")
     return kp * (reference - run.position[:, place]) - kd * run.velocity[:, place]

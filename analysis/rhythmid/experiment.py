@@ -404,7 +404,7 @@ def _experiment(
         model_path = folder / given.model
         if not os.path.isfile(model_path):  # also where the name is too long for any file
             document.at("model").fail(f"no such file: {model_path}")
-    model = Model.load(model_path, load_catalogue(elements))
+    model = Model.of_one_axis(model_path, load_catalogue(elements))
     place = document.at("excitation")
     try:
         duration = given.excitation.duration  # reads the table of samples

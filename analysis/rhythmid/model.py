@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import yaml
 from pydantic import ConfigDict, Field, StrictBool, TypeAdapter
@@ -93,7 +93,20 @@ class Model:
 
     @classmethod
     def load(cls, path: str | Path, catalogue: Catalogue | None = None) -> "Model":
-        """The model in a YAML file. Raises InputError naming line, parameter and unit of what is wrong."""
+        """The model in a YAML file; a `Machine` where the file has a `body:`, which the functions of rhythmid take as well.
+
+        Raises InputError naming line, parameter and unit of what is wrong.
+        """
+        document = read(path)
+        if isinstance(document.value, dict) and "body" in document.value:
+            from rhythmid.body.machine import Machine  # it needs MuJoCo, and models itself
+
+            return cast("Model", Machine.load(path, catalogue))
+        return cls.from_document(document, catalogue)
+
+    @classmethod
+    def of_one_axis(cls, path: str | Path, catalogue: Catalogue | None = None) -> "Model":
+        """The model in a YAML file, of one axis alone. Raises InputError as `load` does, and for a machine of several joints."""
         return cls.from_document(read(path), catalogue)
 
     @classmethod

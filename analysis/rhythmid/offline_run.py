@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.experiment import Experiment, perform
 from rhythmid.model import Model
 from rhythmid.output import require_new
@@ -21,6 +22,8 @@ from rhythmid.result import Result, Row, axis_or_new
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from rich.console import Console
+
+    from rhythmid.body.machine import Machine
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +126,7 @@ class OfflineRun(Result):
 
 
 def simulate(
-    model: Model | str | Path | None,
+    model: "Model | Machine | str | Path | None",
     experiment: Mapping[str, Any] | str | Path,
     elements: Sequence[str | Path] = (),
 ) -> OfflineRun:
@@ -141,7 +144,8 @@ def simulate(
     Returns
     -------
     OfflineRun
-        With the `record` that an identification would be given; `save` writes the bag.
+        With the `record` that an identification would be given; `save` writes the bag. A machine of several joints gives a `JointRun`,
+        which has these as well.
 
     Raises
     ------
@@ -160,6 +164,14 @@ def simulate(
     >>> run.record.output.value.shape
     (500,)
     """
+    if isinstance(model, (str, Path)):
+        catalogue = load_catalogue(tuple(Path(one) for one in elements))
+        loaded = Model.load(model, catalogue)
+        model = model if isinstance(loaded, Model) else loaded
+    if model is not None and not isinstance(model, (Model, str, Path)):
+        from rhythmid.body.joint_run import run_experiment  # it needs MuJoCo
+
+        return cast(OfflineRun, run_experiment(model, experiment))
     with TemporaryDirectory(prefix="rhythmid_") as folder:
         path = Path(folder) / "model.yaml" if isinstance(model, Model) else model
         if isinstance(model, Model):

@@ -87,7 +87,7 @@ class GraphRun:
         from rhythmid.model import Model
         from rhythmid.record.read import read_record
 
-        return identify(read_record(self.bag), Model.load(self.folder / model))
+        return identify(read_record(self.bag), Model.of_one_axis(self.folder / model))
 
     def diagnose(self, model: str | Path = PAPER_HOPPER, budget: float | None = None) -> Diagnosis:
         """Verdict about the nominal `model`, by default the paper's hopper: what `rhythmid diagnose` says.
@@ -98,7 +98,7 @@ class GraphRun:
         from rhythmid.model import Model
         from rhythmid.record.read import read_record
 
-        nominal = Model.load(self.folder / model)
+        nominal = Model.of_one_axis(self.folder / model)
         return diagnose([read_record(self.bag)], nominal, budget=budget).diagnosis
 
     def _columns(self, topic: str, field: str) -> tuple[Columns, NDArray[np.int64]]:

@@ -123,6 +123,14 @@ def test_an_exported_leg_in_a_loop_of_mujocos_own_is_nearer_to_the_recording_wit
             ["identify", "{bag}", "--model", "{other}", "--signals", "{signals}"],
             "the joint 'leg' is not recorded",
         ),
+        (
+            ["identify", "{bag}", "--model", "{leg}", "--signals", SIGNALS, "--method", "paper"],
+            "--method is for a machine of one axis",
+        ),
+        (
+            ["identify", "{bag}", "--model", "{leg}", "--signals", SIGNALS, "--htf", "auto"],
+            "--htf is for a machine of one axis",
+        ),
         (["export", "{leg}", "--to", "sdf", "--out", "{new}"], "is written as mujoco or urdf"),
         (["export", "{leg}", "--to", "urdf", "--out", "{new}"], "a file that ends in .urdf"),
         (["simulate", "{leg}", "--experiment", "{wrong}", "--out", "{new}"], "the joint 'ankle' has no path"),

@@ -78,6 +78,21 @@ def test_commands_keep_to_their_joints_limits_and_orthogonal_multisines_share_th
     assert sorted([*signals[0].harmonics, *signals[1].harmonics]) == [1, 2, 3, 4, 5, 6]
 
 
+def test_an_effort_is_the_mean_over_the_sample_period_before_it(tmp_path: Path):
+    made = experiment(tmp_path, EXPERIMENT.replace("rate: 1000", "rate: 500"))
+    machine = Machine.load(MODELS / "leg.yaml")
+    asked = made.asked(machine)
+    stamps = np.arange(made.count, dtype=np.int64) * made.period_ns
+    efforts = []
+    for period in (made.period_ns, round(machine.body.step * 1e9)):
+        plant = JointPlant(machine, period, start={"rail": 0.45, "hip": asked[0, 0], "knee": asked[0, 1]})
+        plant.push_many(stamps, asked)
+        efforts.append(plant.states(int(stamps[-1]))[1]["effort"][:, :2])
+    coarse, fine = efforts  # of a period of one step the mean is that step's
+    expected = fine[1:].reshape(-1, 4, 2).mean(axis=1)
+    np.testing.assert_allclose(coarse[1:], expected, rtol=1e-9, atol=1e-9)
+
+
 def test_references_that_nobody_renews_are_held_and_forces_fade():
     hold = JointHold(0.01, 0.002, 1_000_000, np.array([False, True]))
     hold.renew(0, np.array([0.5, 2.0]))

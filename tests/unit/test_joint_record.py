@@ -13,7 +13,7 @@ BAG = """
 joints: [hip, knee]
 input:  {topic: /cmd, field: "position[*]", feedforward: "effort[*]"}
 output: {topic: /joint_states, field: "position[*]"}
-effort: {field: "effort[*]", taken: after_actuator}
+effort: {field: "effort[*]", taken: after_actuator, sampled: instant}
 base:   {field: "position[rail]"}
 """
 TIME = np.arange(500) * 0.002
@@ -33,6 +33,7 @@ def test_every_joint_of_a_bag_has_a_record_of_its_own(tmp_path: Path):
     (tmp_path / "signals.yaml").write_text(BAG)
     (found,) = load_joint_records([recorded(tmp_path)], tmp_path / "signals.yaml")
     assert list(found.joints) == ["hip", "knee"] and found.taken == "after_actuator"
+    assert found.sampled == "instant"
     for joint, column in (("hip", 1), ("knee", 0)):
         record = found.joints[joint]
         assert record.input_kind == "reference"

@@ -6,7 +6,6 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from rhythmid.commands.machines import left_words
 from rhythmid.diagnose.answer.printed import rejection_words, remainder_words, scoring_words, show
 from rhythmid.diagnose.answer.result import (
     Detection,
@@ -20,6 +19,7 @@ from rhythmid.diagnose.answer.result import (
     Scored,
 )
 from rhythmid.diagnose.hypothesis import Kind
+from rhythmid.diagnose.joints.printed import left_words
 from rhythmid.diagnose.rejections import Rejection
 
 

@@ -28,11 +28,12 @@ from pydantic import AfterValidator, ConfigDict, TypeAdapter
 from pydantic import Field as Limits
 
 from rhythmid.body.machine import Machine
-from rhythmid.document import Node, read
+from rhythmid.document import Node, parse, read
 from rhythmid.errors import InputError
 from rhythmid.excitation.excitation import Excitation
 from rhythmid.excitation.sequence import build
 from rhythmid.experiment import NodeSpec, of_topic
+from rhythmid.plain_yaml import plain_yaml
 from rhythmid.settings import Delay, TimeMode
 from rhythmid.validation import Number, Range, Whole, validated
 
@@ -116,6 +117,12 @@ class JointExperiment:
     def load(cls, path: str | Path) -> "JointExperiment":
         """The experiment in a YAML file. Raises InputError naming the line and key of what is wrong."""
         return _experiment(read(path), Path(path).resolve())
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> "JointExperiment":
+        """The experiment with the content of a file. Raises InputError naming the key of what is wrong."""
+        path = Path("experiment")
+        return _experiment(parse(plain_yaml(content, path.name), path.name), path)
 
     input_delay = measurement_delay = Delay()  # none by nodes: the joints' paths have theirs
 

@@ -1,7 +1,8 @@
 """A machine of several joints fed command by command: what the plant node and the run without ROS have in common.
 
 Time is whole nanoseconds since the start of the run. The result depends on the commands and their stamps alone, not on the chunks in
-which they are fed. A controller has held the pose of the start before its first reference comes.
+which they are fed. A controller has held the pose of the start before its first reference comes. The effort of a sample is the mean over
+the sample period before it: at a sample's own instant a held reference jumps, and what the actuator gives there is not what it gives between.
 """
 
 from collections.abc import Mapping
@@ -131,9 +132,10 @@ class JointPlant:
         physical = np.maximum(physical, self._latest)
         self._latest = physical[-1]
         first = self._done + 1 - len(self._rows)
-        made = sampled(self._machine, times, physical, self._rows, first, self._begin, self._noise)
+        span = self._period * 1e-9
+        made = sampled(self._machine, times, physical, self._rows, first, self._begin, self._noise, span)
         self._next = int(last) + 1
-        kept = min(float(self._latest.min()), float(times[-1])) - 2.0 * self._step
+        kept = min(float(self._latest.min()), float(times[-1])) - span - 2.0 * self._step
         self._rows = self._rows[max(int((kept - self._begin) / self._step) - first, 0) :]
         return stamps, made
 

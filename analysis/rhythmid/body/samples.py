@@ -1,4 +1,10 @@
-"""What is measured between the steps of a run: positions on the cubic through positions and speeds, all else on straight lines."""
+"""What is measured between the steps of a run: positions on the cubic through positions and speeds, all else on straight lines; an effort
+also as its mean, as drives report it.
+
+A held reference jumps at the stamp of a sample, and the effort with it. An effort taken at that instant is ahead of what acts between the
+samples by half a period, in the reference alone: an analysis would read it as damping and inertia that the joint has not (a controller's gain
+times half a period). The mean over the period before a stamp is late by half a period in all its parts alike, like any measurement.
+"""
 
 import math
 
@@ -57,3 +63,25 @@ def sample_columns(rows, from_column, first, begin, step, times, out):
         for c in range(out.shape[1]):
             here = rows[k, from_column + c]
             out[i, c] = here if share == 0.0 else here + share * (rows[k + 1, from_column + c] - here)
+
+
+@njit(
+    "void(float64[:, ::1], int64, float64, float64, float64, float64[:, ::1], float64[:, ::1])",
+    cache=True,
+    error_model="numpy",
+)
+def mean_efforts(rows, first, begin, step, span, times, out):
+    """Mean effort, `out` (n, joints), over the `span` [s] before times (n, joints) [s]; before the run it is what it is at its begin.
+
+    A step holds its effort, and the order of the sum does not depend on where `rows` begin: all chunks give the same bits.
+    """
+    for i in range(times.shape[0]):
+        for j in range(times.shape[1]):
+            last, end = place_of(times[i, j], begin, step)
+            number, start = place_of(times[i, j] - span, begin, step)
+            total = 0.0
+            for k in range(int(number), int(last)):
+                total += rows[max(k, 0) - first, 4 * j + 3]
+            total += end * rows[int(last) - first, 4 * j + 3]
+            total -= start * rows[max(int(number), 0) - first, 4 * j + 3]
+            out[i, j] = total / (last + end - number - start)

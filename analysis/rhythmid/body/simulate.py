@@ -14,7 +14,7 @@ from rhythmid.body.body import Array, Joint
 from rhythmid.body.held_means import held_means
 from rhythmid.body.machine import Machine
 from rhythmid.body.path_source import COLUMNS, Layout
-from rhythmid.body.samples import sample_columns, sample_joints
+from rhythmid.body.samples import mean_efforts, sample_columns, sample_joints
 from rhythmid.body.stepping_source import generate
 from rhythmid.errors import InputError
 from rhythmid.model import Model
@@ -161,17 +161,20 @@ def sampled(
     first: int,
     begin: float,
     noise: Sequence[list],
+    span: float = 0.0,
 ) -> JointTrajectory:
     """What is measured at stamps `times` (n,) of a run that begins at `begin` [s].
 
     `physical` (n, joints) tells when the measurements were taken, `rows` are of the steps from the number `first` on, and `noise` has for
-    each joint what happens to samples.
+    each joint what happens to samples. The effort is the mean over a `span` [s] before, or without one that of the instant.
     """
     names, nq = machine.joints, machine.body.model.nq
     made = np.empty((len(COLUMNS), len(times), len(names)))
     rows, step = np.ascontiguousarray(rows), machine.body.step
     sample_joints(rows, first, begin, step, np.ascontiguousarray(physical), made)
     position, velocity, output, effort = made
+    if span > 0.0:
+        mean_efforts(rows, first, begin, step, span, np.ascontiguousarray(physical), effort)
     for place, joint in enumerate(names):
         if not any(t.element.slot == "sensor" and t.element.kernel for t in machine.paths[joint].terms):
             output[:, place] = position[:, place]

@@ -34,16 +34,19 @@ def identify(
         Path | None, typer.Option("--save", help="Write delays and model for a controller.")
     ] = None,
     method: Annotated[
-        str, typer.Option("--method", help="joint (maximum likelihood) or paper (magnitudes, then phases).")
-    ] = "joint",
+        str | None,
+        typer.Option(
+            "--method", help="joint (maximum likelihood, the default) or paper (magnitudes, then phases)."
+        ),
+    ] = None,
     htf: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--htf",
-            help="How transfer functions are found: auto (as the excitation allows), separated_lines, "
+            help="How transfer functions are found: auto (as the excitation allows, the default), separated_lines, "
             "local_rational or regularised_least_squares (the paper's).",
         ),
-    ] = "auto",
+    ] = None,
     forcing: Annotated[
         str | None,
         typer.Option(
@@ -76,9 +79,13 @@ def identify(
 
     require_new(json, report, save_model, save)
     if model is not None and machines.is_machine(model):
-        machines.refuse(report=report, save=save, forcing=forcing, clock_offset=clock_offset)
+        machines.refuse(
+            report=report, save=save, forcing=forcing, clock_offset=clock_offset, clock_offset_std=clock_offset_std,
+            method=method, htf=htf,
+        )  # fmt: skip
         machines.identify_files(bags, model, signals, elements or (), json, save_model, Terminal(quiet, json))
         return
+    method, htf = method or "joint", htf or "auto"
     if method not in get_args(Method):
         raise InputError(f"--method {method}: one of {', '.join(get_args(Method))} is expected")
     if htf not in get_args(HtfMethod):

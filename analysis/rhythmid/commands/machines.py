@@ -7,17 +7,11 @@ from typing import TYPE_CHECKING
 
 from rhythmid.errors import InputError
 from rhythmid.output import write_json
-from rhythmid.report.quantity import NONE, number, rounded
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from rhythmid.body.machine import Machine
     from rhythmid.commands.terminal import Terminal
-    from rhythmid.diagnose.answer.result import Diagnosis
-    from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
     from rhythmid.elements.catalogue import Catalogue
-    from rhythmid.identify.joints.joint_identification import MachineIdentification
     from rhythmid.record.joint_record import JointRecord
 
 SUFFIXES = {"mujoco": ".xml", "urdf": ".urdf"}
@@ -83,7 +77,7 @@ def diagnose_files(
     unseen = load_joint_records(holdout, _signals(bags, signals)) if holdout else []
     with progress(terminal.progress, budget) as tell:
         answer = diagnose_machine(records, machine, unseen, catalogue, tell, budget)
-    show_diagnosis(answer.diagnosis, terminal.answer)
+    answer.show(terminal.answer)
     if json is not None:
         write_json(json, answer.diagnosis.to_dict())
     if report is not None:
@@ -95,51 +89,6 @@ def diagnose_files(
         write_page(report, present_machine(answer, machine, source, command_line()))
         terminal.say(f"report: {report}")
     saved(answer.machine, save_model, terminal)
-
-
-def show_diagnosis(found: "MachineDiagnosis", console: "Console") -> None:
-    """Print a diagnosis: the verdict, what is missing at which joint, then a row for every joint."""
-    from rich.markup import escape
-    from rich.table import Table
-
-    console.print(f"[bold]{found.verdict.replace('_', ' ')}[/]: {escape(found.summary)}")
-    for one in found.missing:
-        what = f"mass of {one.link}" if one.link else one.element
-        console.print(
-            f"[bold]{escape(one.joint)}: {escape(what)}[/]   {escape(one.equation)}   (probability {one.probability:.2f}, "
-            f"{number(100.0 * one.share, 3)} % of the joint's mismatch)"
-        )
-        for name, value in one.parameters.items():
-            std = "" if value.std is None else f" ± {value.std:.2g}"
-            console.print(f"  {name}: {rounded(value.value, value.std)}{std} {escape(value.unit)}")
-    for group in found.indistinguishable:
-        console.print(f"indistinguishable here: {escape(', '.join(group))}")
-    table = Table(title="error of the effort on data that no fit has seen, as a share of it")
-    for column in ("joint", "verdict", "nominal", "augmented", "left"):
-        table.add_column(column)
-    for joint, one in found.joints.items():
-        before, after = (one.fit[name].heldout_nrmse for name in ("refitted_nominal", "augmented"))
-        table.add_row(joint, one.verdict.replace("_", " "), _share(before), _share(after), left_words(one))
-    console.print(table)
-    for joint, why in found.not_judged.items():
-        console.print(f"not judged: {escape(joint)}: {escape(why)}")
-    for label, lines in (("assumption", found.assumptions), ("note", found.notes)):
-        for line in lines:
-            console.print(f"{label}: {escape(line)}")
-    console.print(f"next experiment: {escape(found.next_experiment)}")
-
-
-def left_words(one: "Diagnosis") -> str:
-    """What a joint's answer leaves of its mismatch, in words; a dash where there is no mismatch."""
-    if one.verdict == "consistent":
-        return NONE
-    if not one.remainder.significant:
-        return "noise"
-    return f"{100.0 * one.remainder.share:.0f} % of the mismatch"
-
-
-def _share(error: float | None) -> str:
-    return NONE if error is None else f"{number(100.0 * error, 3)} %"
 
 
 def saved(machine: "Machine", path: Path | None, terminal: "Terminal") -> None:
@@ -185,51 +134,20 @@ def identify_files(
     machine, records = loaded(model, load_catalogue(elements), bags, signals)
     with progress(terminal.progress) as tell:
         found = identify_machine(records, machine, tell=tell)
-    show_identification(found, terminal.answer)
+    found.show(terminal.answer)
     if json is not None:
         write_json(json, found.to_dict())
     saved(found.machine, save_model, terminal)
-
-
-def show_identification(found: "MachineIdentification", console: "Console") -> None:
-    """Print an identification: parameters, inertias, errors, and what the records do not tell apart."""
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table(title="parameters")
-    for column in ("name", "value", "std", "unit"):
-        table.add_column(column)
-    for name, one in found.parameters.items():
-        table.add_row(name, rounded(one.value, one.std), f"{one.std:.2g}", escape(one.unit))
-    console.print(table)
-    if found.inertia is not None:
-        seen = found.inertia
-        console.print(
-            f"{seen.rank} of {seen.count} inertial parameters, or combinations of them, are seen; condition {seen.condition:.3g}"
-        )
-        for link, values in seen.links.items():
-            centre = ", ".join(f"{values[name] / values['m']:.4g}" for name in ("mx", "my", "mz"))
-            console.print(f"{escape(link)}: mass {values['m']:.4g} kg, centre at ({centre}) m")
-    for joint, error in found.effort_nrmse.items():
-        runs = ", ".join(f"{number(100.0 * one[joint], 3)} % {name}" for name, one in found.free_run.items())
-        console.print(
-            f"{escape(joint)}: effort missed by {number(100.0 * error, 3)} %; free run, held out: {runs or 'none'}"
-        )
-    for label, lines in (("not separable", found.not_separable), ("note", found.notes)):
-        for line in lines:
-            console.print(f"{label}: {escape(line)}")
 
 
 def simulate_files(
     model: Path, experiment: Path, out: Path, elements: Sequence[Path], terminal: "Terminal"
 ) -> None:
     """Run an experiment with the machine of several joints in a model file, and write its bag."""
-    from rhythmid.body.joint_experiment import JointExperiment, perform
+    from rhythmid.body.joint_run import run_experiment
     from rhythmid.body.machine import Machine
     from rhythmid.elements.catalogue import load_catalogue
-    from rhythmid.record.joint_messages import write_joint_bag
 
-    machine = Machine.load(model, load_catalogue(elements))
-    made = perform(machine, JointExperiment.load(experiment))
-    write_joint_bag(out, {topic: (made.stamp_ns, *rest) for topic, rest in made.topics.items()})
-    terminal.say(f"{out}: {len(made.stamp_ns)} samples of {', '.join(made.topics)}")
+    made = run_experiment(Machine.load(model, load_catalogue(elements)), experiment)
+    made.save(out)
+    terminal.say(f"{out}: {made.headline} of {', '.join(made.messages.topics)}")

@@ -77,7 +77,7 @@ def watch(
     from rhythmid.twin.watch import Watch, watch_record
 
     catalogue = load_catalogue(elements or ())
-    machine = Model.load(model, catalogue)
+    machine = Model.of_one_axis(model, catalogue)
     record = read_record(bag, signals)
     settings = Settings.of(record, healthy, false_alarms)
     forced = record.forcing is not None

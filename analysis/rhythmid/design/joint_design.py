@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from rhythmid.body.joint_experiment import JointExcitation, JointExperiment, perform
+from rhythmid.body.joint_run import JointRun
 from rhythmid.body.machine import Machine
 from rhythmid.errors import InputError
 from rhythmid.excitation.multisine import Multisine
@@ -28,7 +29,6 @@ from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.model import INERTIA
 from rhythmid.progress import Tell
 from rhythmid.record.joint_record import JointRecord
-from rhythmid.record.record import Channel, Record
 
 Array = NDArray[np.float64]
 PERIODS = 2  # of the multisines in a run: what repeats shows the noise
@@ -194,21 +194,10 @@ def rehearsed(machine: Machine, experiment: JointExperiment) -> tuple[JointRecor
         made = perform(machine, experiment)
     except InputError:
         return None, dict.fromkeys(machine.joints, np.inf)
-    time = (made.stamp_ns * 1e-9).astype(np.float64)
-    joints, states = made.topics[f"{experiment.namespace}/joint_states"]
-    _, command = made.topics[f"{experiment.namespace}/command"]
-    records, units = {}, {}
-    for place, joint in enumerate(joints):
-        units[joint] = ("rad", "N*m") if machine.body.joints[joint].rotational else ("m", "N")
-        position = Channel(time, states["position"][:, place], units[joint][0])
-        records[joint] = Record("run", position)
-    for place, joint in enumerate(machine.joints):
-        asked = Channel(time, command["position"][:, place], units[joint][0])
-        effort = Channel(time, states["effort"][:, place], units[joint][1])
-        records[joint] = replace(records[joint], input=asked, effort=effort, input_kind="reference")
-    base = records.pop(machine.body.base) if machine.body.base in records else None
-    peak = {joint: float(np.abs(records[joint].effort.value).max()) for joint in machine.joints}
-    return JointRecord("run", records, base, "after_actuator"), peak
+    record = JointRun(machine, experiment, made).record
+    efforts = {joint: one.effort for joint, one in record.joints.items()}
+    peak = {joint: float(np.abs(one.value).max()) for joint, one in efforts.items() if one is not None}
+    return record, peak
 
 
 def predicted(
@@ -267,7 +256,7 @@ def save_joint_design(found: JointDesign, machine: Machine, model: Path, folder:
         "joints": list(machine.joints),
         "input": {"topic": f"{space}/command", "field": "position[*]"},
         "output": {"topic": f"{space}/joint_states", "field": "position[*]"},
-        "effort": {"field": "effort[*]", "taken": "after_actuator"},
+        "effort": {"field": "effort[*]", "taken": "after_actuator", "sampled": "mean"},
     }
     if machine.body.base in machine.body.joints:
         signals["base"] = {"field": f"position[{machine.body.base}]"}

@@ -8,7 +8,7 @@ it is.
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from threadpoolctl import threadpool_limits
 
@@ -42,6 +42,9 @@ from rhythmid.result import Result, Row, axis_or_new
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from rich.console import Console
+
+    from rhythmid.body.machine import Machine
+    from rhythmid.record.joint_record import JointRecord
 
 
 @dataclass(frozen=True)
@@ -144,9 +147,9 @@ class Answer(Result):
 
 
 def diagnose(
-    records: Record | Sequence[Record],
-    model: Model,
-    holdout: Record | Sequence[Record] = (),
+    records: "Record | JointRecord | Sequence[Record] | Sequence[JointRecord]",
+    model: "Model | Machine",
+    holdout: "Record | JointRecord | Sequence[Record] | Sequence[JointRecord]" = (),
     catalogue: Catalogue | None = None,
     tell: Tell = lambda _: None,
     budget: float | None = None,
@@ -171,7 +174,7 @@ def diagnose(
     Returns
     -------
     Answer
-        The same whenever the records are, but for a budget that ends the search.
+        The same whenever the records are, but for a budget that ends the search. A machine of several joints gives a `MachineAnswer`.
 
     Raises
     ------
@@ -187,10 +190,20 @@ def diagnose(
     >>> answer.diagnosis.verdict
     'consistent'
     """
-    records = (records,) if isinstance(records, Record) else records
-    holdout = (holdout,) if isinstance(holdout, Record) else holdout
-    if not records:
+    fitted = tuple(records) if isinstance(records, Sequence) else (records,)
+    judged = tuple(holdout) if isinstance(holdout, Sequence) else (holdout,)
+    if not fitted:
         raise InputError("no record is given; name at least one bag or table")
+    if not isinstance(model, Model):
+        from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine  # it needs MuJoCo
+
+        first, second = (cast("tuple[JointRecord, ...]", one) for one in (fitted, judged))
+        return cast(Answer, diagnose_machine(first, model, second, catalogue, tell, budget))
+    if not all(isinstance(record, Record) for record in (*fitted, *judged)):
+        raise InputError(
+            "these records are of several joints: give a model with a body:, as Model.load reads it"
+        )
+    records, holdout = cast(tuple[Record, ...], fitted), cast(tuple[Record, ...], judged)
     model = with_declared(model, (*records, *holdout))
     check_free(model)
     given = admitted(records, holdout, model)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,10 @@ from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.record import Record
 from rhythmid.simulation.signal import continuous, spline
 from rhythmid.simulation.simulate import simulate
+
+if TYPE_CHECKING:
+    from rhythmid.body.machine import Machine
+    from rhythmid.record.joint_record import JointRecord
 
 Array = NDArray[np.float64]
 Method = Literal["joint", "paper"]
@@ -100,8 +104,8 @@ def free_run_nrmse(model: Model, record: Record, start: Array) -> float:
 
 
 def identify(
-    records: Record | Sequence[Record],
-    model: Model | None = None,
+    records: "Record | JointRecord | Sequence[Record] | Sequence[JointRecord]",
+    model: "Model | Machine | None" = None,
     harmonics: int = HARMONICS,
     method: Method = "joint",
     forcing: Forcing | None = None,
@@ -134,7 +138,7 @@ def identify(
     Returns
     -------
     Identification
-        A fit that leaves more than a fifth of the motion is not `usable`.
+        A fit that leaves more than a fifth of the motion is not `usable`. A machine of several joints gives a `MachineIdentification`.
 
     Raises
     ------
@@ -166,9 +170,20 @@ def identify(
     >>> found.covariance.correlation.shape == (len(found.covariance.names),) * 2
     True
     """
-    given = (records,) if isinstance(records, Record) else tuple(records)
+    given = tuple(records) if isinstance(records, Sequence) else (records,)
     if not given:
         raise InputError("nothing to identify from: give at least one record")
+    if model is not None and not isinstance(model, Model):
+        from rhythmid.identify.joints.joint_identification import identify_machine  # it needs MuJoCo
+
+        if (method, forcing, offset, htf) != ("joint", None, None, "auto"):
+            raise InputError("method, forcing, offset and htf are for a machine of one axis; leave them out")
+        return cast(Identification, identify_machine(cast("Sequence[JointRecord]", given), model, tell=tell))
+    if not all(isinstance(record, Record) for record in given):
+        raise InputError(
+            "these records are of several joints: give a model with a body:, as Model.load reads it"
+        )
+    given = cast(tuple[Record, ...], given)
     clean = [cleaned(record) for record in given]
     cut = [note for one in clean for note in cut_at_gaps(one.record).notes]
     found = _identified(

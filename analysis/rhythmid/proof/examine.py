@@ -37,7 +37,7 @@ def examine(folder: Path, catalogue: Catalogue, budget: float | None = None) -> 
     answer: dict[str, Any] = {}
     try:
         tell("reading the records")
-        nominal = Model.load(folder / NOMINAL, catalogue)
+        nominal = Model.of_one_axis(folder / NOMINAL, catalogue)
         learn = load_records(_records(folder / LEARN))
         judge = load_records(_records(folder / JUDGE))
         found = diagnose(learn, nominal, judge, catalogue, tell, budget)

@@ -14,6 +14,7 @@ from rhythmid.record.block import Block
 from rhythmid.record.cleaning import LeftOut, cleaned
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.gaps import Cut, cut_at_gaps
+from rhythmid.record.joint_record import JointSignals, names_joints, read_joint_record
 from rhythmid.record.message_types import stamp_path
 from rhythmid.record.quality import ChannelQuality
 from rhythmid.record.read import read_record
@@ -153,23 +154,32 @@ class BagReport:
         return "nothing but what the notes say" if self.notes else "flawless"
 
 
-def quality_report(source: str | Path, signals: Signals | str | Path | None = None) -> BagReport:
-    """Report on a bag, or on the tables that a signals.yaml names.
+def quality_report(
+    source: str | Path, signals: Signals | JointSignals | str | Path | None = None
+) -> BagReport:
+    """Report on a bag, or on the tables that a signals.yaml names; of several joints all channels, by "joint.role".
 
     It tells what analyses will leave out of the record and where they will cut it. What makes the recording unusable as a record is
     reported, not raised: InputError is left for a source that is no recording at all.
     """
     source = Path(source)
     if isinstance(signals, (str, Path)):
-        signals = Signals.load(signals)
+        signals = JointSignals.load(signals) if names_joints(signals) else Signals.load(signals)
     channels: dict[str, ChannelQuality] = {}
     problems: list[str] = []
     notes: list[str] = []
     duration, record, left_out, cut = 0.0, None, (), None
     try:
-        record = read_record(source, signals)
-        channels, duration = dict(record.quality.channels), record.duration
-        notes += record.quality.notes
+        parts: dict[str, Record] = {}
+        if isinstance(signals, JointSignals):
+            parts = {f"{joint}.": one for joint, one in read_joint_record(source, signals).every.items()}
+        else:
+            record = read_record(source, signals)
+            parts = {"": record}
+        for begin, one in parts.items():
+            channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
+            notes += [note for note in one.quality.notes if note not in notes]
+        duration = max(one.duration for one in parts.values())
     except InputError as error:
         if not is_bag(source) or not source.exists():
             raise

@@ -5,7 +5,7 @@ A signals.yaml with `joints:` says of all joints at once which channel is what:
     joints: [hip, knee]                               # or {hip: left_hip, …}: the recording's own names
     input:  {topic: /cmd, field: "position[*]", feedforward: "effort[*]"}
     output: {topic: /joint_states, field: "position[*]"}
-    effort: {field: "effort[*]", taken: before_actuator}          # or after_actuator
+    effort: {field: "effort[*]", taken: before_actuator, sampled: mean}   # or after_actuator; or instant
     base:   {field: "position[rail]"}                 # where the body's base moves along a joint
 
 `[*]` stands for each joint's name in a bag and for its place in the list in a table's array (`column: "q[*]"`); elsewhere in a column's
@@ -20,31 +20,40 @@ from typing import Literal
 
 from pydantic import TypeAdapter
 
-from rhythmid.document import Node, read
+from rhythmid.document import Node, parse, read
 from rhythmid.record.read import read_record, read_tables
 from rhythmid.record.record import Record
 from rhythmid.record.signals import Signals
 from rhythmid.validation import validated
 
 Taken = Literal["before_actuator", "after_actuator"]
+Sampled = Literal["mean", "instant"]
 _TAKEN: TypeAdapter[Taken] = TypeAdapter(Taken)
+_SAMPLED: TypeAdapter[Sampled] = TypeAdapter(Sampled)
 _TEXT: TypeAdapter[str] = TypeAdapter(str)
 SHARED = ("topic", "file", "time")  # what a channel takes from the output's where it says nothing
 
 
 @dataclass(frozen=True)
 class JointSignals:
-    """Contents of a signals.yaml with `joints:`, as the signals of each joint by itself; `base` of the base's joint."""
+    """Contents of a signals.yaml with `joints:`, as the signals of each joint by itself; `base` of the base's joint, `sampled` whether an
+    effort is the mean over a sample period or that of an instant, where that is said."""
 
     joints: Mapping[str, Signals]
     base: Signals | None
     taken: Taken
     path: Path
+    sampled: Sampled | None = None
 
     @classmethod
     def load(cls, path: str | Path) -> "JointSignals":
         """The signals.yaml at `path`. Raises InputError naming line and key of what is wrong."""
         return _joint_signals(read(path), Path(path))
+
+    @classmethod
+    def from_text(cls, text: str, path: str | Path = "signals.yaml") -> "JointSignals":
+        """The signals in a YAML text that stands for the file `path`."""
+        return _joint_signals(parse(text, str(path)), Path(path))
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +65,12 @@ class JointRecord:
     joints: Mapping[str, Record]
     base: Record | None = None
     taken: Taken = "before_actuator"
+    sampled: Sampled | None = None
+
+    @property
+    def every(self) -> dict[str, Record]:
+        """The record of every joint, and of the base as `base`."""
+        return dict(self.joints) if self.base is None else {**self.joints, "base": self.base}
 
     def cut(self, start: float, end: float) -> "JointRecord":
         """What lies within [start, end) seconds."""
@@ -69,6 +84,12 @@ class JointRecord:
         return max(float(one[0]) for one in times), min(float(one[-1]) for one in times)
 
 
+def names_joints(signals: str | Path) -> bool:
+    """Whether a signals.yaml is of several joints. Raises InputError where it cannot be read."""
+    value = read(signals).value
+    return isinstance(value, dict) and "joints" in value
+
+
 def load_joint_records(paths: Iterable[str | Path], signals: JointSignals | str | Path) -> list[JointRecord]:
     """Read several recordings. Raises InputError as `read_record` does."""
     known = signals if isinstance(signals, JointSignals) else JointSignals.load(signals)
@@ -79,7 +100,7 @@ def read_joint_record(source: str | Path, signals: JointSignals) -> JointRecord:
     """Read one recording: a bag, or a table whose columns the signals name. A signals.yaml that names its tables stands for itself."""
     found = {joint: _read(source, one, signals.path) for joint, one in signals.joints.items()}
     base = None if signals.base is None else _read(source, signals.base, signals.path)
-    return JointRecord(next(iter(found.values())).name, found, base, signals.taken)
+    return JointRecord(next(iter(found.values())).name, found, base, signals.taken, signals.sampled)
 
 
 def _read(source: str | Path, signals: Signals, path: Path) -> Record:
@@ -97,10 +118,13 @@ def _joint_signals(document: Node, path: Path) -> JointSignals:
     if output is None:
         document.fail("'output:' is missing: which channel is the measured motion?")
     taken: Taken = "before_actuator"
+    sampled: Sampled | None = None
     if "effort" in keys:
         options = dict(keys["effort"].mapping())
         if "taken" in options:
             taken = validated(options.pop("taken"), _TAKEN)
+        if "sampled" in options:
+            sampled = validated(options.pop("sampled"), _SAMPLED)
         keys["effort"] = replace(keys["effort"], value=options)
     if "input" in keys and isinstance(keys["input"].value, dict):
         options = dict(keys["input"].value)
@@ -124,7 +148,7 @@ def _joint_signals(document: Node, path: Path) -> JointSignals:
         kept = {name: one for name, one in keys.items() if name in ("time", "use", "tables")}
         measured = replace(document, value={**kept, "output": _with_shared(base, output)})
         of_base = Signals.from_node(measured, path)
-    return JointSignals(found, of_base, taken, path)
+    return JointSignals(found, of_base, taken, path, sampled)
 
 
 def _names(node: Node) -> dict[str, str]:

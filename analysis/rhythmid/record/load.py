@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from rhythmid.plain_yaml import plain_yaml
+from rhythmid.record.joint_record import JointSignals, names_joints, read_joint_record
 from rhythmid.record.read import read_record
 from rhythmid.record.record import Record
 from rhythmid.record.signals import Signals
@@ -12,10 +13,10 @@ from rhythmid.record.signals import Signals
 
 def load(
     source: str | Path,
-    signals: Signals | Mapping[str, Any] | str | Path | None = None,
+    signals: Signals | JointSignals | Mapping[str, Any] | str | Path | None = None,
     use: tuple[float, float] | None = None,
 ) -> Record:
-    """Read a recording.
+    """Read a recording; a `JointRecord` where the signals have `joints`.
 
     Parameters
     ----------
@@ -49,6 +50,12 @@ def load(
     (200, 'rad', 1.99)
     """
     if isinstance(signals, Mapping):
-        signals = Signals.from_text(plain_yaml(signals, "signals"))
-    record = read_record(source, signals)
+        text = plain_yaml(signals, "signals")
+        signals = JointSignals.from_text(text) if "joints" in signals else Signals.from_text(text)
+    elif signals is not None and not isinstance(signals, (Signals, JointSignals)) and names_joints(signals):
+        signals = JointSignals.load(signals)
+    if isinstance(signals, JointSignals):
+        record = cast(Record, read_joint_record(source, signals))
+    else:
+        record = read_record(source, signals)
     return record if use is None else record.cut(*use)

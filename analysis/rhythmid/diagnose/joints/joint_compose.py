@@ -30,17 +30,18 @@ def compose_machine(
     found: Mapping[str, JointResult],
     answers: Mapping[str, Diagnosis],
     stated: Mapping[str, Sequence[str]],
-    links: Mapping[str, Estimate],
+    links: Mapping[str, JointResult],
     refused: Mapping[str, str],
+    notes: Sequence[str] = (),
 ) -> MachineDiagnosis:
-    """The diagnosis; `links` are the masses that were put right, `stated` the labels by which the answer at each joint stands."""
+    """The diagnosis; `links` are, by their masses that were put right, what showed these, `stated` the labels by which the answer at each joint stands."""
     missing = [
         _effect(found[joint], answers[joint], label)
         for joint, labels in stated.items()
         for label in labels
         if label.removeprefix(f"{BODY}.") not in links
     ]
-    missing += [_link(machine, link, estimate, found) for link, estimate in links.items()]
+    missing += [_link(machine, link, one) for link, one in links.items()]
     missing.sort(key=lambda one: -one.heldout_gain)
     named = {one.joint for one in missing}
     unknown = tuple(j for j, one in answers.items() if one.verdict == "unknown_physics")
@@ -77,6 +78,7 @@ def compose_machine(
         joints=dict(answers),
         not_judged=dict(refused),
         assumptions=_assumptions(machine, found, answers),
+        notes=tuple(notes),
     )
 
 
@@ -127,14 +129,20 @@ def _gain(one: JointResult) -> float:
     return (before - after) / size
 
 
-def _link(machine: Machine, link: str, estimate: Estimate, found: Mapping[str, JointResult]) -> JointEffect:
-    name = link.removesuffix(".mass")
-    joint = machine.body.joint_of(name)
+def _link(machine: Machine, link: str, one: JointResult) -> JointEffect:
+    """A link's mass, with the evidence of the joint that showed it best."""
+    name, label, decision = link.removesuffix(".mass"), f"{BODY}.{link}", one.result.decision
     slot, equation = EQUATIONS["link_mass"]
-    first = found.get(joint) or next(iter(found.values()))
     return JointEffect(
-        first.joint, "link_mass", slot, equation, 1.0, 1.0, {"mass": estimate}, _gain(first), name
-    )
+        machine.body.joint_of(name), "link_mass", slot, equation, decision.shares[label], decision.probability[label],
+        {"mass": estimate_of(one, label)}, _gain(one), name,
+    )  # fmt: skip
+
+
+def estimate_of(one: JointResult, name: str) -> Estimate:
+    """A parameter of a joint's path as it was fitted."""
+    value = one.result.chosen.model.parameters[name]
+    return Estimate(value.value, one.result.chosen.std().get(name, 0.0), value.unit)
 
 
 def _summary(

@@ -5,28 +5,36 @@ all joints. A link whose mass is wrong shows at every joint that carries it: whe
 it are searched again.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from rhythmid.body.body import BODY
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.compose_effort import compose_effort
-from rhythmid.diagnose.answer.result import Diagnosis, Estimate
+from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import STATED
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
-from rhythmid.diagnose.joints.joint_compose import compose_machine
+from rhythmid.diagnose.joints.joint_compose import compose_machine, estimate_of
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.identify.joints.held_reference import balances_of, with_likely_lead
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.joints.joint_order import check_order
 from rhythmid.identify.joints.reference_delay import reference_delay
+from rhythmid.identify.joints.reference_lead import told_of
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned_joints
 from rhythmid.record.joint_record import JointRecord
+from rhythmid.result import Result, Row
 from rhythmid.simulation.transport import INPUT_DELAY
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 MOST_LINKS = 2  # links whose masses are put right, at most
 LIGHTEST = 0.1  # of the mass that the file gives a link, below which another effect has swallowed it
@@ -34,12 +42,39 @@ MATTERS = 0.02  # of a mass or an inertia, below which it is as right as a balan
 
 
 @dataclass(frozen=True)
-class MachineAnswer:
+class MachineAnswer(Result):
     """A diagnosis, the augmented machine, and what was found at each joint."""
 
     diagnosis: MachineDiagnosis
     machine: Machine
     results: Mapping[str, JointResult]
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        return self.diagnosis.summary
+
+    def show(self, console: "Console") -> None:
+        from rhythmid.diagnose.joints.printed import show_diagnosis
+
+        show_diagnosis(self.diagnosis, console)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The diagnosis as plain data."""
+        return self.diagnosis.to_dict()
+
+    def tables(self) -> Mapping[str, Sequence[Row]]:
+        """The `joints` with their verdicts and errors, and what is `missing`."""
+        joints = [
+            {"joint": joint, "verdict": one.verdict}
+            | {name: one.fit[name].heldout_nrmse for name in ("refitted_nominal", "augmented")}
+            for joint, one in self.diagnosis.joints.items()
+        ]
+        missing = [
+            {"joint": one.joint, "element": one.element, "probability": one.probability, "share": one.share}
+            for one in self.diagnosis.missing
+        ]
+        return {"joints": joints, "missing": missing}
 
 
 def diagnose_machine(
@@ -57,11 +92,13 @@ def diagnose_machine(
     if not records:
         raise InputError("no record is given; name at least one bag or table")
     known, spent = catalogue or load_catalogue(), Budget(budget)
-    nominal, links = machine, {}
+    nominal = machine
+    links: dict[str, JointResult] = {}
     records, said = cleaned_joints(records)
     holdout, of_holdout = cleaned_joints(holdout)
-    balances = JointBalances.of(machine, records)
+    balances = balances_of(machine, records)
     check_order(balances)
+    balances = with_likely_lead(balances, records)
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
     found, refused = _searched(balances, unseen, machine.joints, known, tell, spent)
     for _ in range(MOST_LINKS):
@@ -69,8 +106,8 @@ def diagnose_machine(
         if best is None or spent.spent:
             break
         link, result = best
-        links[link] = _estimate(result, f"{BODY}.{link}")
-        machine = machine.with_inertial({link: links[link].value})
+        links[link] = result
+        machine = machine.with_inertial({link: estimate_of(result, f"{BODY}.{link}").value})
         balances = JointBalances.of(machine, records, balances)
         unseen = JointBalances.of(machine, holdout, balances) if holdout else None
         again = [joint for joint in machine.joints if link in balances.links(joint)]
@@ -80,8 +117,9 @@ def diagnose_machine(
         raise InputError(f"no joint can be judged: {next(iter(refused.values()))}")
     answers = {joint: _answer(one) for joint, one in found.items()}
     stated = {joint: stated_at(one) for joint, one in found.items()}
-    diagnosis = compose_machine(nominal, found, answers, stated, links, refused)
-    diagnosis = replace(diagnosis, notes=(*said, *of_holdout))
+    told = () if records[0].sampled else tuple(told_of(balances.leads))
+    notes = (*said, *of_holdout, *told)
+    diagnosis = compose_machine(nominal, found, answers, stated, links, refused, notes)
     return MachineAnswer(diagnosis, _augmented(machine, found, stated), found)
 
 
@@ -154,12 +192,6 @@ def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, J
     return None if best is None else best[1:]
 
 
-def _estimate(one: JointResult, name: str) -> Estimate:
-    fitted = one.result.chosen
-    value = fitted.model.parameters[name]
-    return Estimate(value.value, fitted.std().get(name, 0.0), value.unit)
-
-
 def _answer(one: JointResult) -> Diagnosis:
     return compose_effort(one.case, one.result, ())
 
@@ -169,6 +201,7 @@ def _augmented(
 ) -> Machine:
     """The machine with what was fitted, and with what the answer stands by."""
     inertial: dict[str, float] = {}
+    spreads: dict[str, float] = {}
     for joint, one in found.items():
         fitted = one.result.chosen if stated[joint] else one.result.nominal
         path = machine.paths[joint]
@@ -176,6 +209,10 @@ def _augmented(
         if INERTIA in fitted.fit.names:
             before = machine.body.parameters[f"{joint}.armature"]
             inertial[f"{joint}.armature"] = max(before + rotor, 0.0)
+        for label, std in fitted.std().items():  # a free mass is as the joint says that tells it best
+            link = label.removeprefix(f"{BODY}.")
+            if label.startswith(f"{BODY}.") and std < spreads.get(link, math.inf):
+                inertial[link], spreads[link] = fitted.model.value(label), std
         machine = machine.with_path(joint, _without_body(fitted.model, path))
     return machine.with_inertial(inertial) if inertial else machine
 

@@ -7,11 +7,10 @@ inverse dynamics being what is known before.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rhythmid.body.body import BODY
@@ -20,6 +19,8 @@ from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit, fit_effort, size_of
 from rhythmid.identify.joints.base_parameters import InertialEstimate, estimate_inertia
+from rhythmid.identify.joints.correlation import Correlations
+from rhythmid.identify.joints.held_reference import balances_of, not_told
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.joints.joint_order import check_order
 from rhythmid.identify.joints.output_error import Knowledge, free_runs, refine
@@ -28,8 +29,16 @@ from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned_joints
 from rhythmid.record.joint_record import JointRecord
+from rhythmid.result import Result, Row
+from rhythmid.statistics import NORMAL_95
 
-CLOSE = 0.9  # correlation of two estimates, from which the records tell only a combination of them
+if TYPE_CHECKING:
+    from rich.console import Console
+
+WORSE = (
+    1.1  # times the error of free runs with the given values, from which the identified ones are warned of
+)
+MUCH = 0.005  # of the motion, by which it has to grow as well: a right model's free runs scatter by more
 LOOSE = 5.0  # times its standard deviation by inverse dynamics that a parameter may move in free runs: errors of the filter are in it
 RELATIVE = 0.3  # of its value, the same at least
 EXPECTED = (
@@ -46,36 +55,74 @@ class JointEstimate:
     std: float
     unit: str
 
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval."""
+        return self.value - NORMAL_95 * self.std, self.value + NORMAL_95 * self.std
+
+    def to_dict(self) -> dict[str, Any]:
+        """The estimate as plain data."""
+        return {"value": self.value, "std": self.std, "unit": self.unit, "interval": list(self.interval)}
+
 
 @dataclass(frozen=True)
-class MachineIdentification:
+class MachineIdentification(Result):
     """What was found.
 
     `parameters` by "joint.element.parameter" and "body.joint.armature"; `effort_nrmse` of each joint's predicted effort, `free_run`
-    of its motion as given and as identified, on records or ends of records that no fit has seen where `unseen`; `not_separable` in
-    words.
+    of its motion as given and as identified, on records or ends of records that no fit has seen where `unseen`; `worse` the joints whose
+    motion the identified values predict worse than those given; `not_separable` in words.
     """
 
     machine: Machine
     parameters: dict[str, JointEstimate]
-    correlations: dict[str, float]
+    correlations: Correlations
     not_separable: tuple[str, ...]
     inertia: InertialEstimate | None
     effort_nrmse: dict[str, float]
     free_run: dict[str, dict[str, float]]
     unseen: bool
+    worse: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
+
+    @property
+    def headline(self) -> str:
+        """How well the efforts are predicted."""
+        worst = max(self.effort_nrmse, key=lambda joint: self.effort_nrmse[joint])
+        return f"{len(self.parameters)} parameters; efforts missed by {100.0 * self.effort_nrmse[worst]:.3g} % at most, at {worst}"
+
+    def show(self, console: "Console") -> None:
+        from rhythmid.identify.joints.printed import show_identification
+
+        show_identification(self, console)
+
+    def tables(self) -> Mapping[str, Sequence[Row]]:
+        """The `parameters`, and of each joint the `errors`."""
+        rows = [
+            {"name": name, "value": one.value, "std": one.std, "unit": one.unit}
+            for name, one in self.parameters.items()
+        ]
+        errors = [
+            {"joint": joint, "effort": error} | {name: run[joint] for name, run in self.free_run.items()}
+            for joint, error in self.effort_nrmse.items()
+        ]
+        return {"parameters": rows, "errors": errors}
 
     def to_dict(self) -> dict[str, Any]:
         """The identification as plain data."""
         from dataclasses import asdict
 
         return {
-            "parameters": {name: asdict(one) for name, one in self.parameters.items()},
-            "correlations": self.correlations,
+            "parameters": {name: one.to_dict() for name, one in self.parameters.items()},
+            "correlations": self.correlations.to_dict(),
             "not_separable": list(self.not_separable),
             "inertia": None if self.inertia is None else asdict(self.inertia),
-            "quality": {"effort_nrmse": self.effort_nrmse, "free_run": self.free_run, "unseen": self.unseen},
+            "quality": {
+                "effort_nrmse": self.effort_nrmse,
+                "free_run": self.free_run,
+                "unseen": self.unseen,
+                "worse": list(self.worse),
+            },
             "notes": list(self.notes),
         }
 
@@ -98,11 +145,11 @@ def identify_machine(
     records, said = cleaned_joints(records)
     holdout, of_holdout = cleaned_joints(holdout)
     seen, unseen = (records, holdout) if holdout else _split(records)
-    balances = JointBalances.of(machine, seen)
+    balances = balances_of(machine, seen)
     check_order(balances)
     fits: dict[str, tuple[Balance, EffortFit]] = {}
     found: dict[str, JointEstimate] = {}
-    correlations: dict[str, float] = {}
+    correlations: list[Correlations] = []
     errors: dict[str, float] = {}
     identified = machine
     rotors = {
@@ -119,7 +166,7 @@ def identify_machine(
         fits[joint] = balance, fit
         errors[joint] = fit.error / size_of(balance)
         identified = _with_fit(identified, machine, joint, fit, late, balances.period, found)
-        correlations |= _correlations(joint, fit)
+        correlations.append(Correlations.of_fit(joint, fit))
     inertia = None
     if not balances.computed:
         tell("inertias of the links")
@@ -131,16 +178,36 @@ def identify_machine(
         runs["given"] = free_runs(machine, others, unseen).nrmse
         if free and balances.computed:
             known = _known(identified, found)
-            identified, spread = refine(identified, balances, seen, known, EXPECTED)
+            identified, spread, refined = refine(identified, balances, seen, known, EXPECTED)
+            correlations.append(refined)
             for name, std in spread.items():
                 found[name] = replace(found[name], value=identified.value(name), std=std)
         runs["identified"] = free_runs(identified, others, unseen).nrmse
     except InputError as error:
         notes.append(f"no free run: {error}")
+    told = Correlations.joined(correlations)
+    worse = worse_joints(runs)
+    notes.extend(_warning(joint, runs) for joint in worse)
     return MachineIdentification(
-        identified, found, correlations, _not_separable(machine, correlations, balances.computed), inertia, errors,
-        runs, True, tuple(notes),
+        identified, found, told, (*_not_separable(told, balances.computed), *not_told(balances, seen)), inertia, errors,
+        runs, True, worse, tuple(notes),
     )  # fmt: skip
+
+
+def worse_joints(runs: Mapping[str, Mapping[str, float]]) -> tuple[str, ...]:
+    """The joints whose motion free runs predict worse with the identified values than with the given ones."""
+    if not {"given", "identified"} <= runs.keys():
+        return ()
+    before, after = runs["given"], runs["identified"]
+    return tuple(joint for joint in before if after[joint] > max(WORSE * before[joint], before[joint] + MUCH))
+
+
+def _warning(joint: str, runs: Mapping[str, Mapping[str, float]]) -> str:
+    before, after = (100.0 * runs[name][joint] for name in ("given", "identified"))
+    return (
+        f"{joint}: the identified values predict the motion worse ({after:.3g} % of it is missed) than the given ones ({before:.3g} %); do not "
+        "use them: an effort of another scale or instant, or an effect that the model lacks, is in them; try `rhythmid diagnose`"
+    )
 
 
 def _split(records: Sequence[JointRecord]) -> tuple[list[JointRecord], list[JointRecord]]:
@@ -184,23 +251,6 @@ def _with_fit(
     return machine
 
 
-def _correlations(joint: str, fit: EffortFit) -> dict[str, float]:
-    """Correlations of a joint's estimates that are close, by "first ~ second"."""
-    weight = fit.jacobian / fit.scale
-    normal = weight.T @ weight + np.diag(fit.precision)
-    scaling = 1.0 / np.sqrt(np.diag(normal))
-    covariance = np.linalg.pinv(normal * np.outer(scaling, scaling))
-    spread = np.sqrt(np.diag(covariance))
-    both = covariance / np.outer(spread, spread)
-    names = ["alignment", *fit.names]
-    return {
-        f"{joint}.{names[i]} ~ {joint}.{names[j]}": float(both[i, j])
-        for i in range(len(names))
-        for j in range(i)
-        if abs(both[i, j]) > CLOSE
-    }
-
-
 def _known(machine: Machine, found: dict[str, JointEstimate]) -> dict[str, Knowledge]:
     """What inverse dynamics says of the parameters that free runs refine: all but the rotors' inertias, which it tells better."""
     known = {}
@@ -213,16 +263,12 @@ def _known(machine: Machine, found: dict[str, JointEstimate]) -> dict[str, Knowl
     return known
 
 
-def _not_separable(
-    machine: Machine, correlations: dict[str, float], computed: Sequence[str]
-) -> tuple[str, ...]:
+def _not_separable(correlations: Correlations, computed: Sequence[str]) -> tuple[str, ...]:
     """In words, what the records do not tell apart."""
     said = []
-    for pair, value in correlations.items():
-        first, second = (one.replace("_", " ") for one in pair.split(" ~ "))
-        said.append(
-            f"{first} and {second}: only a combination of the two is identifiable (correlation {value:.2f})"
-        )
+    for first, second, value in correlations.close():
+        pair = f"{first} and {second}".replace("_", " ")
+        said.append(f"{pair}: only a combination of the two is identifiable (correlation {value:.2f})")
     if computed:
         said.append(
             "armature and delay of the reference: without a recorded torque a later command looks like a heavier rotor"

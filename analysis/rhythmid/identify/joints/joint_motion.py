@@ -6,7 +6,7 @@ parameters). So each joint is balanced as the one of a machine of one axis, with
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -75,7 +75,8 @@ class BodyMotion:
 class JointBalances:
     """The balances of effort of all joints: of each its path as a model of one axis, and its motions.
 
-    `computed` are the joints whose effort is what their controller's known gains make of the reference.
+    `computed` are the joints whose effort is what their controller's known gains make of the reference; `leads` [s] of others are what the
+    references in their recorded efforts were ahead by, and are not in the motions.
     """
 
     machine: Machine
@@ -85,6 +86,7 @@ class JointBalances:
     bodies: list[BodyMotion]
     period: float
     computed: tuple[str, ...]
+    leads: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -93,7 +95,8 @@ class JointBalances:
         records: Sequence[JointRecord],
         alike: "JointBalances | None" = None,
     ) -> "JointBalances":
-        """The balances of these records, filtered as those `alike`. Raises InputError where the records hold too little."""
+        """The balances of these records, filtered as those `alike` and without the same leads. Raises InputError where the records hold
+        too little."""
         stretches = joint_stretches(machine, records)
         cut, dominant = (alike.cut, alike.dominant) if alike else _cut(machine, stretches)
         bodies = [_body_motion(machine, one, cut) for one in stretches]
@@ -120,7 +123,23 @@ class JointBalances:
             else {joint: _bandwidth(motions[joint], cut, dominant) for joint in machine.joints}
         )
         computed = tuple(joint for joint in machine.joints if joint in stretches[0].reference)
-        return cls(machine, models, motions, bandwidths, bodies, period, computed)
+        made = cls(machine, models, motions, bandwidths, bodies, period, computed)
+        return made.with_leads(alike.leads) if alike else made
+
+    def with_leads(self, leads: Mapping[str, float]) -> "JointBalances":
+        """The balances with recorded efforts in which the references are older by these leads [s]."""
+        motions = dict(self.motions)
+        for joint, lead in leads.items():
+            gain = self.machine.paths[joint].value("position_control.proportional")
+            motions[joint] = [
+                replace(
+                    motion, effort=motion.effort + gain * _decimated(body, one.moved(body.stretch.time, lead))
+                )
+                if (one := body.stretch.held.get(joint)) is not None
+                else motion
+                for motion, body in zip(self.motions[joint], self.bodies, strict=True)
+            ]
+        return replace(self, motions=motions, leads={**self.leads, **leads})
 
     def links(self, joint: str) -> tuple[str, ...]:
         """The links whose masses a joint feels, as "link.mass"."""
@@ -233,7 +252,7 @@ def _motion(
     stretch, known = body.stretch, machine.body.parameters
     effort = np.zeros(len(x))
     if joint in stretch.effort:
-        effort = low_pass(stretch.effort[joint], stretch.period, 1.0 / (FINER * body.period))[:: body.every]
+        effort = _decimated(body, stretch.effort[joint])
     found = {
         f"{BODY}.{link}": (known[link], np.ascontiguousarray(column[:, own.velocity]))
         for link, column in columns.items()
@@ -242,6 +261,11 @@ def _motion(
         stretch.record, stretch.name, body.time, x, v, a, x, v, effort, body.period,
         coupling=body.force[:, own.velocity] - model.mass.value * a, links=found,
     )  # fmt: skip
+
+
+def _decimated(body: BodyMotion, signal: Array) -> Array:
+    """A signal at a stretch's samples as one at the motion's."""
+    return low_pass(signal, body.stretch.period, 1.0 / (FINER * body.period))[:: body.every]
 
 
 def _bandwidth(motions: Sequence[Motion], cut: float, dominant: float) -> Bandwidth:

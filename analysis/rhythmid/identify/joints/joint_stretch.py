@@ -1,7 +1,7 @@
 """What was recorded of a machine of several joints, in stretches without a gap and without contact, on one grid for all joints."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from rhythmid.body.machine import FREE, Machine
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.motion import SHORTEST
+from rhythmid.identify.joints.reference_lead import HeldReference, held_reference
 from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.record import Record, Uniform
@@ -26,7 +27,8 @@ MOST = (
 @dataclass(frozen=True, eq=False)
 class JointStretch:
     """One stretch of a record: time (n,) [s], pose (n, nv) of the whole body, and by joint (n, joints) the effort, where that was
-    recorded or is the command, and the reference of its controller with what the controller adds to its force."""
+    recorded or is the command, and the reference of its controller with what the controller adds to its force. `held` are
+    the references that are held while the effort was recorded in step with them."""
 
     record: int
     name: str
@@ -36,6 +38,7 @@ class JointStretch:
     reference: dict[str, Array]
     forward: dict[str, Array]
     period: float
+    held: dict[str, HeldReference] = field(default_factory=dict)
 
 
 def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[JointStretch]:
@@ -53,6 +56,9 @@ def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[Jo
         beside[1:] |= touching[:-1]
         beside[:-1] |= touching[1:]
         flying = ~np.repeat(beside, every)[: len(grid)]
+        held = {
+            joint: one for joint in machine.joints if (one := _held(machine, record, joint, grid)) is not None
+        }
         ends = np.flatnonzero(np.diff(np.concatenate([[0], (valid & flying).astype(int), [0]])))
         for first, end in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
             if end - first < SHORTEST:
@@ -66,6 +72,7 @@ def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[Jo
                     {joint: one[1][part] for joint, one in driven.items() if one[1] is not None},
                     {joint: one[2][part] for joint, one in driven.items() if one[2] is not None},
                     period,
+                    {joint: replace(one, between=one.between[part]) for joint, one in held.items()},
                 )
             )  # fmt: skip
     if not found:
@@ -137,6 +144,15 @@ def _at(grid: Uniform, time: Array) -> Uniform:
         time, output, grid.period, valid, **held, forcing=moved(grid.forcing), effort=moved(grid.effort),
         reference=moved(grid.reference),
     )  # fmt: skip
+
+
+def _held(machine: Machine, record: JointRecord, joint: str, grid: Array) -> HeldReference | None:
+    """The reference of a joint whose effort was recorded in step with it, where it is held between its stamps."""
+    one = record.joints[joint]
+    given = one.reference or (one.input if one.input_kind == "reference" else None)
+    if one.effort is None or given is None or one.hold != "zero" or not machine.controlled(joint):
+        return None
+    return held_reference(one.effort, given, grid)
 
 
 def _drives(model: Model, record: Record, grid: Uniform) -> tuple[Array | None, Array | None, Array | None]:

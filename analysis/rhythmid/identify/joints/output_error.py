@@ -19,6 +19,7 @@ from rhythmid.body.machine import FIXED, Machine
 from rhythmid.body.simulate import run_steps
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
+from rhythmid.identify.joints.correlation import Correlations
 from rhythmid.identify.joints.joint_motion import BodyMotion, JointBalances
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.record import Channel
@@ -101,8 +102,8 @@ def refine(
     records: Sequence[JointRecord],
     known: Mapping[str, Knowledge],
     noise: float,
-) -> tuple[Machine, dict[str, float]]:
-    """The machine whose named parameters fit the free runs, and their standard deviations.
+) -> tuple[Machine, dict[str, float], Correlations]:
+    """The machine whose named parameters fit the free runs, their standard deviations and their correlations.
 
     `noise` is the error that is expected of a right model, as a share of the motion: it weighs the runs against what is `known`.
     """
@@ -142,8 +143,9 @@ def refine(
     found = solve(
         residual, np.clip((start - mean) / std, *ends), jacobian, bounds=ends, max_nfev=TRIALS, loss="linear"
     )
-    spread = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac))) * std
-    return moved(mean + std * found.x), dict(zip(names, spread.tolist(), strict=True))
+    covariance = np.asarray(np.linalg.inv(found.jac.T @ found.jac), dtype=np.float64)
+    spread = dict(zip(names, (np.sqrt(np.diag(covariance)) * std).tolist(), strict=True))
+    return moved(mean + std * found.x), spread, Correlations.of_covariance(names, covariance)
 
 
 def _repeats(balances: JointBalances) -> float:

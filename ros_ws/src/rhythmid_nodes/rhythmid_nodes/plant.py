@@ -124,7 +124,7 @@ class PlantNode(GraphNode):
         if initial is not None and len(initial) != 2:
             raise InputError(f"parameter initial = {initial}: position [m] and velocity [m/s] are expected")
         catalogue = load_catalogue(tuple(Path(folder) for folder in values["elements"] or ()))
-        model = Model.load(values["model"], catalogue)
+        model = Model.of_one_axis(values["model"], catalogue)
         if model.term("periodic_forcing") is not None:
             model = model.without("periodic_forcing")
         forcing = Forcing(values["forcing_amplitude"], values["forcing_frequency"], values["forcing_phase"])

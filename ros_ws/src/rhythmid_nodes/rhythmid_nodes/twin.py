@@ -124,7 +124,7 @@ class TwinNode(GraphNode):
         if not values["model"]:
             raise InputError("parameter model is missing: name a model YAML file")
         require_new(*(Path(values[name]) for name in ("save_calibration", "result") if values[name]))
-        model = Model.load(values["model"], self._catalogue)
+        model = Model.of_one_axis(values["model"], self._catalogue)
         signals = self._signals()
         settings = Settings(
             signals.input_kind, signals.output_kind, signals.hold or "zero", values["healthy"], values["false_alarms"]

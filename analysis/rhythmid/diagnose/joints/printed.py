@@ -1,0 +1,51 @@
+"""A diagnosis of several joints as text on a terminal."""
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from rhythmid.diagnose.answer.result import Diagnosis
+from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
+from rhythmid.report.quantity import NONE, number, rounded
+
+
+def show_diagnosis(found: MachineDiagnosis, console: Console) -> None:
+    """Print a diagnosis: the verdict, what is missing at which joint, then a row for every joint."""
+    console.print(f"[bold]{found.verdict.replace('_', ' ')}[/]: {escape(found.summary)}")
+    for one in found.missing:
+        what = f"mass of {one.link}" if one.link else one.element
+        console.print(
+            f"[bold]{escape(one.joint)}: {escape(what)}[/]   {escape(one.equation)}   (probability {one.probability:.2f}, "
+            f"{number(100.0 * one.share, 3)} % of the joint's mismatch)"
+        )
+        for name, value in one.parameters.items():
+            std = "" if value.std is None else f" ± {value.std:.2g}"
+            console.print(f"  {name}: {rounded(value.value, value.std)}{std} {escape(value.unit)}")
+    for group in found.indistinguishable:
+        console.print(f"indistinguishable here: {escape(', '.join(group))}")
+    table = Table(title="error of the effort on data that no fit has seen, as a share of it")
+    for column in ("joint", "verdict", "nominal", "augmented", "left"):
+        table.add_column(column)
+    for joint, one in found.joints.items():
+        before, after = (one.fit[name].heldout_nrmse for name in ("refitted_nominal", "augmented"))
+        table.add_row(joint, one.verdict.replace("_", " "), _share(before), _share(after), left_words(one))
+    console.print(table)
+    for joint, why in found.not_judged.items():
+        console.print(f"not judged: {escape(joint)}: {escape(why)}")
+    for label, lines in (("assumption", found.assumptions), ("note", found.notes)):
+        for line in lines:
+            console.print(f"{label}: {escape(line)}")
+    console.print(f"next experiment: {escape(found.next_experiment)}")
+
+
+def left_words(one: Diagnosis) -> str:
+    """What a joint's answer leaves of its mismatch, in words; a dash where there is no mismatch."""
+    if one.verdict == "consistent":
+        return NONE
+    if not one.remainder.significant:
+        return "noise"
+    return f"{100.0 * one.remainder.share:.0f} % of the mismatch"
+
+
+def _share(error: float | None) -> str:
+    return NONE if error is None else f"{number(100.0 * error, 3)} %"

@@ -1,0 +1,73 @@
+"""Correlations of the estimates of a machine of several joints."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.body.body import BODY
+from rhythmid.identify.inverse_dynamics.estimate import EffortFit
+from rhythmid.model import INERTIA
+
+Array = NDArray[np.float64]
+CLOSE = 0.9  # correlation of two estimates, from which the records tell only a combination of them
+
+
+@dataclass(frozen=True, eq=False)
+class Correlations:
+    """The `matrix` (n, n) of the correlations of the estimates `names`.
+
+    Estimates of inverse dynamics at different joints are taken as independent, and so are one that free runs have refined and one that they
+    have not.
+    """
+
+    names: tuple[str, ...]
+    matrix: Array
+
+    @classmethod
+    def of_fit(cls, joint: str, fit: EffortFit) -> "Correlations":
+        """Those of a joint's fit, with the alignment of effort and motion."""
+        weight = fit.jacobian / fit.scale
+        normal = weight.T @ weight + np.diag(fit.precision)
+        scaling = 1.0 / np.sqrt(np.diag(normal))
+        names = (f"{joint}.alignment", *(label_of(joint, name) for name in fit.names))
+        covariance = np.asarray(np.linalg.pinv(normal * np.outer(scaling, scaling)), dtype=np.float64)
+        return cls.of_covariance(names, covariance)
+
+    @classmethod
+    def of_covariance(cls, names: Sequence[str], covariance: Array) -> "Correlations":
+        """Those of a covariance, in whatever units."""
+        spread = np.sqrt(np.diag(covariance))
+        return cls(tuple(names), covariance / np.outer(spread, spread))
+
+    @classmethod
+    def joined(cls, parts: Sequence["Correlations"]) -> "Correlations":
+        """Those of several fits, in which what a later part says of two names holds."""
+        names = tuple(dict.fromkeys(name for part in parts for name in part.names))
+        matrix = np.eye(len(names))
+        for part in parts:
+            at = [names.index(name) for name in part.names]
+            others = [k for k in range(len(names)) if k not in at]
+            matrix[np.ix_(at, others)] = matrix[np.ix_(others, at)] = 0.0
+            matrix[np.ix_(at, at)] = part.matrix
+        return cls(names, matrix)
+
+    def close(self) -> Iterator[tuple[str, str, float]]:
+        """The pairs of names of which the records tell only a combination, and their correlation."""
+        for i, first in enumerate(self.names):
+            for j in range(i):
+                if abs(self.matrix[i, j]) > CLOSE:
+                    yield first, self.names[j], float(self.matrix[i, j])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Names and rows as plain data."""
+        return {"names": list(self.names), "matrix": self.matrix.tolist()}
+
+
+def label_of(joint: str, name: str) -> str:
+    """What the machine calls a parameter of a joint's balance."""
+    if name == INERTIA:
+        return f"{BODY}.{joint}.armature"
+    return name if name.startswith(f"{BODY}.") else f"{joint}.{name}"

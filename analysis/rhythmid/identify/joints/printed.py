@@ -1,0 +1,39 @@
+"""An identification of several joints as text on a terminal."""
+
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from rhythmid.report.quantity import number, rounded
+
+if TYPE_CHECKING:
+    from rhythmid.identify.joints.joint_identification import MachineIdentification
+
+
+def show_identification(found: "MachineIdentification", console: Console) -> None:
+    """Print an identification: parameters, inertias, errors, and what the records do not tell apart."""
+    table = Table(title="parameters")
+    for column in ("name", "value", "95 % interval", "unit"):
+        table.add_column(column)
+    for name, one in found.parameters.items():
+        low, high = (rounded(end, one.std) for end in one.interval)
+        table.add_row(name, rounded(one.value, one.std), f"{low} to {high}", escape(one.unit))
+    console.print(table)
+    if found.inertia is not None:
+        seen = found.inertia
+        console.print(
+            f"{seen.rank} of {seen.count} inertial parameters, or combinations of them, are seen; condition {seen.condition:.3g}"
+        )
+        for link, values in seen.links.items():
+            centre = ", ".join(f"{values[name] / values['m']:.4g}" for name in ("mx", "my", "mz"))
+            console.print(f"{escape(link)}: mass {values['m']:.4g} kg, centre at ({centre}) m")
+    for joint, error in found.effort_nrmse.items():
+        runs = ", ".join(f"{number(100.0 * one[joint], 3)} % {name}" for name, one in found.free_run.items())
+        console.print(
+            f"{escape(joint)}: effort missed by {number(100.0 * error, 3)} %; free run, held out: {runs or 'none'}"
+        )
+    for label, lines in (("not separable", found.not_separable), ("note", found.notes)):
+        for line in lines:
+            console.print(f"{label}: {escape(line)}")

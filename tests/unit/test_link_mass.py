@@ -1,0 +1,21 @@
+"""A link whose mass is wrong, found by the joints that carry it."""
+
+import numpy as np
+import pytest
+from legged import MODELS, hop, recorded
+
+from rhythmid.body.machine import Machine
+from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
+
+
+def test_a_links_wrong_mass_has_the_share_and_the_probability_that_the_evidence_gives_it():
+    machine = Machine.load(MODELS / "leg.yaml")
+    heavier = machine.with_inertial({"shank.mass": 1.5 * machine.body.parameters["shank.mass"]})
+    time, rng = np.arange(0.0, 8.0, 0.002), np.random.default_rng(1)
+    record = recorded(heavier, hop(time, rng), time, rng)
+    found = diagnose_machine([record], machine).diagnosis
+    (one,) = [effect for effect in found.missing if effect.element == "link_mass"]
+    assert one.link == "shank" and one.joint == "knee"
+    assert one.parameters["mass"].value == pytest.approx(heavier.body.parameters["shank.mass"], rel=0.1)
+    assert 0.05 < one.share < 1.0 and 0.3 < one.probability < 1.0, (one.share, one.probability)
+    assert one.heldout_gain > 0.05
