@@ -107,6 +107,8 @@ class Record(Result):
         What parameters of the model, by "element.parameter", were in this record, where that is declared.
     whole
         Name of the record that this one is a stretch of; empty for a whole one.
+    stamped
+        Whether the output's times are stamps, which may jitter; they are none where they follow from a declared rate.
     """
 
     name: str
@@ -125,6 +127,7 @@ class Record(Result):
     output_kind: OutputKind = "position"
     parameters: Mapping[str, float] = field(default_factory=dict)
     whole: str = ""
+    stamped: bool = True
 
     @property
     def channels(self) -> dict[str, Channel]:
