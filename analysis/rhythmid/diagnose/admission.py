@@ -25,11 +25,18 @@ DECAYS = 0.7  # of the motion's size from the first quarter to the last, above w
 
 @dataclass(frozen=True)
 class Admitted:
-    """Records and held-out records as they are judged, cut where commands are missing; and what there is to say of them."""
+    """Records and held-out records as they are judged, and what there is to say of them.
+
+    `records` and `holdout` are cut where commands are missing, as a simulation needs them; `whole_records` and `whole_holdout` are
+    not, for effort is balanced at each instant, and `whole_notes` say nothing of cuts.
+    """
 
     records: tuple[Record, ...]
     holdout: tuple[Record, ...]
     notes: tuple[str, ...]
+    whole_records: tuple[Record, ...]
+    whole_holdout: tuple[Record, ...]
+    whole_notes: tuple[str, ...]
 
 
 def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model) -> Admitted:
@@ -44,20 +51,25 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
     given = tuple(driven(record, model) for record, _ in cleaned)
     check_comparable(prepare(given))
     cut = [cut_at_gaps(record) for record in given]
-    notes = dict.fromkeys(
-        (
-            remark,
-            *(f"{one.name}: {note}" for one in whole for note in punctuality_notes(one.run)),
-            *(note for _, said in (*tidy, *cleaned) for note in said),
-            *(drive_of(a, b) for (a, _), b in zip(cleaned, given)),
-            *(note for one in cut for note in one.notes),
-        )
+    said = (
+        remark,
+        *(f"{one.name}: {note}" for one in whole for note in punctuality_notes(one.run)),
+        *(note for _, told in (*tidy, *cleaned) for note in told),
+        *(drive_of(a, b) for (a, _), b in zip(cleaned, given)),
     )
-    learnt, unseen = (
-        tuple(stretch for one in part for stretch in one.stretches)
-        for part in (cut[: len(records)], cut[len(records) :])
+    notes, whole_notes = (
+        tuple(dict.fromkeys(note for note in (*said, *more) if note is not None))
+        for more in ((n for one in cut for n in one.notes), (n for one in cut for n in one.filled))
     )
-    return Admitted(learnt, unseen, tuple(note for note in notes if note is not None))
+    learnt, unseen = cut[: len(records)], cut[len(records) :]
+    return Admitted(
+        tuple(stretch for one in learnt for stretch in one.stretches),
+        tuple(stretch for one in unseen for stretch in one.stretches),
+        notes,
+        tuple(one.whole for one in learnt),
+        tuple(one.whole for one in unseen),
+        whole_notes,
+    )
 
 
 def without_clipped(record: Record) -> tuple[Record, tuple[str, ...]]:

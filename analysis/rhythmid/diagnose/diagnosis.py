@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from threadpoolctl import threadpool_limits
 
-from rhythmid.diagnose.admission import admitted
+from rhythmid.diagnose.admission import Admitted, admitted
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
@@ -201,10 +201,11 @@ def diagnose(
     with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
         known = catalogue or load_catalogue()
         case = Case(model, given.records, given.holdout, known, pool, tell, Budget(budget))
-        effort = applicable(case.records, model)
+        whole = replace(case, records=given.whole_records, holdout=given.whole_holdout)
+        effort = applicable(whole.records, model)
         made: list[Answer] = []
         untried: list[str] = []
-        answers = _answers(case, effort, given.notes, untried)
+        answers = _answers(case, whole, effort, given, untried)
         while not made or not made[-1].stands:
             try:
                 answer = next(answers, None)
@@ -218,20 +219,24 @@ def diagnose(
         chosen = next((one for one in made if one.stands), made[0])
         if effort.applies and chosen.stands and isinstance(made[0].result, FreeRunResult):
             if not case.budget.spent:
-                return _compared(chosen, _by_effort(case, effort, (), 1))
+                return _compared(chosen, _by_effort(whole, effort, (), 1))
             untried.append(BY_EFFORT)
         return _with_untried(chosen, untried)
 
 
-def _answers(case: Case, effort: Applicability, notes: Sequence[str], untried: list[str]) -> Iterator[Answer]:
+def _answers(
+    case: Case, whole: Case, effort: Applicability, given: Admitted, untried: list[str]
+) -> Iterator[Answer]:
     """Answers of all ways to score that apply, the most telling way first; they are worked out as they are asked for.
 
     A free run that follows the machine comes first. Else the recorded effort does where it is at least as large as the
     inertial force, so that it moves the machine against other forces, and windows where the machine swings by itself.
-    With an answer in hand no further way begins once the budget is spent; what the next one would have been joins `untried`.
+    Effort is scored on the `whole` case, whose records nothing cuts. With an answer in hand no further way begins once the budget is spent; what the next one would have been joins `untried`.
     """
     warned = check_plausible(case.nominal, case.records, case.pool)
-    notes = notes if warned is None else (*notes, warned)
+    more = () if warned is None else (warned,)
+    bridged = () if effort.balance is None else effort.balance.notes
+    effort_notes = (*given.whole_notes, *bridged, *more)
     driven = effort.applies and effort.effort_share >= 1.0
 
     def late(way: str) -> bool:
@@ -240,7 +245,7 @@ def _answers(case: Case, effort: Applicability, notes: Sequence[str], untried: l
         return case.budget.spent
 
     if effort.applies and not effort.free_run_means_something:
-        answer = _by_effort(case, effort, notes)
+        answer = _by_effort(whole, effort, effort_notes)
         yield answer
         if answer.diagnosis.augmented.train_nrmse < LEFT or late(BY_MOTION):
             return
@@ -254,7 +259,7 @@ def _answers(case: Case, effort: Applicability, notes: Sequence[str], untried: l
             if number and late(WAYS[scoring.kind]):
                 return
             result = free_run(case, scoring)
-            diagnosis = compose(case, result, notes)
+            diagnosis = compose(case, result, (*given.notes, *more))
             yield Answer(diagnosis, causal(without_free_maps(result.search.fit.model)), result)
 
     if not effort.applies or not effort.free_run_means_something:
@@ -267,12 +272,12 @@ def _answers(case: Case, effort: Applicability, notes: Sequence[str], untried: l
     if told:
         return
     if driven:
-        yield _by_effort(case, effort, notes)
+        yield _by_effort(whole, effort, effort_notes)
         if late(BY_MOTION):
             return
     yield from by_motion(windows=True)
     if not driven and not late(BY_EFFORT):
-        yield _by_effort(case, effort, notes)
+        yield _by_effort(whole, effort, effort_notes)
 
 
 def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST_EFFECTS) -> Answer:
