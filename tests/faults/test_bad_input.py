@@ -359,7 +359,9 @@ def test_two_results_are_not_written_over_one_another(refused, bag, topics):
         (("identify", "bag", "--model", "none.yaml"), "none.yaml: cannot be read"),
         (("identify",), "Missing argument"),
         (("check",), "Missing argument"),
-        (("check", "bag", "bag"), "unexpected extra argument"),
+        (("check", "bag", "none", "missing"), "none: no such file or directory; missing: no such"),
+        (("check", "bag", "bag", "--report", "page.html"), "--report makes the page of one recording"),
+        (("table1", "bag"), "unexpected extra argument"),
         (("table1", "--jsom", "out"), "No such option"),
     ],
 )

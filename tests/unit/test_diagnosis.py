@@ -4,11 +4,13 @@ import json
 from dataclasses import replace
 
 import pytest
+from axes import axis, axis_model
 from json_schema import conforming
 
 from machines import CATALOGUE, SHORT, hopper, only, records
-from rhythmid.diagnose.constants import PRACTICAL
-from rhythmid.diagnose.diagnosis import Answer, diagnose
+from rhythmid.diagnose.case import TIME_SPENT
+from rhythmid.diagnose.constants import LEFT, PRACTICAL
+from rhythmid.diagnose.diagnosis import BY_MOTION, Answer, diagnose
 from rhythmid.diagnose.rejections import RULES
 from rhythmid.diagnose.replay import redecide
 from rhythmid.errors import InputError
@@ -103,6 +105,22 @@ def test_a_budget_that_is_spent_ends_the_search_and_the_answer_is_one_all_the_sa
     assert result.verdict != "missing_physics"
     (late,) = [one for one in result.excluded if "the time given was spent" in one]
     assert "coulomb_friction" in late
+
+
+def test_no_other_way_to_score_begins_once_the_budget_is_spent_and_the_answer_says_so():
+    told: list[str] = []
+    answer = diagnose([axis()], axis_model(), catalogue=SMALL, tell=told.append, budget=0.0)
+    found = conforming(answer.diagnosis)
+    assert found.scoring.kind == "effort" and found.refitted_nominal.train_nrmse > LEFT
+    assert not any("windows" in one for one in told)
+    assert f"{BY_MOTION}: {TIME_SPENT}" in found.excluded
+
+
+def test_without_an_answer_in_hand_a_spent_budget_still_leads_to_one():
+    unknown = replace(axis(), input=None)  # no effort: the motion is all that can be scored
+    held = axis_model().with_element(CATALOGUE["linear_spring"], {"stiffness": 400.0, "rest_length": 0.0})
+    found = diagnose([unknown], held, catalogue=SMALL, budget=0.0).diagnosis
+    assert found.scoring.kind in ("free_run", "windows")
 
 
 def test_all_parameters_fixed_is_refused_with_the_mend():

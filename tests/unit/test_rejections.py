@@ -3,10 +3,22 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from contests import SIZE, predicted, supposed
 
-from rhythmid.diagnose.rejections import RULES, SHAPES, Claim, decisive, rejections_of, table
+from rhythmid.diagnose.rejections import (
+    CHANCE,
+    FEW,
+    HARM,
+    INSTEAD,
+    RULES,
+    SHAPES,
+    Claim,
+    decisive,
+    rejections_of,
+    table,
+)
 
 NOMINAL = supposed("", predicted(1.0))
 GOOD = Claim(supposed("friction", predicted(0.01)), NOMINAL, NOMINAL, 0.01, 30, SIZE, 0.01)
@@ -70,6 +82,27 @@ def test_an_effect_that_acts_in_few_blocks_is_believed_and_in_one_it_is_not(bloc
     density[:blocks] += 100.0
     claim = replace(GOOD, hypothesis=supposed("friction", replace(predicted(0.1), log_density=density)))
     assert ("predicts_better" not in rejected(claim)) == believed
+
+
+def why(density: np.ndarray, mean_square: float = 0.1, **more) -> str:
+    """Why an effect does not predict better, whose blocks gain so much each in log density."""
+    made = replace(predicted(mean_square), log_density=NOMINAL.prediction.log_density + density)
+    claim = replace(GOOD, hypothesis=supposed("friction", made), floor=0.0, **more)
+    (row,) = [row for row in rejections_of(claim) if row.name == "predicts_better"]
+    return row.reason
+
+
+def test_the_reason_why_an_effect_predicts_no_better_is_the_true_one():
+    blocks = np.zeros(60)
+    harmful, few, small = blocks + 1.0, blocks.copy(), blocks + 0.05
+    harmful[:5] = -30.0  # it halves the error, and single blocks count against it
+    few[:2] = 100.0
+    assert why(harmful, 0.5) == HARM
+    assert why(few) == FEW
+    assert why(small, 0.98) == CHANCE
+    rival = replace(supposed("hysteresis", NOMINAL.prediction), elements=("hysteresis",))
+    assert why(small, 0.98, without=rival) == INSTEAD
+    assert all(reason in table() for reason in (HARM, FEW, CHANCE, INSTEAD))
 
 
 def test_predictions_that_agree_to_the_last_digit_gain_nothing():

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import prepare
+from rhythmid.record.read import read_record
 from rhythmid.record.record import Channel, Record
 from rhythmid.record.stamp_jitter import stamp_jitter
 
@@ -92,3 +93,22 @@ def test_a_record_without_jitter_is_weighed_as_it_is():
     assert one.spread is None
     samples = np.arange(float(one.blocks))
     assert one.levelled(samples) is samples
+
+
+def test_samples_at_a_declared_rate_have_no_stamps_that_could_jitter(tmp_path):
+    np.savetxt(
+        tmp_path / "log.csv", np.column_stack([TIME, sampled(1e-3)]), delimiter=",", header="t,y", comments=""
+    )
+    jitter = {}
+    for clock in ("sample_rate: 500", "column: t"):
+        (tmp_path / "signals.yaml").write_text(
+            f"time: {{{clock}}}\ninput: none\noutput: {{column: y, unit: m}}\n"
+        )
+        one = read_record(tmp_path / "log.csv", tmp_path / "signals.yaml")
+        jitter[clock] = (
+            one.quality.channels["output"].stamp_jitter,
+            any("jitter" in note for note in one.quality.notes),
+            prepare([one])[0].spread is not None,
+        )
+    assert jitter["sample_rate: 500"] == (None, False, False)
+    assert jitter["column: t"][0] == pytest.approx(1e-3, rel=0.1) and jitter["column: t"][1:] == (True, True)

@@ -110,6 +110,22 @@ def test_json_on_standard_output_is_nothing_but_json(bag, rhythmid):
     assert "joint_states" in done.stderr  # the report for people goes where it does not disturb
 
 
+def test_several_recordings_are_checked_one_after_the_other_and_listed_as_json(bag, command, tmp_path):
+    both = command("check", bag, bag)
+    assert (both.code, both.out.count("joint_states")) == (
+        0,
+        2 * command("check", bag).out.count("joint_states"),
+    )
+    told = json.loads(command("check", bag, bag, "--json", "-").out)
+    assert [one["usable"] for one in told] == [True, True]
+    spoilt = command("check", "nothing", bag, "--json", "quality.json")
+    assert (
+        spoilt.code == 2 and spoilt.err.startswith("error: nothing: no such") and "joint_states" in spoilt.out
+    )
+    (left,) = json.loads((tmp_path / "quality.json").read_text())
+    assert left["path"] == str(bag)
+
+
 def test_quiet_prints_errors_only(bag, rhythmid, tmp_path):
     done = rhythmid("check", bag, "-q", "--json", "-", "--report", "page.html")
     assert done.returncode == 0 and json.loads(done.stdout)["topics"] and done.stderr == ""

@@ -7,7 +7,7 @@ import pytest
 from contests import BLOCKS, SEEN, SIZE, contest, decided, ends, predicted, supposed, verdict
 
 from rhythmid.diagnose.answer.result import FitQuality, MissingEffect
-from rhythmid.diagnose.answer.wording import freed_value, summary_of
+from rhythmid.diagnose.answer.wording import freed_value, listed, summary_of
 from rhythmid.diagnose.constants import APART
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.rejections import RULES
@@ -272,6 +272,27 @@ def test_a_small_effect_beside_a_large_one_is_stated_where_nothing_of_its_size_i
     named = [MissingEffect(name, "force", "", 1.0, 1.0, {}) for name in decision.named]
     said = summary_of(decision, named, FitQuality(0.1, 0.1), FitQuality(0.01, 0.01), "motion")
     assert ("With it and cubic, which is too uncertain to be named, the error" in said) == (len(named) == 1)
+
+
+def named_beside(count: int, groups: tuple[tuple[str, ...], ...] = ()) -> str:
+    """What is said of friction, of so many effects beside it that are too uncertain, and of names that nothing separates."""
+    _, decision = decided(contest(NOMINAL, friction(0.02)))
+    decision = replace(decision, beside=("constant_force", "position_ripple")[:count], equivalent=groups)
+    named = [MissingEffect("friction", "force", "", 1.0, 1.0, {})]
+    return summary_of(decision, named, FitQuality(0.1, 0.1), FitQuality(0.01, 0.01), "motion")
+
+
+def test_one_effect_is_and_two_are_too_uncertain_to_be_named():
+    assert "With it and constant force, which is too uncertain to be named, the" in named_beside(1)
+    assert "and constant force and position ripple, which are too uncertain to be named, the" in named_beside(
+        2
+    )
+
+
+def test_names_that_are_not_separated_are_listed_with_and_and_alternatives_with_or():
+    groups = (("friction", "bouc_wen"), ("a", "b", "c"))
+    assert "do not separate friction and bouc wen; nor a, b and c." in named_beside(0, groups)
+    assert listed(("a",)) == "a" and listed(("a", "b_c", "d"), "or") == "a, b c or d" and listed(()) == ""
 
 
 def test_a_second_name_that_is_open_does_not_take_the_first_one_with_it():

@@ -1,4 +1,4 @@
-"""`rhythmid check`: what is in a recording, and how good its timing is."""
+"""`rhythmid check`: what is in recordings, and how good their timing is."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,38 +12,58 @@ from rhythmid.output import require_new, write_json
 EXAMPLES = (
     "rhythmid check bag",
     "rhythmid check run.csv --signals signals.yaml --json -",
+    "rhythmid check small.csv large.csv --signals signals.yaml",
     "rhythmid check bag --report page.html",
 )
 
 
 def check(
-    bag: Annotated[
-        Path, typer.Argument(help="Bag directory, .mcap/.db3 file, table, or signals.yaml of tables.")
+    bags: Annotated[
+        list[Path],
+        typer.Argument(help="Bag directories, .mcap/.db3 files, tables, or signals.yaml files of tables."),
     ],
     signals: SignalsFile = None,
     json: JsonFile = None,
     report: ReportFile = None,
     quiet: Quiet = False,
 ) -> None:
-    """Report data quality: topics, rates, gaps, duplicates, jitter, clock. Exit code 2 if it cannot be used."""
+    """Report data quality: topics, rates, gaps, duplicates, jitter, clock. Exit code 2 if one cannot be used.
+
+    Of several recordings one report follows the other, and the JSON is a list of them.
+    """
     from rhythmid.errors import InputError
     from rhythmid.progress_bar import progress
-    from rhythmid.record.bag_report import quality_report
+    from rhythmid.record.bag_report import BagReport, quality_report
 
     require_new(json, report)
+    if report is not None and len(bags) > 1:
+        raise InputError(
+            "--report makes the page of one recording; give one, or list them for `rhythmid batch`"
+        )
     terminal = Terminal(quiet, json)
-    with progress(terminal.progress, log=False) as tell:
-        tell(f"reading {bag}")
-        found = quality_report(bag, signals)
-    for line in found.lines():
-        terminal.say(line)
-    if json is not None:
-        write_json(json, found.to_dict())
-    if report is not None:
+    made: list[BagReport] = []
+    refused: list[str] = []
+    for bag in bags:
+        try:
+            with progress(terminal.progress, log=False) as tell:
+                tell(f"reading {bag}")
+                found = quality_report(bag, signals)
+        except InputError as error:  # is no recording at all: the others are told all the same
+            refused.append(str(error))
+            continue
+        made.append(found)
+        refused += found.problems
+        for line in found.lines():
+            terminal.say(line)
+    if json is not None and made:
+        told = [found.to_dict() for found in made]
+        write_json(json, told if len(bags) > 1 else told[0])
+    if report is not None and made:
         from rhythmid.report.page import write_page
         from rhythmid.report.recording import recording_page
 
+        (found,) = made
         write_page(report, recording_page(found.to_dict(), found.record, found.remarks, command_line()))
         terminal.say(f"report: {report}")
-    if not found.usable:
-        raise InputError("; ".join(found.problems))
+    if refused:
+        raise InputError("; ".join(refused))

@@ -58,7 +58,8 @@ def diagnose(
         typer.Option(
             "--budget",
             metavar="SECONDS",
-            help="Begin no further round of the search after so many seconds; the answer says what was not tried.",
+            help="Begin no further round of the search and no other way of scoring after so many seconds on the wall clock, "
+            "whatever else the computer does; the answer says what was not tried.",
         ),
     ] = None,
     quiet: Quiet = False,

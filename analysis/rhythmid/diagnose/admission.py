@@ -23,11 +23,18 @@ DECAYS = 0.7  # of the motion's size from the first quarter to the last, above w
 
 @dataclass(frozen=True)
 class Admitted:
-    """Records and held-out records as they are judged, cut where commands are missing; and what there is to say of them."""
+    """Records and held-out records as they are judged, and what there is to say of them.
+
+    `records` and `holdout` are cut where commands are missing, as a simulation needs them; `whole_records` and `whole_holdout` are
+    not, for effort is balanced at each instant, and `whole_notes` say nothing of cuts.
+    """
 
     records: tuple[Record, ...]
     holdout: tuple[Record, ...]
     notes: tuple[str, ...]
+    whole_records: tuple[Record, ...]
+    whole_holdout: tuple[Record, ...]
+    whole_notes: tuple[str, ...]
 
 
 def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model) -> Admitted:
@@ -41,20 +48,25 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
     given = tuple(driven(one.record, model) for one in clean)
     check_comparable(prepare(given))
     cut = [cut_at_gaps(record) for record in given]
-    notes = dict.fromkeys(
-        (
-            remark,
-            *(f"{one.name}: {note}" for one in whole for note in punctuality_notes(one.run)),
-            *(note for one in clean for note in one.notes),
-            *(drive_of(one.record, b) for one, b in zip(clean, given)),
-            *(note for one in cut for note in one.notes),
-        )
+    said = (
+        remark,
+        *(f"{one.name}: {note}" for one in whole for note in punctuality_notes(one.run)),
+        *(note for one in clean for note in one.notes),
+        *(drive_of(one.record, b) for one, b in zip(clean, given)),
     )
-    learnt, unseen = (
-        tuple(stretch for one in part for stretch in one.stretches)
-        for part in (cut[: len(records)], cut[len(records) :])
+    notes, whole_notes = (
+        tuple(dict.fromkeys(note for note in (*said, *more) if note is not None))
+        for more in ((n for one in cut for n in one.notes), (n for one in cut for n in one.filled))
     )
-    return Admitted(learnt, unseen, tuple(note for note in notes if note is not None))
+    learnt, unseen = cut[: len(records)], cut[len(records) :]
+    return Admitted(
+        tuple(stretch for one in learnt for stretch in one.stretches),
+        tuple(stretch for one in unseen for stretch in one.stretches),
+        notes,
+        tuple(one.whole for one in learnt),
+        tuple(one.whole for one in unseen),
+        whole_notes,
+    )
 
 
 def check_driven(records: Sequence[Record], model: Model) -> str | None:

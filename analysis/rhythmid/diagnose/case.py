@@ -10,10 +10,13 @@ from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 
+TIME_SPENT = "the time given was spent"  # why something was not tried
+
 
 @dataclass(frozen=True)
 class Budget:
-    """Seconds that a search may take, from when the budget was made; None for as long as it needs."""
+    """Seconds on the wall clock, from when the budget was made, after which a search begins nothing more; None for as long as
+    it needs."""
 
     seconds: float | None = None
     began: float = field(default_factory=time.monotonic)

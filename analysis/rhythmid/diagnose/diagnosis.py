@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING, Any, cast
 
 from threadpoolctl import threadpool_limits
 
-from rhythmid.diagnose.admission import admitted
+from rhythmid.diagnose.admission import Admitted, admitted
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.baseline import causal, check_free
-from rhythmid.diagnose.case import Budget, Case
+from rhythmid.diagnose.case import TIME_SPENT, Budget, Case
 from rhythmid.diagnose.constants import DRIVES_IT, LEFT
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST_EFFECTS
 from rhythmid.diagnose.free_map import without_free_maps
 from rhythmid.diagnose.free_run import FreeRunResult, free_run
+from rhythmid.diagnose.hypothesis import ScoringKind
 from rhythmid.diagnose.replay import ledger
 from rhythmid.diagnose.scoring import settle
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
@@ -45,6 +46,13 @@ if TYPE_CHECKING:
 
     from rhythmid.body.machine import Machine
     from rhythmid.record.joint_record import JointRecord
+
+BY_EFFORT, BY_MOTION = "scoring by the recorded effort", "scoring by the motion, in free run or in windows"
+WAYS: Mapping[ScoringKind, str] = {
+    "effort": BY_EFFORT,
+    "free_run": "scoring in free run",
+    "windows": "scoring in windows",
+}
 
 
 @dataclass(frozen=True)
@@ -169,7 +177,7 @@ def diagnose(
     tell
         Called with a sentence at the beginning of each step.
     budget
-        Seconds that the search may take; the answer says what was not tried.
+        Seconds on the wall clock that may pass before the search begins nothing more; the answer says what was not tried.
 
     Returns
     -------
@@ -211,9 +219,11 @@ def diagnose(
     with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
         known = catalogue or load_catalogue()
         case = Case(model, given.records, given.holdout, known, pool, tell, Budget(budget))
-        effort = applicable(case.records, model)
+        whole = replace(case, records=given.whole_records, holdout=given.whole_holdout)
+        effort = applicable(whole.records, model)
         made: list[Answer] = []
-        answers = _answers(case, effort, given.notes)
+        untried: list[str] = []
+        answers = _answers(case, whole, effort, given, untried)
         while not made or not made[-1].stands:
             try:
                 answer = next(answers, None)
@@ -225,25 +235,37 @@ def diagnose(
                 break
             made.append(answer)
         chosen = next((one for one in made if one.stands), made[0])
-        compare = effort.applies and chosen.stands and isinstance(made[0].result, FreeRunResult)
-        if compare and not case.budget.spent:
-            return _compared(chosen, _by_effort(case, effort, (), 1))
-        return chosen
+        if effort.applies and chosen.stands and isinstance(made[0].result, FreeRunResult):
+            if not case.budget.spent:
+                return _compared(chosen, _by_effort(whole, effort, (), 1))
+            untried.append(BY_EFFORT)
+        return _with_untried(chosen, untried)
 
 
-def _answers(case: Case, effort: Applicability, notes: Sequence[str]) -> Iterator[Answer]:
+def _answers(
+    case: Case, whole: Case, effort: Applicability, given: Admitted, untried: list[str]
+) -> Iterator[Answer]:
     """Answers of all ways to score that apply, the most telling way first; they are worked out as they are asked for.
 
     A free run that follows the machine comes first. Else the recorded effort does where it is at least as large as the
     inertial force, so that it moves the machine against other forces, and windows where the machine swings by itself.
+    Effort is scored on the `whole` case, whose records nothing cuts. With an answer in hand no further way begins once the budget is spent; what the next one would have been joins `untried`.
     """
     warned = check_plausible(case.nominal, case.records, case.pool)
-    notes = notes if warned is None else (*notes, warned)
+    more = () if warned is None else (warned,)
+    bridged = () if effort.balance is None else effort.balance.notes
+    effort_notes = (*given.whole_notes, *bridged, *more)
     driven = effort.applies and effort.effort_share >= DRIVES_IT
+
+    def late(way: str) -> bool:
+        if case.budget.spent:
+            untried.append(way)
+        return case.budget.spent
+
     if effort.applies and not effort.free_run_means_something:
-        answer = _by_effort(case, effort, notes)
+        answer = _by_effort(whole, effort, effort_notes)
         yield answer
-        if answer.diagnosis.augmented.train_nrmse < LEFT:
+        if answer.diagnosis.augmented.train_nrmse < LEFT or late(BY_MOTION):
             return
     series, count = prepare((*case.records, *case.holdout)), len(case.records)
 
@@ -251,9 +273,11 @@ def _answers(case: Case, effort: Applicability, notes: Sequence[str]) -> Iterato
         ways = settle(
             case.nominal, series[:count], series[count:], case.catalogue, case.pool, case.tell, windows
         )
-        for scoring in ways:
+        for number, scoring in enumerate(ways):
+            if number and late(WAYS[scoring.kind]):
+                return
             result = free_run(case, scoring)
-            diagnosis = compose(case, result, notes)
+            diagnosis = compose(case, result, (*given.notes, *more))
             yield Answer(diagnosis, causal(without_free_maps(result.search.fit.model)), result)
 
     if not effort.applies or not effort.free_run_means_something:
@@ -266,10 +290,12 @@ def _answers(case: Case, effort: Applicability, notes: Sequence[str]) -> Iterato
     if told:
         return
     if driven:
-        yield _by_effort(case, effort, notes)
+        yield _by_effort(whole, effort, effort_notes)
+        if late(BY_MOTION):
+            return
     yield from by_motion(windows=True)
-    if not driven:
-        yield _by_effort(case, effort, notes)
+    if not driven and not late(BY_EFFORT):
+        yield _by_effort(whole, effort, effort_notes)
 
 
 def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST_EFFECTS) -> Answer:
@@ -289,3 +315,12 @@ def _compared(answer: Answer, other: Answer) -> Answer:
     words = in_words(" and ".join(sorted(stated[1])))
     note = f"Scored by effort the same records stand by another name: {words}. Believe neither without another experiment."
     return replace(answer, diagnosis=replace(first, notes=(*first.notes, note)))
+
+
+def _with_untried(answer: Answer, ways: Sequence[str]) -> Answer:
+    """The answer that says, too, which ways to score the budget left no time for."""
+    if not ways:
+        return answer
+    first = answer.diagnosis
+    late = tuple(f"{way}: {TIME_SPENT}" for way in ways)
+    return replace(answer, diagnosis=replace(first, excluded=(*first.excluded, *late)))

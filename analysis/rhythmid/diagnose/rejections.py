@@ -8,8 +8,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from rhythmid.diagnose.constants import (
     APART,
+    BLOCK_ODDS,
     EDGE,
     EQUIVALENT,
     FALSE_ALARM,
@@ -57,13 +60,21 @@ class Claim:
 
 @dataclass(frozen=True)
 class Rule:
-    """One row: it rejects a claim whose `statistic` is below its `threshold`."""
+    """One row: it rejects a claim whose `statistic` is below its `threshold`.
+
+    `reason` says why, all reasons where there are several; which of them is true of a claim is then what `why` says.
+    """
 
     name: str
     says: str
     reason: str
     statistic: Callable[[Claim], float]
     threshold: Callable[[Claim], float]
+    why: Callable[[Claim], str] | None = None
+
+    def reason_for(self, claim: Claim) -> str:
+        """Why it rejects this claim."""
+        return self.reason if self.why is None else self.why(claim)
 
 
 @dataclass(frozen=True)
@@ -143,13 +154,34 @@ def _shape_rule(name: str, says: str, reason: str) -> Rule:
     )
 
 
+CHANCE = "a gain of this size is expected by chance among so many candidates"
+HARM = "it harms some blocks of the records, which outweighs its gain in the others"
+FEW = "its gain rests on too few blocks of the records"
+INSTEAD = "other effects, one fewer, predict as well"
+
+
+def _why_no_better(claim: Claim) -> str:
+    """What makes the weight of evidence too small: a rival, blocks that count against it, too few blocks for it, or chance."""
+    needed = decisive(claim.candidates)
+    gain = claim.hypothesis.prediction.log_density - claim.without.prediction.log_density
+    if not set(claim.without.elements) <= set(claim.hypothesis.elements) and gain.sum() < needed:
+        return INSTEAD
+    # chance takes no such share off all that is left, noise included
+    large = claim.removed >= REST * claim.without.prediction.mean_square
+    if large or gain.sum() >= needed:
+        for_it = float(np.clip(gain, 0.0, math.log(BLOCK_ODDS)).sum())
+        return HARM if for_it >= needed else FEW
+    return CHANCE
+
+
 RULES: tuple[Rule, ...] = (
     Rule(
         "predicts_better",
         "log odds against the best hypothesis with one effect less, of which no block of data brings more than 20 to 1",
-        "a gain of this size is expected by chance among so many candidates",
+        "; or ".join((CHANCE, INSTEAD, HARM, FEW)),
         lambda claim: weight_for(claim.hypothesis.prediction, claim.without.prediction),
         lambda claim: decisive(claim.candidates),
+        _why_no_better,
     ),
     Rule(
         "predicts_ahead",
@@ -216,7 +248,8 @@ def rejections_of(claim: Claim, rules: Sequence[Rule] = RULES) -> list[Rejection
     for rule in rules:
         statistic, threshold = rule.statistic(claim), rule.threshold(claim)
         if not statistic >= threshold:
-            found.append(Rejection(claim.hypothesis.elements, rule.name, statistic, threshold, rule.reason))
+            reason = rule.reason_for(claim)
+            found.append(Rejection(claim.hypothesis.elements, rule.name, statistic, threshold, reason))
     return found
 
 

@@ -264,8 +264,12 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
     if np.concatenate(whole).mean() < 1.0 - TORN:
         block, whole = 1, [np.ones(len(s.time), bool) for s in made]
     made = [replace(s, block=block, used=used) for s, used in zip(made, whole)]
-    spreads = relative_spreads([(record_of(s), s.time, s.value) for s in made], block)
-    return [replace(s, spread=spread) for s, spread in zip(made, spreads)]
+    stamped = [s for s, record in zip(made, records, strict=True) if record.stamped]
+    spreads = iter(relative_spreads([(record_of(s), s.time, s.value) for s in stamped], block))
+    return [
+        replace(s, spread=next(spreads)) if record.stamped else s
+        for s, record in zip(made, records, strict=True)
+    ]
 
 
 def record_of(series: Series) -> str:

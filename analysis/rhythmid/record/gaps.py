@@ -26,10 +26,15 @@ EXACT = (
 
 @dataclass(frozen=True)
 class Cut:
-    """The stretches of a record between the `gaps` of its commands, from and until [s], and what there is to say of them."""
+    """The stretches of a record between the `gaps` of its commands, from and until [s], and what there is to say of them.
+
+    `whole` is the record uncut, with what could be filled in filled in; `filled` are those of the notes that hold for it, too.
+    """
 
     stretches: tuple[Record, ...]
     notes: tuple[str, ...]
+    whole: Record
+    filled: tuple[str, ...] = ()
     gaps: tuple[tuple[float, float], ...] = ()
 
 
@@ -53,18 +58,19 @@ def cut_at_gaps(record: Record) -> Cut:
         if count:
             record = replace(record, **{role: filled})
             notes.append(f"{record.name}: {count} lost samples of the {role} are interpolated")
+    filled_in = tuple(notes)
     if not spans:
-        return Cut((record,), tuple(notes))
+        return Cut((record,), filled_in, record, filled_in)
     stretches = tuple(_between(record, _joined(spans)))
     if not stretches:
-        return Cut((record,), tuple(notes))  # too often to be cut: what remains is the hold
+        return Cut((record,), filled_in, record, filled_in)  # too often to be cut: what remains is the hold
     kept = sum(one.duration for one in stretches)
     gaps = tuple(_joined(spans))
     notes.append(
         f"{record.name}: cut where commands are missing ({len(gaps)} times, the first at t = {gaps[0][0]:.6g} s, "
         f"{sum(b - a for a, b in gaps):.3g} s in all) into stretches with initial states of their own ({len(stretches)}, {kept:.4g} s)"
     )
-    return Cut(stretches, tuple(notes), gaps)
+    return Cut(stretches, tuple(notes), record, filled_in, gaps)
 
 
 def _bridged(channel: Channel, output: Channel, held: bool) -> tuple[Channel, int, list[tuple[float, float]]]:

@@ -17,7 +17,7 @@ def judged(
     lateness: NDArray[np.floating] | None,
     time: Array,
     value: Array,
-    measured: bool,
+    stamped: bool,
     missing: int,
     conflicts: int,
 ) -> ChannelQuality:
@@ -28,13 +28,13 @@ def judged(
     source : where it comes from.
     recorded, lateness : (m,) times [s] in the order of recording, and receipt less stamp [s]; None where there is no stamp.
     time, value : (n,) times [s] in order, without duplicates, and values; NaN where one is missing.
-    measured : whether it is the output, whose samples tell of the jitter of its stamps.
+    stamped : whether it is the output with stamps of its own, of whose jitter the samples tell; a declared rate makes no stamps.
     missing, conflicts : messages without the channel's entry, and duplicates with other values.
     """
     absent = np.isnan(value)
     present = value[~absent]
     skew = None if lateness is None else clock_skew(recorded, lateness)
-    jitter = stamp_jitter([(time[~absent], present)]) if measured else None
+    jitter = stamp_jitter([(time[~absent], present)]) if stamped else None
     return ChannelQuality(
         source,
         Timing.of(recorded),

@@ -245,6 +245,8 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
     """Channels in order of time without duplicates, and their quality as recorded."""
     channels: dict[str, Any] = {}
     judgement: dict[str, ChannelQuality] = {}
+    clocks = {role: samples.source.clock(signals.time).kind for role, samples in made.items()}
+    stamped = clocks["output"] != "rate"
     for role, samples in made.items():
         label = f"{samples.source.place}{samples.source}"
         if len(samples.time) == 0:
@@ -261,18 +263,18 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
                 f"two publishers, a clock set back or too coarse stamps; {mend}"
             )
         judgement[role] = judged(
-            str(samples.source), samples.time, samples.lateness, time, value, role == "output", samples.missing, conflicts
+            str(samples.source), samples.time, samples.lateness, time, value, stamped and role == "output", samples.missing, conflicts
         )  # fmt: skip
         if absent.any():
             time, value = time[~absent], value[~absent]
         shared = next((c.time for c in channels.values() if np.array_equal(c.time, time)), time)
         channels[role] = Channel(shared, value, samples.source.unit, str(samples.source))
     channels, held_back = evened(channels)
-    clocks = {role: samples.source.clock(signals.time).kind for role, samples in made.items()}
     notes = (*quality.notes, *clock_notes(judgement, clocks), *held_back)
     return Record(
         name, input_kind=signals.input_kind, output_kind=signals.output_kind, forcing_law=signals.forcing_law,
-        quality=replace(quality, channels=judgement, notes=notes), parameters=signals.declared(name), **channels,
+        quality=replace(quality, channels=judgement, notes=notes), parameters=signals.declared(name), stamped=stamped,
+        **channels,
     )  # fmt: skip
 
 

@@ -77,13 +77,16 @@ class Uniform:
     period, rate
         Of the grid [s, Hz].
     valid
-        Bool[n]; False where a channel has a gap, so that its value is no more than a bridge.
+        Bool[n]; False where a channel has a gap that its neighbours do not tell, so that its value is no more than a bridge.
+    missing
+        Bool[n]; True within any gap of a channel, whether its neighbours tell it or not.
     """
 
     time: Array
     output: Array
     period: float
     valid: NDArray[np.bool_]
+    missing: NDArray[np.bool_]
     input: Array | None = None
     forcing: Array | None = None
     velocity: Array | None = None
@@ -126,6 +129,8 @@ class Record(Result):
         What parameters of the model, by "element.parameter", were in this record, where that is declared.
     whole
         Name of the record that this one is a stretch of; empty for a whole one.
+    stamped
+        Whether the output's times are stamps, which may jitter; they are none where they follow from a declared rate.
 
     Examples
     --------
@@ -156,6 +161,7 @@ class Record(Result):
     output_kind: OutputKind = "position"
     parameters: Mapping[str, float] = field(default_factory=dict)
     whole: str = ""
+    stamped: bool = True
 
     @property
     def channels(self) -> dict[str, Channel]:
@@ -281,10 +287,11 @@ class Record(Result):
         values = {role: self._resample(role, channel, grid) for role, channel in channels.items()}
         if self.forcing_law is not None:
             values["forcing"] = self.forcing_law(grid)
-        valid = np.ones(len(grid), dtype=bool)
+        valid, missing = np.ones(len(grid), dtype=bool), np.zeros(len(grid), dtype=bool)
         for role, channel in channels.items():
-            valid &= ~_within_gap(channel, grid, _held(role, self.hold))
-        return Uniform(grid, values.pop("output"), period, valid, **values)
+            within, untold = _within_gap(channel, grid, _held(role, self.hold))
+            valid, missing = valid & ~untold, missing | within
+        return Uniform(grid, values.pop("output"), period, valid, missing, **values)
 
     def _last(self, role: str, channel: Channel) -> float:
         """Until when the channel has a value: a held one keeps its last for one more period, a lone one for ever."""
@@ -323,21 +330,23 @@ def _on_grid(time: Array, anchor: float, period: float) -> NDArray[np.bool_]:
     return np.abs(time - anchor - np.rint((time - anchor) / period) * period) <= SAME
 
 
-def _within_gap(channel: Channel, grid: Array, held: bool) -> NDArray[np.bool_]:
-    """Whether grid times lie strictly within a gap of the channel that its neighbours do not tell.
+def _within_gap(channel: Channel, grid: Array, held: bool) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Whether grid times lie strictly within a gap of the channel, and within one that its neighbours do not tell.
 
-    They do where a cubic through them is nearly as good as the samples themselves, and where a `held` value is the same
+    They tell it where a cubic through them is nearly as good as the samples themselves, and where a `held` value is the same
     before and after.
     """
-    found = np.zeros(len(grid), dtype=bool)
+    missing, untold = np.zeros(len(grid), dtype=bool), np.zeros(len(grid), dtype=bool)
     first, lost = gaps_between(channel.time)
     if held:
         changed = channel.value[first] != channel.value[first + 1]
         first, lost = first[changed], lost[changed]
     if len(first) == 0:
-        return found
+        return missing, untold
     errors = interpolation_errors(channel.value, int(lost.max()))
     for at, count in zip(first, lost, strict=True):
+        within = (grid > channel.time[at] + SAME) & (grid < channel.time[at + 1] - SAME)
+        missing |= within
         if errors[count] > AS_GOOD * errors[1]:
-            found |= (grid > channel.time[at] + SAME) & (grid < channel.time[at + 1] - SAME)
-    return found
+            untold |= within
+    return missing, untold

@@ -2,7 +2,8 @@
 
 A sample whose stamp is out by ε is off by ε times the slope s, so that the variance of the noise is σ² + j² s² with the standard
 deviation j of the jitter (T. M. Souders et al., IEEE Trans. Instrum. Meas. 39 (1990) 80). Noise is what a polynomial through the
-neighbours does not tell of a sample. No model is asked: what a model lacks grows with speed, too.
+neighbours does not tell of a sample. No model is asked: what a model lacks grows with speed, too. Times that follow from a
+declared rate are no stamps, so that of a record without any (`Record.stamped`) no jitter is sought.
 """
 
 import math

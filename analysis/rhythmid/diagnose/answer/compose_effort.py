@@ -15,7 +15,7 @@ from rhythmid.diagnose.answer.result import (
     Remainder,
     Scored,
 )
-from rhythmid.diagnose.answer.wording import SENTENCES, freed_value, recalibrated, summary_of
+from rhythmid.diagnose.answer.wording import SENTENCES, freed_value, listed, recalibrated, summary_of
 from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.run import EffortResult
@@ -129,7 +129,7 @@ def _next_experiment(result: EffortResult) -> str:
             "none needed for these records; other speeds, loads and positions would exclude smaller effects"
         )
     if decision.equivalent:
-        rivals = "; ".join(" or ".join(group) for group in decision.equivalent)
+        rivals = "; and ".join(listed(group) for group in decision.equivalent)
         return f"several speeds in both directions, slow reversals and another load: what separates {rivals}"
     if result.decision.unexplained.significant:
         return (

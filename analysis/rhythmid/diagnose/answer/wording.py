@@ -61,8 +61,7 @@ def summary_of(
 
     `whole` is what errors are a share of; `freed` tells of the fixed value that the chosen hypothesis frees, if it does.
     """
-    names = " and ".join(in_words(effect.element) for effect in missing)
-    groups = [" or ".join(in_words(name) for name in group) for group in decision.equivalent]
+    names = listed([effect.element for effect in missing])
     if freed is not None:
         return f"Undecided: {freed}"
     if decision.verdict == "consistent":
@@ -73,13 +72,15 @@ def summary_of(
         return f"{said} down to the noise."
     if decision.verdict == "missing_physics":
         said = f"The model lacks {names}."
-        if groups:
-            said += f" These records do not separate {'; '.join(groups)}."
+        if decision.equivalent:
+            groups = "; nor ".join(listed(group) for group in decision.equivalent)
+            said += f" These records do not separate {groups}."
         before, after = plain.heldout_nrmse, augmented.heldout_nrmse
         if before is not None and after is not None:
-            beside = in_words(" and ".join(decision.beside))
+            beside = listed(decision.beside)
             if beside:
-                beside = f" and {beside}, which is too uncertain to be named"
+                verb = "is" if len(decision.beside) == 1 else "are"
+                beside = f" and {beside}, which {verb} too uncertain to be named"
             said += (
                 f" With {'it' if len(missing) == 1 else 'them'}{beside}, the error on held-out data falls from {100 * before:.2f} % to "
                 f"{100 * after:.2f} % of the {whole}."
@@ -90,19 +91,28 @@ def summary_of(
         return said
     if decision.verdict == "undecided":
         said = f"Undecided: {decision.reason}."
-        if groups:
-            return f"{said} They are {'; '.join(groups)}."
+        if decision.equivalent:
+            groups = "; and ".join(listed(group, "or") for group in decision.equivalent)
+            return f"{said} They are {groups}."
         return said + (f" Best so far: {names}." if names else "")
     return f"Something is missing that the catalogue does not know: {decision.reason}." + (
-        f" The nearest known effects do not explain it: {names}." if names else ""
+        f" The nearest known {'effect does' if len(missing) == 1 else 'effects do'} not explain it: {names}."
+        if names
+        else ""
     )
+
+
+def listed(names: Sequence[str], word: str = "and") -> str:
+    """Names in words: "a", "a and b", "a, b and c"; with "or" where one of them is meant."""
+    said = [in_words(name) for name in names]
+    return f" {word} ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
 
 
 def freed_value(nominal: Model, fitted: Model, elements: Sequence[str]) -> str:
     """Sentences about the fixed values among the `elements`, which a hypothesis frees beside the others."""
     effects = [label for label in elements if fitted.term(label) is not None]
     freed = [name for name in elements if name not in effects]
-    beside = f" with {in_words(' and '.join(effects))}" if effects else ""
+    beside = f" with {listed(effects)}" if effects else ""
     values = [
         f"{name} is held at {nominal.parameters[name].value:g} {nominal.parameters[name].unit} as given. Freed it comes out at "
         f"{fitted.value(name):.4g}"

@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
-from rhythmid.identify.inverse_dynamics.motion import Motion, high_pass, low_pass, motion_of, stretches
+from rhythmid.identify.inverse_dynamics.motion import (
+    Motion,
+    Stretch,
+    high_pass,
+    low_pass,
+    motion_of,
+    runs,
+    stretches,
+)
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.record.record import Record
 from rhythmid.simulation.effect import MAX_STEP, Path, effect_along
@@ -28,6 +36,7 @@ FAST = 0.95  # quantile of the speed that is called fast
 DECIMATED = 2.5  # rows a period of the cut-off: the Nyquist rate and a quarter for the filter's slope (Gautier et al.)
 MEMORY = 2e8  # bytes of forces that are kept, so that a refit computes again only what changed
 MANY_ROWS = 200  # of a short record that are kept at least: their correlation is allowed for
+QUARTER = 0.25  # of the shortest period of the effort, up to which a gap is bridged: a cubic beside it misses 12 % of that, 1.5 % of one twice as long
 LEAST_ROWS = 40  # rows without which nothing is estimated
 INVERSIONS = (
     8  # steps of an actuator's inversion at most: an error that halves each time is then below a hundredth
@@ -72,8 +81,10 @@ class Balance:
     @classmethod
     def of(cls, records: Sequence[Record], model: Model, bandwidth: Bandwidth | None = None) -> "Balance":
         """The balance of these records. Raises InputError where no effort was recorded, or too little of motion."""
-        raw = stretches(records, model)
-        chosen = bandwidth or bandwidth_of(raw, model)
+        if bandwidth is None:
+            raw, chosen = _bridged(records, model)
+        else:
+            raw, chosen = stretches(records, model, QUARTER / bandwidth.effort), bandwidth
         motions = [motion_of(one, model, chosen.motion, chosen.low) for one in raw]
         return cls.of_motions(motions, chosen, max(one.period for one in raw))
 
@@ -92,7 +103,7 @@ class Balance:
             margin = min(math.ceil(1.0 / (chosen.effort * motion.period)), len(motion.time) // 4)
             if clear is not None:
                 margin = math.ceil(clear / (chosen.effort * motion.period))
-            rows = np.arange(margin, len(motion.time) - margin, step)
+            rows = motion.recorded(np.arange(margin, len(motion.time) - margin, step))
             all_rows += len(rows)
             sticks = stuck(
                 np.abs(motion.leg_velocity) <= STICK * speed, 1.0 / (chosen.effort * motion.period)
@@ -124,6 +135,19 @@ class Balance:
     def filtered(self, signal: Array, period: float) -> Array:
         """A signal (n,) or (n, p) through the filter that the effort and all that is compared with it go through."""
         return high_pass(low_pass(signal, period, self.bandwidth.effort), period, self.bandwidth.low)
+
+    @property
+    def notes(self) -> list[str]:
+        """What was interpolated of each record."""
+        found: dict[str, list[float]] = {}
+        for motion in self.motions:
+            if motion.bridged:
+                found.setdefault(motion.name, []).extend(end - begin for begin, end in motion.bridged)
+        return [
+            f"{name}: {len(gaps)} gaps of at most {max(gaps):.2g} s ({sum(gaps):.3g} s in all) are bridged, short beside the effort's "
+            "shortest period; they count neither in fits nor in scores"
+            for name, gaps in found.items()
+        ]
 
     @property
     def mechanical(self) -> Array:
@@ -293,12 +317,25 @@ class Balance:
         return self._sensitive[name]
 
 
+def _bridged(records: Sequence[Record], model: Model) -> tuple[list[Stretch], Bandwidth]:
+    """The stretches of these records, bridged where gaps are short beside what their effort contains; and their bandwidth.
+
+    It is read off the stretches between all gaps first, and again off the longer ones that it leads to.
+    """
+    raw = stretches(records, model)
+    chosen = bandwidth_of(raw, model)
+    longer = stretches(records, model, QUARTER / chosen.effort)
+    if not any(one.bridged for one in longer):
+        return raw, chosen
+    chosen = bandwidth_of(longer, model)
+    return stretches(records, model, QUARTER / chosen.effort), chosen
+
+
 def stuck(slow: Mask, memory: float) -> Mask:
     """Samples (n,) to leave out: all `slow` ones, and within half the filter's `memory` [samples] of a rest as long as that, for
     what the friction did meanwhile has come there through the filter."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], slow.astype(int), [0]])))
     out, half = slow.copy(), math.ceil(0.5 * memory)
-    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for first, end in runs(slow):
         if end - first >= memory:
             out[max(first - half, 0) : end + half] = True
     return out

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
@@ -23,10 +24,15 @@ from rhythmid.record.record import Channel, Record
 from rhythmid.simulation.effect import Path, effect_along
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 ORDER = 4  # of the Butterworth filter, run forwards and backwards (the order that Gautier et al. use)
 SLOW_ORDER = 2  # of the high-pass filter, run twice
 FINER = 10.0  # samples in a period of the motion's bandwidth that are kept: the switch of a friction is placed to a tenth of it
 SHORTEST = 32  # samples of a stretch without a gap, below which it says nothing
+BRIDGE = 3  # degree of the polynomial across a gap: it turns once on either side, as what the band holds may within three gaps
+LEAST_BESIDE = (
+    4  # samples on either side of a gap that it is fitted to, at least, and as many more as are missing
+)
 BASES = ("base_displacement", "base_acceleration")
 
 
@@ -38,6 +44,7 @@ class Motion:
     d'Alembert's −m a, and `driven_by_base` says so. `leg_position`, `leg_velocity` are relative to the base where that
     moves. `coupling` (n,) is, at a joint of several, the force beside its own inertia times its acceleration that the body asks
     for; `links` are its derivatives with respect to the body's parameters, by name, and the values at which they were taken.
+    `bridged` are the gaps, from and until [s], across which nothing was recorded but interpolated: no row of effort lies there.
     """
 
     record: int
@@ -53,6 +60,14 @@ class Motion:
     driven_by_base: bool = False
     coupling: Array | None = None
     links: Mapping[str, tuple[float, Array]] = field(default_factory=dict)
+    bridged: tuple[tuple[float, float], ...] = ()
+
+    def recorded(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Those of the rows that lie in no gap."""
+        time = self.time[rows]
+        for begin, end in self.bridged:
+            rows, time = rows[(time <= begin) | (time >= end)], time[(time <= begin) | (time >= end)]
+        return rows
 
     def path(self, effort: Array, leg: Array, signal: Array, of_leg: bool) -> Path:
         """The trajectory along which an element's force is computed."""
@@ -65,7 +80,8 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Raw samples (n,) of one stretch: the measured output, the effort or base signal, and the forcing, on a grid."""
+    """Raw samples (n,) of one stretch: the measured output, the effort or base signal, and the forcing, on a grid; `bridged` are
+    the gaps, from and until [s], across which they were interpolated."""
 
     record: int
     name: str
@@ -75,6 +91,7 @@ class Stretch:
     period: float
     kind: str
     measured: str
+    bridged: tuple[tuple[float, float], ...] = ()
 
 
 def effort_channel(record: Record, model: Model) -> Channel | None:
@@ -86,8 +103,9 @@ def effort_channel(record: Record, model: Model) -> Channel | None:
     return None
 
 
-def stretches(records: Sequence[Record], model: Model) -> list[Stretch]:
-    """The stretches without gaps of all records, on uniform grids at the rates of their outputs.
+def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> list[Stretch]:
+    """The stretches without gaps of all records, on uniform grids at the rates of their outputs; gaps of up to `longest` [s],
+    and those that their neighbours tell, are bridged.
 
     Raises InputError where a record has neither effort nor a moving base, or is too short.
     """
@@ -110,21 +128,55 @@ def stretches(records: Sequence[Record], model: Model) -> list[Stretch]:
         else:
             assert grid.input is not None
             drive = grid.input if grid.forcing is None else grid.input + grid.forcing
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], grid.valid.astype(int), [0]])))
-        for first, end in zip(edges[::2], edges[1::2], strict=True):
+        bridged = short_gaps(grid.missing, int(longest / grid.period)) | (grid.missing & grid.valid)
+        output, drive = (across(signal, ~grid.missing, bridged) for signal in (grid.output, drive))
+        for first, end in runs(~grid.missing | bridged):
             if end - first < SHORTEST:
                 continue
-            part = slice(int(first), int(end))
+            part = slice(first, end)
+            spans = ((first + a - 1, first + b) for a, b in runs(bridged[part]))
             kind = record.input_kind if base else "force"
             found.append(
                 Stretch(
-                    number, record.name, grid.time[part], grid.output[part], drive[part], grid.period, kind,
-                    record.output_kind,
+                    number, record.name, grid.time[part], output[part], drive[part], grid.period, kind,
+                    record.output_kind, tuple((float(grid.time[a]), float(grid.time[b])) for a, b in spans),
                 )
             )  # fmt: skip
     if not found:
         raise InputError(f"no stretch without a gap has {SHORTEST} samples")
     return found
+
+
+def runs(marked: Mask) -> list[tuple[int, int]]:
+    """Where samples (n,) are marked one after the other: of each run the first, and the one after its last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(int), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def short_gaps(missing: Mask, longest: int) -> Mask:
+    """Samples (n,) in gaps of at most so many samples, with at least four recorded ones near either side."""
+    found = np.zeros(len(missing), dtype=bool)
+    for first, end in runs(missing):
+        beside = max(end - first, LEAST_BESIDE)
+        before, after = ~missing[max(first - beside, 0) : first], ~missing[end : end + beside]
+        if end - first <= longest and min(before.sum(), after.sum()) >= LEAST_BESIDE:
+            found[first:end] = True
+    return found
+
+
+def across(signal: Array, recorded: Mask, bridged: Mask) -> Array:
+    """A signal (n,) with its `bridged` runs on the polynomial through what is recorded on either side, by least squares: a spline
+    through noisy samples would set out with the slope of their noise."""
+    made = signal.copy()
+    for first, end in runs(bridged):
+        beside = max(end - first, LEAST_BESIDE)
+        near = np.arange(max(first - beside, 0), min(end + beside, len(signal)))
+        near = near[recorded[near]]
+        if len(near) <= BRIDGE:
+            continue  # what the spline made of it
+        through = Polynomial.fit(near.astype(float), signal[near], BRIDGE)
+        made[first:end] = through(np.arange(first, end, dtype=float))
+    return made
 
 
 @lru_cache(maxsize=64)
@@ -194,6 +246,7 @@ def motion_of(stretch: Stretch, model: Model, frequency: float, low: float = 0.0
         velocity - base_rate if moved else velocity,
         drive if stretch.kind == "force" else -inertial,
         period, stretch.kind in BASES,
+        bridged=stretch.bridged,
     )  # fmt: skip
 
 

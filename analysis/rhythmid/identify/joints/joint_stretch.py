@@ -139,9 +139,10 @@ def _at(grid: Uniform, time: Array) -> Uniform:
     output = moved(grid.output)
     assert output is not None
     valid = np.interp(time, grid.time, grid.valid.astype(float)) > WHOLE
+    missing = np.interp(time, grid.time, grid.missing.astype(float)) > 0.0
     held = {} if grid.input is None else {"input": np.interp(time, grid.time, grid.input)}
     return Uniform(
-        time, output, grid.period, valid, **held, forcing=moved(grid.forcing), effort=moved(grid.effort),
+        time, output, grid.period, valid, missing, **held, forcing=moved(grid.forcing), effort=moved(grid.effort),
         reference=moved(grid.reference),
     )  # fmt: skip
 
