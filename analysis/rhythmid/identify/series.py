@@ -332,6 +332,8 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
     stiffness = spring if spring > NO_SPRING * inertial else inertial
     effort, peak, pumping, reference = 0.0, 0.0, 0.0, 0.0
+    # by a forcing or a controller of the model's own
+    driven = any(term.element.acts in ("drive", "feedback") for term in model.terms)
     fed = any(term.element.takes for term in model.terms)  # by a voltage, say: what is recorded is no force
     for one in series:
         total = np.zeros(len(one.time))
@@ -339,6 +341,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
             if signal is not None:
                 inside = (one.time >= signal.x[0]) & (one.time <= min(signal.x[-1], FOR_EVER))
                 total[inside] += signal(one.time[inside])
+        driven = driven or bool(np.any(total))
         if one.kind == "reference":
             reference = max(reference, float(np.std(total)))
         elif not fed:
@@ -367,6 +370,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         peak_effort=peak,
         rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
         displaced_base=any(one.kind == "base_displacement" for one in series),
+        idle=not driven,
     )
 
 
