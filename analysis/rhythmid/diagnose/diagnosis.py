@@ -206,7 +206,7 @@ def diagnose(
             if answer is None:
                 break
             made.append(answer)
-        chosen = next((one for one in made if one.stands), made[0])
+        chosen = _beside_free_run(next((one for one in made if one.stands), made[0]), made)
         compare = effort.applies and chosen.stands and isinstance(made[0].result, FreeRunResult)
         if compare and not case.budget.spent:
             return _compared(chosen, _by_effort(case, effort, (), 1))
@@ -257,6 +257,21 @@ def _answers(case: Case, effort: Applicability, notes: Sequence[str]) -> Iterato
 def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST_EFFECTS) -> Answer:
     result = effort_run(case, effort, most)
     return Answer(compose_effort(case, result, notes), result.chosen.model, result)
+
+
+def _beside_free_run(chosen: Answer, made: Sequence[Answer]) -> Answer:
+    """The answer; one from windows that nothing is missing has a note where a free run says otherwise of the same records."""
+    if chosen.diagnosis.verdict != "consistent" or chosen.diagnosis.scoring.kind != "windows":
+        return chosen
+    free = next((one.diagnosis for one in made if one.diagnosis.scoring.kind == "free_run"), None)
+    if free is None or free.verdict == "consistent":
+        return chosen
+    left = free.fit["augmented"].train_nrmse
+    note = (
+        f"In windows nothing is missing. In free run the same records are {free.verdict.replace('_', ' ')}, with {100.0 * left:.2g} % of the "
+        "motion left: something slow may be missing, or small disturbances add up."
+    )
+    return replace(chosen, diagnosis=replace(chosen.diagnosis, notes=(*chosen.diagnosis.notes, note)))
 
 
 def _compared(answer: Answer, other: Answer) -> Answer:
