@@ -31,6 +31,7 @@ from rhythmid.identify.declared import with_declared
 from rhythmid.identify.inverse_dynamics.applicability import Applicability, applicable
 from rhythmid.identify.joint_covariance import JointCovariance
 from rhythmid.identify.plausibility import check_plausible
+from rhythmid.identify.record_zero import without_record_zero
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.parallel import cores
@@ -236,7 +237,8 @@ def _answers(case: Case, effort: Applicability, notes: Sequence[str]) -> Iterato
         for scoring in ways:
             result = free_run(case, scoring)
             diagnosis = compose(case, result, notes)
-            yield Answer(diagnosis, causal(without_free_maps(result.search.fit.model)), result)
+            model = without_record_zero(without_free_maps(result.search.fit.model))
+            yield Answer(diagnosis, causal(model), result)
 
     if not effort.applies or not effort.free_run_means_something:
         yield from by_motion(windows=True)

@@ -14,6 +14,7 @@ import numpy as np
 
 from rhythmid.diagnose.baseline import FOLLOWS, Calibration, calibrate, reconstructed
 from rhythmid.diagnose.hypothesis import ScoringKind
+from rhythmid.diagnose.record_zeros import with_zeros
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import LEAST_BLOCKS, forgets, periods_long
@@ -82,6 +83,8 @@ def settle(
             cut, unseen = hold_out_tail(cut)
         try:
             calibration = calibrate(model, cut, catalogue, pool, tell)
+            if how.kind == "free_run":  # windows have starts of their own, which take up most of a zero
+                calibration, unseen = with_zeros(calibration, model, unseen, catalogue, pool, tell)
         except InputError as error:
             failure = failure or error
             continue
@@ -123,7 +126,9 @@ def _all_the_same(
     if not separate:
         cut, unseen = hold_out_tail(cut)
     try:
-        calibration = calibrate(model, cut, catalogue, pool, tell)
+        calibration, unseen = with_zeros(
+            calibrate(model, cut, catalogue, pool, tell), model, unseen, catalogue, pool, tell
+        )
     except InputError:
         return ()
     if calibration.fit.nrmse() >= FOLLOWS:

@@ -45,6 +45,8 @@ class Series:
     `parameters` are values of the model's parameters that the record declares; see `own_model`. `record` is the record that the
     series is a stretch of, empty for a whole one. `spread` (n // block,) is the standard deviation of each average's noise over its
     root mean square, where it is not the same throughout: jitter of the stamps makes it grow with the slope of the signal.
+    `zero` is what was taken off the samples because the output's zero is not that of the first record, as far as that is known; None
+    where it is; see `record_zero`.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Series:
     parameters: Mapping[str, float] = field(default_factory=dict)
     record: str = ""
     spread: Array | None = None
+    zero: float | None = None
 
     @property
     def blocks(self) -> int:

@@ -29,6 +29,7 @@ from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.repeats import noise_from_repeats
 from rhythmid.identify.series import Series
+from rhythmid.identify.zero_estimates import zeros_told
 from rhythmid.model import Model
 
 SHOWN = 8  # alternatives listed
@@ -107,7 +108,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         delays=delays_of(fit),
         next_experiment=next_experiment(found, rivals, series, decision.verdict),
         scoring=Scored(result.scoring.kind, None, result.scoring.reason),
-        calibration=(*result.calibration.notes, *recalibrated(case.nominal, fit)),
+        calibration=(*result.calibration.notes, *zeros_told(fit), *recalibrated(case.nominal, fit)),
         excluded=tuple(f"{' + '.join(added)}: {why}" for added, why in found.excluded),
         heldout=held,
         notes=tuple(notes),
