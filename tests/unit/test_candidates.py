@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rhythmid.elements.candidates import candidates
+from rhythmid.elements.candidates import IDLE, candidates
 from rhythmid.elements.catalogue import load_catalogue, load_element
 from rhythmid.elements.element import Element, Parameter, Scales
 from rhythmid.elements.first_guess import NoGuess
@@ -95,6 +95,20 @@ def test_what_is_not_tried_is_told_with_the_reason(scales, name, reason):
         candidates(CATALOGUE, Model.from_text("inertia: {mass: 1.0}").setting, scales).not_tried[name]
         == reason
     )
+
+
+def test_a_machine_that_nothing_drives_lacks_no_command_nor_actuator(scales):
+    model = Model.from_text("inertia: {mass: 1.0}")
+    idle = candidates(CATALOGUE, model.setting, replace(scales, idle=True))
+    driven = candidates(CATALOGUE, model.setting, scales)
+    gone = {element.name for element, _ in driven.tried} - {element.name for element, _ in idle.tried}
+    assert {"actuator_lag", "backlash", "command_hold", "load_dependent_friction"} <= gone
+    assert {idle.not_tried[name] for name in gone} == {IDLE}
+    assert gone == {
+        element.name
+        for element, _ in driven.tried
+        if element.slot in ("command", "actuator") or element.name == "load_dependent_friction"
+    }
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,58 @@
 """The menu of next experiments: what the machine, and the sampling of its records, can bear."""
 
+import math
+
+import numpy as np
 import pytest
 
-from rhythmid.diagnose.answer.next_experiment import _menu
+from machines import CATALOGUE, SHORT, hopper, records, search_of
+from rhythmid.diagnose.answer.next_experiment import MORE_FREE, _menu, next_experiment, separation
 from rhythmid.excitation.sequence import build
+from rhythmid.identify.output_error import estimate
+from rhythmid.identify.series import Series, prepare, scales
+from rhythmid.model import Model
+from rhythmid.record.record import Channel, Record
+
+PENDULUM = """
+units: {force: rad/s^2, position: rad}
+inertia: {mass: {value: 1.0, fixed: true}}
+force:
+  - linear_spring: {stiffness: {value: 40.0}, rest_length: {value: 0.0}}
+  - viscous_damper: {damping: {value: 0.2}}
+"""
+TIME = 0.02 * np.arange(400)
+
+
+def decay(amplitude: float) -> list[Series]:
+    """A free swing of this amplitude [rad] about 0.1 rad."""
+    swing = 0.1 + amplitude * np.exp(-0.1 * TIME) * np.cos(math.sqrt(40.0) * TIME)
+    noise = 1e-3 * np.random.default_rng(3).standard_normal(len(TIME))
+    return prepare([Record("swing", Channel(TIME, swing + noise, "rad"))])
+
+
+@pytest.mark.parametrize(("amplitude", "factors"), [(0.5, {"0.3", "3"}), (2.0, {"0.3"})])
+def test_a_machine_that_nothing_drives_is_released_from_other_amplitudes(amplitude, factors):
+    """And an angle no further than from the other side."""
+    series = decay(amplitude)
+    nominal = Model.from_text(PENDULUM)
+    found = search_of(estimate(nominal, series))
+    rival = nominal.with_element(CATALOGUE["coulomb_friction"], {"force": 0.3, "transition": 1e-3})
+    other = search_of(estimate(rival, series, names=nominal.free), "coulomb_friction")
+    menu = separation(found.best, other.best, series, found.noise.variance, 5e-3)
+    assert {one.words.split(", ")[1].split()[0] for one in menu} == factors
+    assert all(one.words.startswith("a release at rest from ") and one.chi2 > 0.0 for one in menu)
+    said = next_experiment(found, [other.best], series, "missing_physics")
+    assert said.startswith("a release at rest from ") and "coulomb_friction" in said
+    assert next_experiment(found, [], series, "undecided") == MORE_FREE
+
+
+def test_only_a_machine_without_input_is_idle():
+    assert scales(decay(0.5), Model.from_text(PENDULUM)).idle
+    assert not scales(prepare(records(hopper(), SHORT[2:])), hopper()).idle
+    forced = Model.from_text(PENDULUM).with_element(
+        CATALOGUE["periodic_forcing"], {"amplitude": 1.0, "frequency": 1.0, "phase": 0.0}
+    )
+    assert not scales(decay(0.5), forced).idle
 
 
 @pytest.mark.parametrize("highest", [4.0, 40.0, 400.0])

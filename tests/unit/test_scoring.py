@@ -1,15 +1,103 @@
 """How records are scored: the free run where it follows the machine, windows where it does not, and what comes after those."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.diagnose import diagnosis as module
 from rhythmid.diagnose import scoring
 from rhythmid.diagnose.diagnosis import diagnose
-from rhythmid.diagnose.scoring import FREE_RUN, Scoring, settle
+from rhythmid.diagnose.scoring import ALL_THE_SAME, FOLLOWS, FREE_RUN, INTEGRATES, Scoring, settle
+from rhythmid.identify.multiple_shooting import forgets
 from rhythmid.identify.series import prepare
+from rhythmid.model import Model
+from rhythmid.record.record import Channel, Record
+from rhythmid.simulation.signal import continuous
+from rhythmid.simulation.simulate import simulate
+
+PENDULUM = """
+units: {{force: rad/s^2, position: rad}}
+inertia: {{mass: {{value: 1.0, fixed: true}}}}
+force:
+  - pendulum_gravity: {{moment: {{value: {moment}}}, reference: {{value: {reference}}}}}
+  - viscous_damper: {{damping: {{value: {damping}}}}}
+"""
+BALL = """
+inertia: {mass: {value: 1.0, fixed: true}}
+force:
+  - gravity: {acceleration: 9.81}
+  - periodic_forcing: {amplitude: 15.0, frequency: 1.0}
+  - end_stop_contact: {stiffness: 3000.0, damping_ratio: 0.03, position: 0.0, side: -1.0}
+"""
+CART = """
+inertia: {mass: {value: 1.0, fixed: true}}
+force: [{viscous_damper: {damping: {value: 0.5}}}]
+"""
+
+
+def pendulum(moment: float = 40.0, reference: float = 0.0, damping: float = 0.02) -> Model:
+    """Free, of one period a second at small swings."""
+    return Model.from_text(PENDULUM.format(moment=moment, reference=reference, damping=damping))
+
+
+def motion(machine: Model, start: tuple[float, float], seconds: float, std: float, seed: int = 0) -> Record:
+    """What a sensor at 50 Hz sees of a machine from a start, with white noise."""
+    time = 0.02 * np.arange(round(50.0 * seconds))
+    value = simulate(machine, time, initial=start).output
+    value = value + std * np.random.default_rng(seed).standard_normal(len(time))
+    return Record("motion", Channel(time, value, machine.units.position))
+
+
+@pytest.mark.parametrize("amplitude", [0.4, 1.5])
+def test_a_lightly_damped_swing_with_friction_is_scored_in_free_run_over_sixty_periods(amplitude):
+    machine = pendulum().with_element(
+        CATALOGUE["coulomb_friction"], {"force": 0.002 * 40.0 * amplitude, "transition": 1e-3}
+    )
+    series = prepare([motion(machine, (amplitude, 0.0), 60.0, 1e-3)])
+    found = settle(pendulum(moment=41.0), series, [], CATALOGUE)
+    assert found[0].kind == "free_run" and found[0].reason == FREE_RUN
+
+
+def test_the_free_run_of_an_unstable_machine_means_nothing():
+    up = pendulum(reference=np.pi, damping=0.5)
+    assert not forgets(up, prepare([motion(up, (1e-3, 0.0), 2.0, 1e-5)]))
+    ball = Model.from_text(BALL, catalogue=CATALOGUE)
+    for seconds in (10.0, 40.0):  # while the runs part, and when they have parted as far as they can
+        assert not forgets(ball, prepare([motion(ball, (0.3, 0.0), seconds, 1e-4)]))
+
+
+def test_a_free_run_that_follows_a_machine_that_integrates_comes_after_the_windows():
+    cart = Model.from_text(CART)
+    time = 0.01 * np.arange(1000)
+    force = np.random.default_rng(5).standard_normal(20).repeat(50)
+    pushed = Channel(time, force, "N")
+    value = simulate(cart, time, continuous(time, force, "zero")).output
+    value = value + 1e-3 * np.random.default_rng(1).standard_normal(len(time))
+    found = settle(cart, prepare([Record("cart", Channel(time, value, "m"), pushed)]), [], CATALOGUE)
+    assert [one.kind for one in found] == ["windows", "free_run"]
+    assert found[0].reason.endswith(INTEGRATES) and found[1].reason == ALL_THE_SAME
+    assert found[1].calibration.fit.nrmse() < FOLLOWS
+
+
+@pytest.mark.parametrize(("verdict", "said"), [("unknown_physics", 1), ("consistent", 0)])
+def test_windows_in_which_nothing_is_missing_tell_what_a_free_run_says(monkeypatch, verdict, said):
+    quality = {"augmented": SimpleNamespace(train_nrmse=0.07)}
+    plain = diagnose(records(hopper(), SHORT[1:2]), hopper(), catalogue=CATALOGUE).diagnosis
+    made = [
+        replace(plain, scoring=replace(plain.scoring, kind="windows")),
+        replace(plain, verdict=verdict, fit=quality),
+    ]
+    fit = SimpleNamespace(fit=SimpleNamespace(model=hopper()))
+    monkeypatch.setattr(module, "settle", lambda *_, **__: [SimpleNamespace(kind="windows")] * 2)
+    monkeypatch.setattr(module, "free_run", lambda *_: SimpleNamespace(search=fit))
+    monkeypatch.setattr(module, "compose", lambda *_: made.pop(0))
+    found = diagnose(records(hopper(), SHORT[1:2]), hopper(), catalogue=CATALOGUE).diagnosis
+    assert not made and found.scoring.kind == "windows" and found.verdict == "consistent"
+    assert len(found.notes) == len(plain.notes) + said
+    assert sum("unknown physics, with 7 % of the motion left" in note for note in found.notes) == said
 
 
 def scorings(amplitude: float) -> list[Scoring]:

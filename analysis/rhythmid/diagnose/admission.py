@@ -79,8 +79,8 @@ def check_driven(records: Sequence[Record], model: Model) -> str | None:
         quarters = np.array_split(record.output.value - record.output.value.mean(), 4)
         if float(np.std(quarters[-1])) > DECAYS * float(np.std(quarters[0])):
             return (
-                f"{record.name}: has no input channel, and the motion hardly decays: whatever drives it counts as missing physics "
-                "here; name its channel under 'input:' (or 'forcing:') in signals.yaml"
+                f"{record.name}: has no input channel and is taken for a free motion, which hardly decays; if anything drives it, "
+                "name its channel under 'input:' (or 'forcing:') in signals.yaml"
             )
     forced = [record for record in records if record.forcing is not None]
     if forced and all(record.input is None for record in records):

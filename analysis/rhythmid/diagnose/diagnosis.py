@@ -32,6 +32,7 @@ from rhythmid.identify.declared import with_declared
 from rhythmid.identify.inverse_dynamics.applicability import Applicability, applicable
 from rhythmid.identify.joint_covariance import JointCovariance
 from rhythmid.identify.plausibility import check_plausible
+from rhythmid.identify.record_zero import without_record_zero
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.parallel import cores
@@ -234,7 +235,7 @@ def diagnose(
             if answer is None:
                 break
             made.append(answer)
-        chosen = next((one for one in made if one.stands), made[0])
+        chosen = _beside_free_run(next((one for one in made if one.stands), made[0]), made)
         if effort.applies and chosen.stands and isinstance(made[0].result, FreeRunResult):
             if not case.budget.spent:
                 return _compared(chosen, _by_effort(whole, effort, (), 1))
@@ -278,7 +279,8 @@ def _answers(
                 return
             result = free_run(case, scoring)
             diagnosis = compose(case, result, (*given.notes, *more))
-            yield Answer(diagnosis, causal(without_free_maps(result.search.fit.model)), result)
+            model = without_record_zero(without_free_maps(result.search.fit.model))
+            yield Answer(diagnosis, causal(model), result)
 
     if not effort.applies or not effort.free_run_means_something:
         yield from by_motion(windows=True)
@@ -301,6 +303,21 @@ def _answers(
 def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: int = MOST_EFFECTS) -> Answer:
     result = effort_run(case, effort, most)
     return Answer(compose_effort(case, result, notes), result.chosen.model, result)
+
+
+def _beside_free_run(chosen: Answer, made: Sequence[Answer]) -> Answer:
+    """The answer; one from windows that nothing is missing has a note where a free run says otherwise of the same records."""
+    if chosen.diagnosis.verdict != "consistent" or chosen.diagnosis.scoring.kind != "windows":
+        return chosen
+    free = next((one.diagnosis for one in made if one.diagnosis.scoring.kind == "free_run"), None)
+    if free is None or free.verdict == "consistent":
+        return chosen
+    left = free.fit["augmented"].train_nrmse
+    note = (
+        f"In windows nothing is missing. In free run the same records are {free.verdict.replace('_', ' ')}, with {100.0 * left:.2g} % of the "
+        "motion left: something slow may be missing, or small disturbances add up."
+    )
+    return replace(chosen, diagnosis=replace(chosen.diagnosis, notes=(*chosen.diagnosis.notes, note)))
 
 
 def _compared(answer: Answer, other: Answer) -> Answer:

@@ -15,6 +15,7 @@ import numpy as np
 from rhythmid.diagnose.baseline import Calibration, calibrate, reconstructed
 from rhythmid.diagnose.constants import BETTER_STEP, BETTER_TOGETHER, FOLLOWS, HOPELESS, PATIENCE
 from rhythmid.diagnose.hypothesis import ScoringKind
+from rhythmid.diagnose.record_zeros import with_zeros
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import LEAST_BLOCKS, forgets, periods_long
@@ -30,6 +31,7 @@ INTEGRATES = (
 )
 FREE_RUN = "the model follows the machine in free run"
 LOSES = "in free run the nominal model does not follow the machine"
+ALL_THE_SAME = "the model follows the machine in free run, although every small disturbance adds up there"
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,8 @@ def settle(
     """Calibrate the nominal model in the longest runs through which it follows the machine, in free run or in windows.
 
     The first result is the way to score. Where it is not the free run, but a free run is not hopeless, that comes second, for
-    what the first leaves without a name: windows hide what is slow, and lines that are narrower than a window resolves.
+    what the first leaves without a name: windows hide what is slow, and lines that are narrower than a window resolves. Where
+    the machine integrates or is unstable, a free run comes second if it follows the machine all the same.
     Without `windows` only a free run that follows the machine is a result, else there is none.
     Without `separate` held-out series the last fifth of every run is held out. Raises InputError when no length works.
     """
@@ -77,6 +80,8 @@ def settle(
             cut, unseen = hold_out_tail(cut)
         try:
             calibration = calibrate(model, cut, catalogue, pool, tell)
+            if how.kind == "free_run":  # windows have starts of their own, which take up most of a zero
+                calibration, unseen = with_zeros(calibration, model, unseen, catalogue, pool, tell)
         except InputError as error:
             failure = failure or error
             continue
@@ -96,10 +101,38 @@ def settle(
         assert failure is not None
         raise failure
     longest, best = tried[0], tried[-1]
+    if longest.kind != "free_run":
+        chosen = longest if best.error >= BETTER_TOGETHER * longest.error else best
+        return (chosen, *_all_the_same(model, series, separate, catalogue, pool, tell))
     if best.error >= BETTER_TOGETHER * longest.error:
         return (longest,)
-    near = longest.kind == "free_run" and longest.calibration.fit.nrmse() < HOPELESS
+    near = longest.calibration.fit.nrmse() < HOPELESS
     return (best, longest) if near and best is not longest else (best,)
+
+
+def _all_the_same(
+    model: Model,
+    series: Sequence[Series],
+    separate: Sequence[Series],
+    catalogue: Catalogue,
+    pool: ThreadPoolExecutor | None,
+    tell: Tell,
+) -> tuple[Scoring, ...]:
+    """The free run of a machine that integrates or is unstable, where the model follows it: no window shows what is slow."""
+    cut, unseen = list(series), list(separate)
+    if not separate:
+        cut, unseen = hold_out_tail(cut)
+    try:
+        calibration, unseen = with_zeros(
+            calibrate(model, cut, catalogue, pool, tell), model, unseen, catalogue, pool, tell
+        )
+    except InputError:
+        return ()
+    if calibration.fit.nrmse() >= FOLLOWS:
+        return ()
+    if calibration.reconstructed:
+        unseen = [reconstructed(one) for one in unseen]
+    return (Scoring(calibration, tuple(unseen), "free_run", ALL_THE_SAME),)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from rhythmid.elements.element import Element, Scales
 from rhythmid.elements.first_guess import NoGuess
 
+IDLE = "no command, forcing or controller drives the machine"
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -83,6 +85,8 @@ def _unsuitable(element: Element, setting: Setting, scales: Scales) -> str | Non
         return "it needs an angle as position"
     if element.controlled and not setting.controlled:
         return "it needs a controller in the model"
+    if scales.idle and (element.driven or element.slot in ("command", "actuator")):
+        return IDLE
     if element.displaced_base and not scales.displaced_base:
         return "it needs an input that displaces the base"
     for source, default in element.borrows.values():

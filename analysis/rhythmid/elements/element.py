@@ -100,6 +100,7 @@ class Scales:
     peak_effort: float = 0.0  # largest actuator force, 0 where unknown
     rest: float | None = None  # position at which the model's linear spring is at rest, where that is known
     displaced_base: bool = False  # whether the input displaces the base that the leg stands on
+    idle: bool = False  # whether no command, forcing or controller drives the machine: it moves freely
 
     @property
     def force(self) -> float:
@@ -184,6 +185,7 @@ class Element:
     rotational: bool = False  # makes sense only where the position is an angle
     controlled: bool = False  # makes sense only where a controller in the command path closes the loop
     displaced_base: bool = False  # says what another does not only where the input displaces the base
+    driven: bool = False  # says nothing where the actuator makes no force, as commands and actuators do
     starts: Callable[[Scales], list[dict[str, float]]] | None = None
     ranges: Callable[[Scales], Mapping[str, tuple[float, float]]] | None = None
     hops: Callable[[Scales], Mapping[str, float]] | None = None

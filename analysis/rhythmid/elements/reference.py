@@ -146,6 +146,8 @@ def describe(element: Element) -> str:
         )
     if element.displaced_base:
         facts.append("- For machines on a base that the input displaces.")
+    if element.driven:
+        facts.append("- For machines whose actuator makes a force.")
     facts.append("- Candidate." if element.candidate else "- Not a candidate.")
     if element.special_case_of:
         facts.append(f"- Special case of {_names(element.special_case_of)}.")

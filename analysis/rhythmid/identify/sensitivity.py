@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rhythmid.identify.free_run import FreeRun
 from rhythmid.identify.noise import NoiseModel, runs
+from rhythmid.identify.record_zero import zero_place
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
@@ -39,6 +40,8 @@ class Problem:
         self.run, self.names, self.noise, self.pool = run, tuple(names), noise, pool
         self.hidden: list[tuple[Array, Array]] = []  # mean and scatter of each series' element states
         self.spread = max(float(np.std(one.averaged)) for one in run.series) or 1.0
+        # zeros differ by no more than the outputs do
+        self.reach = float(np.ptp([[one.averaged.min(), one.averaged.max()] for one in run.series])) or 1.0
         self.stretches = [
             [s for s in runs(one.used) if s.stop - s.start > noise.order + 1] for one in run.series
         ]
@@ -67,14 +70,18 @@ class Problem:
         """Take the usual values of the elements' own states from a run.
 
         A hidden state hardly differs from a kick to the velocity when its element is fast; knowing its usual range keeps
-        it from wandering off.
+        it from wandering off. A zero of its own, which never moves in a run, is within the outputs' reach.
         """
         self.hidden = []
+        zero = zero_place(self.run.compiled.layout.states)
         for index, start in enumerate(starts):
             rows = self.run.rows(model, index, start)
             # all of the run: a free decay is at its largest where it begins
             states = rows[:, 2 : self.run.states] if rows is not None else np.zeros((1, self.run.states - 2))
-            self.hidden.append((states.mean(axis=0), 3.0 * states.std(axis=0) + 1e-12))
+            scatter = 3.0 * states.std(axis=0) + 1e-12
+            if zero is not None and self.run.series[index].zero is not None:
+                scatter[zero - 2] = self.reach
+            self.hidden.append((states.mean(axis=0), scatter))
 
     def departure(self, index: int, start: Array) -> Array:
         """Element states of a start, as multiples of their usual scatter from their usual mean."""

@@ -49,6 +49,8 @@ class Series:
     root mean square, where it is not the same throughout: jitter of the stamps makes it grow with the slope of the signal.
     `resolution` is the step of the grid that the samples were rounded to, 0 where they lie on none. `colour` is the noise model,
     where that is known up to its size, as that of what jitter of commands excites.
+    `zero` is what was taken off the samples because the output's zero is not that of the first record, as far as that is known; None
+    where it is; see `record_zero`.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Series:
     spread: Array | None = None
     resolution: float = 0.0
     colour: NoiseModel | None = None
+    zero: float | None = None
 
     @property
     def blocks(self) -> int:
@@ -343,6 +346,8 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
     stiffness = spring if spring > NO_SPRING * inertial else inertial
     effort, peak, pumping, reference = 0.0, 0.0, 0.0, 0.0
+    # by a forcing or a controller of the model's own
+    driven = any(term.element.acts in ("drive", "feedback") for term in model.terms)
     fed = any(term.element.takes for term in model.terms)  # by a voltage, say: what is recorded is no force
     for one in series:
         total = np.zeros(len(one.time))
@@ -350,6 +355,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
             if signal is not None:
                 inside = (one.time >= signal.x[0]) & (one.time <= min(signal.x[-1], FOR_EVER))
                 total[inside] += signal(one.time[inside])
+        driven = driven or bool(np.any(total))
         if one.kind == "reference":
             reference = max(reference, float(np.std(total)))
         elif not fed:
@@ -378,6 +384,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         peak_effort=peak,
         rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
         displaced_base=any(one.kind == "base_displacement" for one in series),
+        idle=not driven,
     )
 
 

@@ -29,6 +29,7 @@ from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.repeats import noise_from_repeats
 from rhythmid.identify.series import Series
+from rhythmid.identify.zero_estimates import zeros_told
 from rhythmid.model import Model
 
 SHOWN = 8  # alternatives listed
@@ -109,6 +110,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         scoring=Scored(result.scoring.kind, None, result.scoring.reason),
         calibration=(
             *result.calibration.notes,
+            *zeros_told(fit),
             *recalibrated(case.nominal, fit.model, {name: fit.std[name] for name in fit.names}),
         ),
         excluded=tuple(f"{' + '.join(added)}: {why}" for added, why in found.excluded),

@@ -15,11 +15,13 @@ from scipy.interpolate import PPoly
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.search.refit import fine_enough
 from rhythmid.diagnose.search.trial import Trial
+from rhythmid.elements.element import Scales
 from rhythmid.excitation.excitation import Excitation
 from rhythmid.excitation.sequence import build
 from rhythmid.identify.descent import first_guess
-from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.free_run import prepare_run, start_of
 from rhythmid.identify.series import Series, dominant_frequency, scales
+from rhythmid.model import Model
 from rhythmid.simulation.signal import spline, zero_order_hold
 
 Array = NDArray[np.float64]
@@ -27,6 +29,12 @@ HIGHEST = 0.4  # of the sample rate
 LENGTH = 30.0  # periods of the dominant motion
 NONE = "none needed for these records; a larger and more varied excitation would exclude smaller effects"
 MORE = "repeat the records with a larger and more varied excitation"
+NONE_FREE = (
+    "none needed for these records; releases from larger and smaller amplitudes would exclude smaller effects"
+)
+MORE_FREE = "repeat the records with releases from larger and smaller amplitudes"
+# of the largest amplitude in the records: laws of position and of speed part where both are far from what was seen
+RELEASES = (0.3, 3.0)
 
 
 @dataclass(frozen=True)
@@ -62,10 +70,58 @@ def _menu(effort: float, frequency: float, length: float, highest: float) -> lis
     return found
 
 
-def _predicted(trial: Trial, series: Series, step: float) -> Array | None:
-    run = prepare_run(trial.model, [series], fine_enough(trial.model, step))
-    outputs = run.outputs(trial.model, first_guess(trial.model, run))
+@dataclass(frozen=True)
+class _Experiment:
+    """A record as it would be: its inputs in `series`; where the machine is let go at rest, the position `released` [its unit]."""
+
+    words: str
+    series: Series
+    released: float | None = None
+
+
+def _predicted(trial: Trial, experiment: _Experiment, step: float) -> Array | None:
+    model = trial.model
+    run = prepare_run(model, [experiment.series], fine_enough(model, step))
+    if experiment.released is None:
+        starts = first_guess(model, run)
+    else:
+        starts = [start_of(model, run, 0, experiment.released, 0.0)]
+    outputs = run.outputs(model, starts)
     return None if outputs is None else outputs[0]
+
+
+def _releases(sizes: Scales, model: Model, longest: Series) -> list[_Experiment]:
+    """Releases at rest, for a machine that nothing drives: from a smaller and from a larger amplitude than the records have.
+
+    An angle is turned no further than to the other side, from where a pendulum falls as far as it can.
+    """
+    largest = 0.5 * (sizes.high - sizes.low)
+    unit = model.units.position
+    n = len(longest.time)
+    time = np.arange(n, dtype=float) * longest.period
+    series = replace(
+        longest, name="imagined", time=time, command=None, forcing=None, used=np.ones(longest.blocks, bool),
+        ignored=None, hidden=None,
+    )  # fmt: skip
+    found = []
+    for factor in RELEASES:
+        amplitude = factor * largest
+        if model.units.position == "rad" and amplitude > math.pi:
+            continue
+        words = f"a release at rest from {amplitude:.3g} {unit} beside the middle of the motion, {factor:g} times its amplitude"
+        found.append(_Experiment(words, series, sizes.centre + amplitude))
+    return found
+
+
+def _played_menu(sizes: Scales, longest: Series, frequency: float) -> list[_Experiment]:
+    """What a machine that is driven can play."""
+    length = min(LENGTH / frequency, longest.time[-1] - longest.time[0])
+    found = []
+    for words, spec, factor in _menu(sizes.effort, frequency, length, HIGHEST / longest.period):
+        if factor != 1.0 and longest.forcing is None:
+            continue
+        found.append(_Experiment(words, _imagined(longest, build(spec), longest.forcing, factor)))
+    return found
 
 
 def _imagined(series: Series, excitation: Excitation, forcing: PPoly | None, factor: float) -> Series:
@@ -102,40 +158,44 @@ def _played(
 
 
 def separation(a: Trial, b: Trial, series: Sequence[Series], variance: float, step: float) -> list[Proposal]:
-    """The menu's experiments with what they would tell between two models, the best first."""
+    """The experiments that the machine can play, with what they would tell between two models, the best first.
+
+    A machine that nothing drives can be released.
+    """
     sizes = scales(series, a.model)
     longest = max(series, key=lambda s: s.time[-1] - s.time[0])
-    frequency = dominant_frequency(longest)
-    length = min(LENGTH / frequency, longest.time[-1] - longest.time[0])
+    menu = (
+        _releases(sizes, a.model, longest)
+        if sizes.idle
+        else _played_menu(sizes, longest, dominant_frequency(longest))
+    )
     found: list[Proposal] = []
-    for words, spec, factor in _menu(sizes.effort, frequency, length, HIGHEST / longest.period):
-        if factor != 1.0 and longest.forcing is None:
-            continue
-        excitation = build(spec)
-        imagined = _imagined(longest, excitation, longest.forcing, factor)
-        first, second = _predicted(a, imagined, step), _predicted(b, imagined, step)
+    for one in menu:
+        first, second = _predicted(a, one, step), _predicted(b, one, step)
         if first is None or second is None:
             continue
-        half = len(first) // 5  # what the unknown start leaves in both has died out by then
-        difference = first[half:] - second[half:]
+        # what an unknown start leaves in both has died out by then; a release is known
+        begin = len(first) // 5 if one.released is None else 0
+        difference = first[begin:] - second[begin:]
         difference = difference - difference.mean()
         chi2 = float(difference @ difference) / max(variance, 1e-300)
         if math.isfinite(chi2):
-            found.append(Proposal(words, chi2, excitation.duration))
+            found.append(Proposal(one.words, chi2, float(one.series.time[-1])))
     return sorted(found, key=lambda p: -p.chi2)
 
 
 def next_experiment(found: Search, rivals: Sequence[Trial], series: Sequence[Series], verdict: str) -> str:
     """One sentence: what to record next, and what it would settle."""
     best = found.best
+    none, more = (NONE_FREE, MORE_FREE) if scales(series, best.model).idle else (NONE, MORE)
     others = [t for t in rivals if set(t.added) != set(best.added)]
     if not others:
         others = [t for t in found.trials if set(t.added) != set(best.added)]
     if not others or (verdict == "consistent" and len(found.trials) < 2):
-        return MORE if verdict == "undecided" else NONE
+        return more if verdict == "undecided" else none
     menu = separation(best, others[0], series, found.noise.variance, found.fit.run.max_step)
     if not menu:
-        return MORE
+        return more
     top = menu[0]
     versus = " + ".join(others[0].added) or "the nominal model"
     mine = " + ".join(best.added) or "the nominal model"

@@ -144,10 +144,11 @@ def search(
     pool: ThreadPoolExecutor | None,
     tell: Tell = lambda _: None,
     budget: Budget | None = None,
+    most: int = MOST_EFFECTS,
 ) -> Search:
     """Search the catalogue for what the nominal model lacks; `nominal` is the fit to the same series of the one `given`.
 
-    Once the `budget` is spent no further round begins; what was not tried is told among the excluded.
+    At most `most` effects are found. Once the `budget` is spent no further round begins; what was not tried is told among the excluded.
     """
     budget = budget or Budget()
     step = nominal.run.max_step
@@ -180,7 +181,7 @@ def search(
     while (
         now.p_value < LEVEL
         and _could_pay(now, best, max(WORTH, SHARE * gained), current)
-        and len(best.added) < MOST_EFFECTS
+        and len(best.added) < most
     ):
         if budget.spent:
             untried = [score.element.name for score, _ in distinct(now.scores, REFITTED)]
@@ -234,16 +235,14 @@ def search(
         trials[tuple(sorted(best.added))] = best
         tell(f"{best.added[-1]} explains it better by {gain:.0f}; looking for more")
         current = whole_fit(best, series, noise, step, pool=pool)
-        if len(best.added) >= MOST_EFFECTS:
+        if len(best.added) >= most:
             break
         now, current = one_round(current, best.added, catalogue, pool)
         here = under_noise([best], series, current.noise, step, 0)[0]
         rounds.append(now)
     if best.added and not budget.spent:
         margin = max(WORTH, SHARE * gained)
-        reduced, more = eliminate(
-            best, series, catalogue, trials, noise, step, rounds, margin, MOST_EFFECTS, tell
-        )
+        reduced, more = eliminate(best, series, catalogue, trials, noise, step, rounds, margin, most, tell)
         trials |= more
         if reduced is not best:
             best = in_best_order(reduced, series, noise, step)

@@ -28,6 +28,7 @@ ELEMENT = Element(
     borrows={"mass": ("inertia.mass", None), "step": (STEP, 1e-3)},
     kernel=kernel,
     size="coefficient",
+    driven=True,
     starts=lambda s: [{"coefficient": 0.05, "transition": 0.1 * s.velocity}],
     ranges=lambda s: {"transition": s.turning},
     also_known_as=("gear friction", "torque-dependent friction"),

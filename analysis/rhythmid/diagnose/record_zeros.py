@@ -1,0 +1,121 @@
+"""Zeros that differ from record to record: whether the records have them, and the calibration with them.
+
+A zero of each record is a hypothesis like any other. It is not missing physics, and what it can do, physics can do as well:
+the mean of a motion shifts with its amplitude where a stiffness is not symmetric. So it is adopted, for all hypotheses alike, where
+it predicts data that the fit has not seen decisively better, both beside the nominal model and beside the effect of the catalogue that
+explains the records best. The output is linear in its zeros, so that cross-validation to first order is exact in them.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.diagnose.baseline import Calibration
+from rhythmid.diagnose.constants import PRACTICAL
+from rhythmid.diagnose.contenders import Rows, linearised, rows_of
+from rhythmid.diagnose.evidence import Linearised, predict, weight_for
+from rhythmid.diagnose.location import FreeMap, Reach, beside, following, reach_of
+from rhythmid.diagnose.rejections import decisive
+from rhythmid.diagnose.search.forward import search
+from rhythmid.diagnose.search.score_tests import under
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.errors import InputError
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.output_error import Fit, estimate, start_only
+from rhythmid.identify.record_zero import moved, others_marked, with_record_zero
+from rhythmid.identify.series import Series, record_of, scales
+from rhythmid.identify.zero_estimates import zeros_of
+from rhythmid.model import Model
+from rhythmid.progress import Tell
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """A fit under white noise, and what its predictions are made from."""
+
+    fit: Fit
+    rows: Rows
+    reach: Sequence[Reach]
+    base: Linearised
+
+    @classmethod
+    def of(cls, fit: Fit, pool: ThreadPoolExecutor | None) -> "_Seen":
+        """White, because what is missing is no noise: whitened as such, a constant would hardly be left."""
+        left = np.concatenate([r[one.used] for r, one in zip(fit.residuals, fit.run.series, strict=True)])
+        noise = NoiseModel(np.empty(0), math.sqrt(float(np.mean(left**2))))
+        fit = under(fit, noise, pool)
+        rows = rows_of(fit.run.series, (), noise)
+        reach = reach_of(fit, rows, pool)
+        return cls(fit, rows, reach, following(linearised(fit, rows), rows, reach))
+
+    def with_zeros(self) -> Linearised:
+        """The fit with a zero of each record but the first beside it."""
+        series = self.fit.run.series
+        names = tuple(dict.fromkeys(record_of(one) for one in series))[1:]
+        columns = tuple(
+            tuple(np.full(one.blocks, float(record_of(one) == name)) for one in series) for name in names
+        )
+        none = np.empty(0)
+        return beside(self.fit, self.base, FreeMap("zero", columns, none, none), self.rows, self.reach)
+
+
+def _told(seen: _Seen) -> bool:
+    """Whether zeros predict unseen data decisively better than the fit alone, and by a practical size."""
+    found = predict([seen.with_zeros(), seen.base], seen.rows.blocks, seen.rows.record)
+    removed = found[1].mean_square - found[0].mean_square
+    return weight_for(found[0], found[1]) > decisive(1) and removed > (PRACTICAL * seen.rows.size) ** 2
+
+
+def with_zeros(
+    calibration: Calibration,
+    given: Model,
+    unseen: Sequence[Series],
+    catalogue: Catalogue,
+    pool: ThreadPoolExecutor | None = None,
+    tell: Tell = lambda _: None,
+) -> tuple[Calibration, list[Series]]:
+    """The calibration of the model `given`, and held-out series, with a zero of each record where the records have them.
+
+    The series are moved by the zeros, so that sizes and first guesses are those of one machine; what is left of the zeros stays free.
+    """
+    fit, series, kept = calibration.fit, calibration.series, (calibration, list(unseen))
+    if len({record_of(one) for one in series}) < 2 or series[0].measured != "position":
+        return kept
+    if not _told(_Seen.of(fit, pool)):
+        return kept
+    tell("the output's zero seems to differ from record to record; looking for an effect that says the same")
+    known = catalogue.within(scales(series, fit.model))
+    if not _told(_Seen.of(search(series, fit, given, known, pool, tell, most=1).fit, pool)):
+        return kept
+    tell("refitting with a zero of each record")
+    try:
+        free = estimate(with_record_zero(fit.model), others_marked(series), pool=pool)
+        zeros = {name: value for name, (value, _) in zeros_of(free).items()}
+        shifted = [_moved_by(one, zeros) for one in free.run.series]
+        free = estimate(free.model, shifted, pool=pool)
+    except InputError:
+        return kept
+    found = replace(calibration, fit=free, series=tuple(shifted))
+    return found, [_of_unseen(one, free, zeros) for one in unseen]
+
+
+def _moved_by(one: Series, zeros: Mapping[str, float]) -> Series:
+    return moved(one, zeros[record_of(one)]) if record_of(one) in zeros else one
+
+
+def _of_unseen(one: Series, fit: Fit, zeros: Mapping[str, float]) -> Series:
+    """A held-out series: the hidden end of a record has its zero, a separate record one of its own."""
+    if any(record_of(other) == record_of(one) for other in fit.run.series):
+        return _moved_by(one, zeros)
+    one = moved(one, 0.0)
+    try:
+        alone = zeros_of(start_only(fit.model, [one], fit.noise, fit.run.max_step))
+    except InputError:
+        return one
+    return moved(one, alone[record_of(one)][0])

@@ -1,0 +1,109 @@
+"""Zeros that differ from record to record: adopted where the records have them, told, and left alone where they do not."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from machines import CATALOGUE, hopper, only, records
+from rhythmid.diagnose.baseline import calibrate
+from rhythmid.diagnose.diagnosis import diagnose
+from rhythmid.diagnose.record_zeros import with_zeros
+from rhythmid.identify.record_zero import RECORD_ZERO
+from rhythmid.identify.series import hold_out_tail, prepare
+from rhythmid.identify.zero_estimates import zeros_told
+from rhythmid.model import Model
+from rhythmid.record.record import Channel, Record
+from rhythmid.simulation.simulate import simulate
+
+NOMINAL = """
+units: {force: rad/s^2, position: rad}
+inertia: {mass: {value: 1.0, fixed: true}}
+force:
+  - linear_spring: {stiffness: {value: 20.0}, rest_length: {value: 0.0}}
+  - viscous_damper: {damping: {value: 0.3}}
+"""
+NOISE = 5e-3  # [rad]
+ZEROS = {"first": 0.2, "second": 0.4, "third": 0.0}  # [rad]
+FRICTION = only("coulomb_friction", "quadratic_drag", "cubic_stiffness", "quadratic_stiffness")
+SAME = dict.fromkeys(ZEROS, 0.2)
+
+
+def nominal() -> Model:
+    return Model.from_text(NOMINAL, catalogue=CATALOGUE)
+
+
+def decays(machine: Model, zeros: dict[str, float]) -> list[Record]:
+    """Releases of a machine at 50 Hz, each with a zero of its own."""
+    time = 0.02 * np.arange(500)
+    made = []
+    for seed, (name, zero) in enumerate(zeros.items()):
+        start = (1.5 - 0.3 * seed, 0.0)
+        value = simulate(machine, time, initial=start).output + zero
+        value = value + NOISE * np.random.default_rng(seed).standard_normal(len(time))
+        made.append(Record(name, Channel(time, value, "rad")))
+    return made
+
+
+def assert_told(note: str) -> None:
+    """The note says the zeros within their standard deviations, and those are small."""
+    for name in ("second", "third"):
+        value, _, std = note.split(f" {name} ")[1].split()[:3]
+        assert float(std) < 0.05
+        assert abs(float(value) - (ZEROS[name] - ZEROS["first"])) < 4.0 * max(float(std), 1e-3)
+
+
+@cache
+def with_friction() -> Model:
+    return (
+        nominal()
+        .with_values({"linear_spring.stiffness": 21.0, "viscous_damper.damping": 0.1})
+        .with_element(CATALOGUE["coulomb_friction"], {"force": 1.5, "transition": 1e-3})
+    )
+
+
+def test_friction_is_named_beside_zeros_that_differ_and_the_zeros_are_told():
+    held = decays(with_friction(), {"held": -0.1})
+    answer = diagnose(decays(with_friction(), ZEROS), nominal(), held, FRICTION)
+    found = answer.diagnosis
+    assert found.verdict == "missing_physics" and [one.element for one in found.missing] == [
+        "coulomb_friction"
+    ]
+    assert found.missing[0].parameters["force"].value == pytest.approx(1.5, rel=0.05)
+    (told,) = [note for note in found.calibration if "zero differs" in note]
+    assert_told(told)
+    assert answer.model.term(RECORD_ZERO.name) is None
+    assert found.fit["augmented"].heldout_nrmse < 0.05
+
+
+@pytest.mark.parametrize(
+    ("machine", "zeros", "adopted"),
+    [
+        (with_friction, SAME, False),
+        (with_friction, ZEROS, True),
+        (nominal, SAME, False),
+        (nominal, ZEROS, True),
+    ],
+)
+def test_zeros_are_adopted_only_where_they_differ(machine, zeros, adopted):
+    series, unseen = hold_out_tail(prepare(decays(machine(), zeros)))
+    plain = calibrate(nominal(), series, CATALOGUE)
+    found, others = with_zeros(plain, nominal(), unseen, FRICTION)
+    assert (found is not plain) == adopted
+    if not adopted:
+        assert others == unseen
+        return
+    assert found.fit.nrmse() < plain.fit.nrmse()
+    assert_told(*zeros_told(found.fit))
+    for one, other in zip(found.series, others, strict=True):
+        np.testing.assert_array_equal(one.value, other.value)
+
+
+def test_a_mean_that_shifts_with_the_amplitude_is_physics_and_no_zero():
+    """A hopper whose spring is not symmetric, at two amplitudes."""
+    machine = hopper().with_element(CATALOGUE["quadratic_stiffness"], {"coefficient": 600.0})
+    protocol = [({"type": "silence", "length": 6.0}, amplitude) for amplitude in (1.0, 3.0)]
+    series, unseen = hold_out_tail(prepare(records(machine, protocol)))
+    plain = calibrate(hopper(), series, CATALOGUE)
+    found, _ = with_zeros(plain, hopper(), unseen, only("quadratic_stiffness", "coulomb_friction"))
+    assert found is plain
