@@ -10,6 +10,8 @@ from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 
+SPENT = "the time given was spent"  # why something was not tried
+
 
 @dataclass(frozen=True)
 class Budget:
