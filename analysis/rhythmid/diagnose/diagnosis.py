@@ -17,12 +17,14 @@ from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.baseline import causal, check_free
-from rhythmid.diagnose.case import Budget, Case
+from rhythmid.diagnose.case import SPENT, Budget, Case
 from rhythmid.diagnose.constants import DRIVES_IT, LEFT
+from rhythmid.diagnose.effort.candidate import SEEN
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST_EFFECTS
 from rhythmid.diagnose.free_map import without_free_maps
 from rhythmid.diagnose.free_run import FreeRunResult, free_run
+from rhythmid.diagnose.hypothesis import ScoringKind
 from rhythmid.diagnose.replay import ledger
 from rhythmid.diagnose.scoring import settle
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
@@ -41,6 +43,9 @@ from rhythmid.result import Result, Row, axis_or_new
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from rich.console import Console
+
+HOW: Mapping[ScoringKind, str] = {"free_run": "in free run", "windows": "in windows", "effort": "by effort"}
+DOUBTED = "Believe neither without another experiment."
 
 
 @dataclass(frozen=True)
@@ -207,10 +212,12 @@ def diagnose(
                 break
             made.append(answer)
         chosen = next((one for one in made if one.stands), made[0])
-        compare = effort.applies and chosen.stands and isinstance(made[0].result, FreeRunResult)
-        if compare and not case.budget.spent:
-            return _compared(chosen, _by_effort(case, effort, (), 1))
-        return chosen
+        unscored = effort.applies and all(one.diagnosis.scoring.kind != "effort" for one in made)
+        if unscored and chosen.stands:
+            if case.budget.spent:
+                return _with_excluded(chosen, f"a comparison with the recorded effort: {SPENT}")
+            made.append(_by_effort(case, effort, (), len(chosen.diagnosis.missing)))
+        return _compared(chosen, made)
 
 
 def _answers(case: Case, effort: Applicability, notes: Sequence[str]) -> Iterator[Answer]:
@@ -259,15 +266,30 @@ def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: in
     return Answer(compose_effort(case, result, notes), result.chosen.model, result)
 
 
-def _compared(answer: Answer, other: Answer) -> Answer:
-    """The answer with a note where the effort, scored too, stands by other names."""
-    first, second = answer.diagnosis, other.diagnosis
-    stated = [
-        {effect.element for effect in one.missing} if one.verdict == "missing_physics" else set()
-        for one in (first, second)
-    ]
-    if not all(stated) or stated[0] & stated[1]:
-        return answer
-    words = " and ".join(sorted(stated[1])).replace("_", " ")
-    note = f"Scored by effort the same records stand by another name: {words}. Believe neither without another experiment."
-    return replace(answer, diagnosis=replace(first, notes=(*first.notes, note)))
+def _with_excluded(answer: Answer, line: str) -> Answer:
+    found = answer.diagnosis
+    return replace(answer, diagnosis=replace(found, excluded=(*found.excluded, line)))
+
+
+def _compared(answer: Answer, made: Sequence[Answer]) -> Answer:
+    """The answer with a note for each other way to score, of those that were `made`, that comes to another verdict or other names."""
+    found = answer.diagnosis
+    notes = [_difference(found, other.diagnosis) for other in made if other is not answer]
+    told = tuple(note for note in notes if note is not None)
+    return replace(answer, diagnosis=replace(found, notes=(*found.notes, *told))) if told else answer
+
+
+def _difference(found: Diagnosis, other: Diagnosis) -> str | None:
+    """In a sentence, what another way to score the same records says against an answer; None where it agrees, or where it could not
+    show what the answer names."""
+    scored = f"Scored {HOW[other.scoring.kind]} the same records"
+    names, others = ({effect.element for effect in one.missing} for one in (found, other))
+    if found.verdict == other.verdict:
+        if found.verdict != "missing_physics" or names & others:
+            return None
+        words = " and ".join(sorted(others)).replace("_", " ")
+        return f"{scored} stand by another name: {words}. {DOUBTED}"
+    if found.verdict == "missing_physics" and other.verdict == "consistent":
+        hidden = other.scoring.kind == "effort" and not any(one.slot in SEEN for one in found.missing)
+        return None if hidden else f"{scored} lack nothing of practical size. {DOUBTED}"
+    return f"{scored} come to another verdict. {other.summary}"
