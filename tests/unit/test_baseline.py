@@ -1,13 +1,18 @@
 """Calibration of the nominal model: what the records do not determine is kept, and said."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.baseline import NO_ORIGIN, calibrate
+from rhythmid.diagnose import baseline
+from rhythmid.diagnose.baseline import NO_ORIGIN, calibrate, with_delays
 from rhythmid.elements.catalogue import load_catalogue
-from rhythmid.identify.series import prepare
-from rhythmid.model import Model
+from rhythmid.identify.series import Series, prepare
+from rhythmid.model import Model, Prior
 from rhythmid.record.record import Channel, Record
+from rhythmid.simulation.transport import INPUT_DELAY
 
 CATALOGUE = load_catalogue()
 NOMINAL = """
@@ -42,3 +47,41 @@ def test_where_no_position_is_measured_the_rest_length_is_kept_as_it_was_given_a
     found = calibrate(Model.from_text(NOMINAL.format(fixed=", fixed: true")), prepare([record]), CATALOGUE)
     assert "linear_spring.rest_length" not in found.fit.names and found.notes == (NO_ORIGIN,)
     assert found.fit.model.value("linear_spring.rest_length") == 0.0
+
+
+def driven(period: float) -> Series:
+    """A series with a command, of this sample period."""
+    time = np.arange(0.0, 4.0, period)
+    return prepare(
+        [Record("driven", Channel(time, np.sin(9.0 * time), "m"), Channel(time, np.cos(9.0 * time), "N"))]
+    )[0]
+
+
+def test_a_delay_that_the_model_lacks_may_be_two_samples_late_or_one_early_and_is_known_to_a_sample():
+    model = with_delays(Model.from_text(NOMINAL.format(fixed="")), [driven(4e-3)], CATALOGUE)
+    delay = model.parameters[INPUT_DELAY]
+    assert delay.bounds == pytest.approx((-6e-3, 1e-2)) and delay.prior == Prior(0.0, pytest.approx(4e-3))
+
+
+def test_a_delay_that_the_model_has_may_be_as_long_as_its_file_says():
+    text = NOMINAL.format(fixed="") + "command: [{input_delay: {delay: {value: 0.02, unit: s}}}]\n"
+    own = Model.from_text(text)
+    delay = with_delays(own, [driven(4e-3)], CATALOGUE).parameters[INPUT_DELAY]
+    assert (
+        delay.bounds == pytest.approx((-6e-3, own.parameters[INPUT_DELAY].bounds[1])) and delay.prior is None
+    )
+
+
+@pytest.mark.parametrize(("ratio", "moved"), [(0.6, True), (0.8, False)])
+def test_a_delay_far_from_its_start_is_taken_where_it_lowers_the_error_by_far(monkeypatch, ratio, moved):
+    model = with_delays(Model.from_text(NOMINAL.format(fixed="")), [driven(0.05)], CATALOGUE)
+
+    def fitted(model: Model, error: float) -> Any:
+        return SimpleNamespace(
+            model=model, names=[INPUT_DELAY], chi2=error, run=None, noise=None, starts=(), nrmse=lambda: error
+        )
+
+    monkeypatch.setattr(baseline, "minimise", lambda model, *_: fitted(model, ratio))
+    monkeypatch.setattr(baseline, "estimate", lambda model, *_, **__: fitted(model, ratio))
+    found = baseline._scan_delays(fitted(model, 1.0), [driven(0.05)], None)
+    assert (found.model.value(INPUT_DELAY) > 0.0) is moved

@@ -1,16 +1,23 @@
 """The 95 % quantile: one number, right, and the half-width of every interval that is printed."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from batches import made_up
+from matplotlib.collections import LineCollection
 from scipy.stats import norm
 
 import rhythmid
+from rhythmid.batch import present
+from rhythmid.batch.scatter import trend
 from rhythmid.identify.identifiability import Offset, _intervals
 from rhythmid.identify.identification import Estimate
+from rhythmid.proof.card import coverage
 from rhythmid.proof.rate import Rate
+from rhythmid.proof.score import Estimated
 from rhythmid.report import residual_figures
 from rhythmid.report.blocks import charts_of
 from rhythmid.report.quantity import estimate, plus_minus
@@ -89,3 +96,41 @@ def test_a_bound_on_the_clocks_offset_widens_by_the_delays_own_95_percent_interv
     found = _intervals(*given, Offset(-0.005, 0.01))
     assert found["input"] == pytest.approx((0.035 - QUANTILE * 1e-3, 0.05 + QUANTILE * 1e-3))
     assert found["measurement"] == pytest.approx((0.04 - QUANTILE * 2e-3, 0.055 + QUANTILE * 2e-3))
+
+
+def test_an_interval_of_the_proof_holds_what_is_within_the_quantile_and_nothing_beyond():
+    inside, outside = (Estimated("a", 0.0, share * QUANTILE, 1.0) for share in (0.999, 1.001))
+    assert coverage([inside, outside]) == Rate(1, 2)
+
+
+def test_the_runs_of_a_batch_are_drawn_with_their_95_percent_intervals(tmp_path):
+    found = made_up(tmp_path, [5.0, 6.0, 7.0], stds=[0.5, 0.4, 0.3])
+    axis = found.plot()
+    (bars,) = axis.collections
+    assert isinstance(bars, LineCollection)
+    halves = [0.5 * np.ptp(np.asarray(segment)[:, 1]) for segment in bars.get_segments()]
+    assert halves == pytest.approx([QUANTILE * std for std in (0.5, 0.4, 0.3)])
+
+
+def test_the_page_of_a_batch_draws_and_scales_by_the_95_percent_interval(tmp_path, monkeypatch):
+    drawn: list = []
+    plain = present.draw_runs
+
+    def draw_runs(alt, label, unit, points, mean):
+        drawn.extend(points)
+        return plain(alt, label, unit, points, mean)
+
+    monkeypatch.setattr(present, "draw_runs", draw_runs)
+    found = made_up(tmp_path, [5.0, 6.0, 7.0], stds=[0.5, 0.4, 0.3])
+    present.present(found, lambda _: "")
+    assert [point.half for point in drawn] == pytest.approx([QUANTILE * std for std in (0.5, 0.4, 0.3)])
+    (one,) = found.agreements
+    for std, unit in ((6e-4, "mN"), (5e-4, "µN")):  # intervals of ± 1.18 mN and of ± 980 µN
+        assert present._agreement_row(replace(one, mean=1e-6, std=std))[2].endswith(unit)
+
+
+def test_the_interval_of_a_slope_is_students_at_95_percent():
+    times = np.arange(5.0)
+    slope = trend(np.array([0.0, 1.1, 1.9, 3.2, 3.9]), np.ones(5), ["a"] * 5, times)
+    assert slope is not None and slope.freedom == 3
+    assert slope.half == pytest.approx(3.182446 * slope.std, rel=1e-6)  # of tables, three degrees of freedom

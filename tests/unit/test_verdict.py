@@ -376,6 +376,14 @@ def test_names_that_leave_a_part_are_mainly_right_and_such_that_leave_most_are_n
     assert "velocity" in decision.reason and decision.joint < 0.8
 
 
+@pytest.mark.parametrize(("left", "expected"), [(0.01, "unknown_physics"), (0.6, "missing_physics")])
+def test_what_more_effects_would_explain_though_they_are_not_granted_is_left_over(left, expected):
+    more = supposed("friction play", predicted(left), shape={"within_bounds": 0.0})
+    _, decision = decided(contest(NOMINAL, friction(0.6), more, maps={"velocity": predicted(0.58, 0.0)}))
+    assert decision.verdict == expected and decision.named == ("friction",)
+    assert (decision.unexplained.goes_with == "further effects (play)") is (expected == "unknown_physics")
+
+
 def test_a_small_structured_remainder_does_not_take_the_name_away():
     made = contest(NOMINAL, friction(0.02), maps={"position": predicted(0.01)})
     _, decision = decided(made)
@@ -443,6 +451,37 @@ def test_a_name_is_stated_only_where_the_records_tell_it_from_others_by_far(marg
     assert decision.verdict == expected and decision.named == ("friction",)
     assert (decision.probability["friction"] >= 0.8) == (expected == "missing_physics")
     assert "lacks" in decision.reason or expected == "missing_physics"
+
+
+@pytest.mark.parametrize(("gain", "expected"), [(20.0, "undecided"), (1000.0, "missing_physics")])
+def test_a_name_is_stated_only_where_the_records_tell_it_from_nothing_by_far(gain, expected):
+    nominal = supposed("", predicted(1.0, 0.0))
+    _, decision = decided(contest(nominal, friction(0.1, score=gain)))
+    assert (decision.verdict, decision.named) == (expected, ("friction",))
+
+
+@pytest.mark.parametrize(
+    ("both", "score", "named"),
+    [
+        (0.75, 600.0, ()),  # better than nothing, and hardly better than the first alone
+        (0.6, 600.0, ("friction", "cubic")),
+    ],
+)
+def test_two_effects_have_to_beat_the_best_one_alone_though_that_was_refused(both, score, named):
+    alone = friction(0.9, score=500.0)
+    pair = supposed("friction cubic", predicted(both, score))
+    nominal = supposed("", predicted(1.0, 0.0))
+    made = contest(nominal, alone, pair, maps={"position": predicted(0.01, -1000.0)})
+    selection, _ = decided(made)
+    assert set(selection.chosen.elements) == set(named)
+
+
+@pytest.mark.parametrize(("score", "named"), [(3.0, ()), (300.0, ("friction", "cubic"))])
+def test_two_effects_have_to_beat_the_nominal_model_where_one_alone_predicts_worse(score, named):
+    alone = friction(0.9, score=-300.0)
+    pair = supposed("friction cubic", predicted(0.1, score))
+    selection, _ = decided(contest(supposed("", predicted(1.0, 0.0)), alone, pair))
+    assert set(selection.chosen.elements) == set(named)
 
 
 @pytest.mark.parametrize(

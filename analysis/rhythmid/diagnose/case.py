@@ -10,7 +10,7 @@ from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 
-TIME_SPENT = "the time given was spent"  # why something was not tried
+SPENT = "the time given was spent"  # why something was not tried
 
 
 @dataclass(frozen=True)

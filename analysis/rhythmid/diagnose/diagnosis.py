@@ -17,8 +17,9 @@ from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.baseline import causal, check_free
-from rhythmid.diagnose.case import TIME_SPENT, Budget, Case
+from rhythmid.diagnose.case import SPENT, Budget, Case
 from rhythmid.diagnose.constants import DRIVES_IT, LEFT
+from rhythmid.diagnose.effort.candidate import SEEN
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST_EFFECTS
 from rhythmid.diagnose.free_map import without_free_maps
@@ -48,12 +49,9 @@ if TYPE_CHECKING:
     from rhythmid.body.machine import Machine
     from rhythmid.record.joint_record import JointRecord
 
+HOW: Mapping[ScoringKind, str] = {"free_run": "in free run", "windows": "in windows", "effort": "by effort"}
 BY_EFFORT, BY_MOTION = "scoring by the recorded effort", "scoring by the motion, in free run or in windows"
-WAYS: Mapping[ScoringKind, str] = {
-    "effort": BY_EFFORT,
-    "free_run": "scoring in free run",
-    "windows": "scoring in windows",
-}
+DOUBTED = "Believe neither without another experiment."
 
 
 @dataclass(frozen=True)
@@ -235,12 +233,14 @@ def diagnose(
             if answer is None:
                 break
             made.append(answer)
-        chosen = _beside_free_run(next((one for one in made if one.stands), made[0]), made)
-        if effort.applies and chosen.stands and isinstance(made[0].result, FreeRunResult):
-            if not case.budget.spent:
-                return _compared(chosen, _by_effort(whole, effort, (), 1))
-            untried.append(BY_EFFORT)
-        return _with_untried(chosen, untried)
+        chosen = next((one for one in made if one.stands), made[0])
+        unscored = effort.applies and all(one.diagnosis.scoring.kind != "effort" for one in made)
+        if unscored and chosen.stands:
+            if case.budget.spent:
+                untried.append("a comparison with the recorded effort")
+            else:
+                made.append(_by_effort(whole, effort, (), len(chosen.diagnosis.missing)))
+        return _with_untried(_compared(chosen, made), untried)
 
 
 def _answers(
@@ -275,7 +275,7 @@ def _answers(
             case.nominal, series[:count], series[count:], case.catalogue, case.pool, case.tell, windows
         )
         for number, scoring in enumerate(ways):
-            if number and late(WAYS[scoring.kind]):
+            if number and late(f"scoring {HOW[scoring.kind]}"):
                 return
             result = free_run(case, scoring)
             diagnosis = compose(case, result, (*given.notes, *more))
@@ -305,39 +305,34 @@ def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: in
     return Answer(compose_effort(case, result, notes), result.chosen.model, result)
 
 
-def _beside_free_run(chosen: Answer, made: Sequence[Answer]) -> Answer:
-    """The answer; one from windows that nothing is missing has a note where a free run says otherwise of the same records."""
-    if chosen.diagnosis.verdict != "consistent" or chosen.diagnosis.scoring.kind != "windows":
-        return chosen
-    free = next((one.diagnosis for one in made if one.diagnosis.scoring.kind == "free_run"), None)
-    if free is None or free.verdict == "consistent":
-        return chosen
-    left = free.fit["augmented"].train_nrmse
-    note = (
-        f"In windows nothing is missing. In free run the same records are {free.verdict.replace('_', ' ')}, with {100.0 * left:.2g} % of the "
-        "motion left: something slow may be missing, or small disturbances add up."
-    )
-    return replace(chosen, diagnosis=replace(chosen.diagnosis, notes=(*chosen.diagnosis.notes, note)))
+def _compared(answer: Answer, made: Sequence[Answer]) -> Answer:
+    """The answer with a note for each other way to score, of those that were `made`, that comes to another verdict or other names."""
+    found = answer.diagnosis
+    notes = [_difference(found, other.diagnosis) for other in made if other is not answer]
+    told = tuple(note for note in notes if note is not None)
+    return replace(answer, diagnosis=replace(found, notes=(*found.notes, *told))) if told else answer
 
 
-def _compared(answer: Answer, other: Answer) -> Answer:
-    """The answer with a note where the effort, scored too, stands by other names."""
-    first, second = answer.diagnosis, other.diagnosis
-    stated = [
-        {effect.element for effect in one.missing} if one.verdict == "missing_physics" else set()
-        for one in (first, second)
-    ]
-    if not all(stated) or stated[0] & stated[1]:
-        return answer
-    words = in_words(" and ".join(sorted(stated[1])))
-    note = f"Scored by effort the same records stand by another name: {words}. Believe neither without another experiment."
-    return replace(answer, diagnosis=replace(first, notes=(*first.notes, note)))
+def _difference(found: Diagnosis, other: Diagnosis) -> str | None:
+    """In a sentence, what another way to score the same records says against an answer; None where it agrees, or where it could not
+    show what the answer names."""
+    scored = f"Scored {HOW[other.scoring.kind]} the same records"
+    names, others = ({effect.element for effect in one.missing} for one in (found, other))
+    if found.verdict == other.verdict:
+        if found.verdict != "missing_physics" or names & others:
+            return None
+        words = in_words(" and ".join(sorted(others)))
+        return f"{scored} stand by another name: {words}. {DOUBTED}"
+    if found.verdict == "missing_physics" and other.verdict == "consistent":
+        hidden = other.scoring.kind == "effort" and not any(one.slot in SEEN for one in found.missing)
+        return None if hidden else f"{scored} lack nothing of practical size. {DOUBTED}"
+    return f"{scored} come to another verdict. {other.summary}"
 
 
 def _with_untried(answer: Answer, ways: Sequence[str]) -> Answer:
     """The answer that says, too, which ways to score the budget left no time for."""
     if not ways:
         return answer
-    first = answer.diagnosis
-    late = tuple(f"{way}: {TIME_SPENT}" for way in ways)
-    return replace(answer, diagnosis=replace(first, excluded=(*first.excluded, *late)))
+    found = answer.diagnosis
+    late = tuple(f"{way}: {SPENT}" for way in ways)
+    return replace(answer, diagnosis=replace(found, excluded=(*found.excluded, *late)))

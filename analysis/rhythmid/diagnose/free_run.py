@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rhythmid.diagnose.alternatives import alternatives
 from rhythmid.diagnose.baseline import Calibration
-from rhythmid.diagnose.case import Case
+from rhythmid.diagnose.case import SPENT, Case
 from rhythmid.diagnose.constants import PRACTICAL
 from rhythmid.diagnose.contenders import (
     Contender,
@@ -45,6 +45,9 @@ from rhythmid.identify.robust_covariance import with_robust_covariance
 from rhythmid.identify.sample_clock.tick_interval import ticks_followed
 from rhythmid.identify.series import Series, scales
 from rhythmid.identify.student import autocorrelation_time
+
+# what competes beside the effects that were searched for, where there is time
+OTHER_KINDS = ("freed values, longer delays, other places, free functions and related laws",)
 
 
 @dataclass(frozen=True)
@@ -89,7 +92,9 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     trial = _trial_of(chosen, contenders)
     if trial.added != found.best.added:
         run = trajectories(whole_fit(trial, seen, found.noise, step, pool=case.pool))
-    if not case.budget.spent and chosen.kind != "freed_value":
+    if case.budget.spent:
+        found = replace(found, excluded=(*found.excluded, (OTHER_KINDS, SPENT)))
+    elif chosen.kind != "freed_value":
         nominal = next(one.trial for one in contenders if one.kind == "nominal")
         weighed = [one.trial for one in contenders]
         others = alternatives(

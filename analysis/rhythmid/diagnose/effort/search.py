@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from rhythmid.diagnose.case import Budget
+from rhythmid.diagnose.case import SPENT, Budget
 from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.effort.candidate import (
     INPUT_DELAY,
@@ -64,7 +64,7 @@ class EffortSearch:
     reference, beyond : the nominal model, and the chosen one, with a free map beside them; and what the first predicts.
     chosen : the hypothesis with which the search ended.
     condition : of the nominal model's scaled columns.
-    not_tried : why candidates of the catalogue took no part, by name.
+    not_tried : why candidates of the catalogue took no part, by name; and what the budget cut off.
     candidates : number of effects that were tried.
     """
 
@@ -117,8 +117,10 @@ def search_effort(
     reference = reference_of(balance, nominal, search.blocks)
     chosen = nominal
     budget = budget or Budget()
+    cut: dict[str, str] = {}
     for number in range(most):
         if budget.spent:
+            cut = search.cut_off(chosen)
             break
         tell(f"looking for effect {number + 1} in the effort")
         better = search.further(chosen, reference)
@@ -137,7 +139,7 @@ def search_effort(
     return EffortSearch(
         balance, search.blocks, nominal, tuple(search.found[i] for i in order), tuple(made[i] for i in order),
         search.set_aside, chosen,
-        reference, made[-2], beyond, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)), len(search.tried),
+        reference, made[-2], beyond, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)) | cut, len(search.tried),
     )  # fmt: skip
 
 
@@ -159,6 +161,14 @@ class _Search:
         """What was ruled out, one of each structure; none that was fitted in another way and not ruled out."""
         kept = {tuple(sorted(one.elements)): one for one in self.ruled_out if not self._known(one)}
         return tuple(kept.values())
+
+    def cut_off(self, parent: Fitted) -> dict[str, str]:
+        """What is not tried any more once the budget is spent: all candidates, or a further effect beside those of the parent."""
+        if parent.elements:
+            return {f"further effects beside {' and '.join(parent.elements)}": SPENT}
+        model = parent.fit.model
+        starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
+        return {one.name: SPENT for one in starts}
 
     def further(self, parent: Fitted, reference: Linearised) -> Fitted | None:
         """The best model with one effect more, or with a kin in the place of one; None where the table rejects that."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.diagnose.case import Budget
+from rhythmid.diagnose.case import SPENT, Budget
 from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
 from rhythmid.diagnose.search.backward import eliminate
 from rhythmid.diagnose.search.order import in_best_order
@@ -185,7 +185,7 @@ def search(
     ):
         if budget.spent:
             untried = [score.element.name for score, _ in distinct(now.scores, REFITTED)]
-            excluded.append((tuple(untried), "the time given was spent"))
+            excluded.append((tuple(untried), SPENT))
             break
         count = REFITTED if not best.added else REFITTED - 1
         proposals, enough = _proposals(here.model, replace(now, added=here.added), count, here.chi2)
@@ -240,7 +240,9 @@ def search(
         now, current = one_round(current, best.added, catalogue, pool)
         here = under_noise([best], series, current.noise, step, 0)[0]
         rounds.append(now)
-    if best.added and not budget.spent:
+    if best.added and budget.spent:
+        excluded.append((("backward elimination",), SPENT))
+    elif best.added:
         margin = max(WORTH, SHARE * gained)
         reduced, more = eliminate(best, series, catalogue, trials, noise, step, rounds, margin, most, tell)
         trials |= more

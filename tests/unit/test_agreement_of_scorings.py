@@ -1,0 +1,105 @@
+"""Ways to score the same records that apply: where they come to other verdicts or names the answer says so, and else it does not."""
+
+from types import SimpleNamespace
+
+import pytest
+from answers import diagnosed
+
+from machines import CATALOGUE, SHORT, hopper, records
+from rhythmid.diagnose import diagnosis as module
+from rhythmid.diagnose.answer.result import Diagnosis
+from rhythmid.diagnose.diagnosis import DOUBTED, Answer, diagnose
+
+RECORD = records(hopper(), SHORT[2:])
+FRICTION = diagnosed("missing_physics", "coulomb_friction")
+QUIET = diagnosed("consistent")
+
+
+def answered(
+    monkeypatch: pytest.MonkeyPatch,
+    *made: Diagnosis,
+    by_effort: Diagnosis | None = None,
+    budget: float | None = None,
+) -> tuple[Diagnosis, list[int]]:
+    """What a user reads of answers that are `made` one after the other, where effort is scored only to compare; and how many effects
+    were looked for in the effort."""
+    asked: list[int] = []
+
+    def answer(found: Diagnosis) -> Answer:
+        return Answer(found, hopper(), SimpleNamespace())  # type: ignore[arg-type]
+
+    def effort(_case, _applicability, _notes, most: int) -> Answer:
+        asked.append(most)
+        assert by_effort is not None
+        return answer(by_effort)
+
+    applies = by_effort is not None or any(one.scoring.kind == "effort" for one in made)
+    monkeypatch.setattr(module, "applicable", lambda *_: SimpleNamespace(applies=applies))
+    monkeypatch.setattr(module, "_answers", lambda *_: iter([answer(one) for one in made]))
+    monkeypatch.setattr(module, "_by_effort", effort)
+    return diagnose(RECORD, hopper(), catalogue=CATALOGUE, budget=budget).diagnosis, asked
+
+
+def test_another_name_by_effort_is_told_with_a_warning(monkeypatch):
+    other = diagnosed("missing_physics", "actuator_lag", "backlash", kind="effort")
+    found, asked = answered(monkeypatch, FRICTION, by_effort=other)
+    (note,) = found.notes
+    assert (
+        note
+        == f"Scored by effort the same records stand by another name: actuator lag and backlash. {DOUBTED}"
+    )
+    assert found.verdict == "missing_physics" and asked == [1]
+
+
+def test_a_name_that_both_stand_by_needs_no_note_and_as_many_effects_are_looked_for_in_the_effort(
+    monkeypatch,
+):
+    first = diagnosed("missing_physics", "coulomb_friction", "second_mode")
+    found, asked = answered(
+        monkeypatch, first, by_effort=diagnosed("missing_physics", "coulomb_friction", kind="effort")
+    )
+    assert found == first and asked == [2]
+
+
+@pytest.mark.parametrize(
+    ("slot", "told"), [("force", True), ("actuator", True), ("sensor", False), ("timing", False)]
+)
+def test_nothing_by_effort_speaks_against_what_the_effort_would_show_and_not_against_a_sensor(
+    monkeypatch, slot, told
+):
+    first = diagnosed("missing_physics", "lag", slot=slot)
+    found, _ = answered(monkeypatch, first, by_effort=diagnosed("consistent", kind="effort"))
+    assert found.notes == (
+        (f"Scored by effort the same records lack nothing of practical size. {DOUBTED}",) if told else ()
+    )
+
+
+def test_effort_that_came_first_and_found_nothing_is_told_beside_the_names_that_windows_found(monkeypatch):
+    named = diagnosed("missing_physics", "coulomb_friction", kind="windows")
+    found, asked = answered(monkeypatch, diagnosed("consistent", kind="effort"), named)
+    assert [effect.element for effect in found.missing] == ["coulomb_friction"] and asked == []
+    assert found.notes == (f"Scored by effort the same records lack nothing of practical size. {DOUBTED}",)
+
+
+def test_every_other_verdict_is_told_with_what_it_says(monkeypatch):
+    found, _ = answered(
+        monkeypatch, diagnosed("unknown_physics", kind="windows"), diagnosed("undecided", kind="free_run"),
+        diagnosed("unknown_physics", kind="effort"),
+    )  # fmt: skip
+    assert found.verdict == "unknown_physics"
+    assert found.notes == (
+        "Scored in free run the same records come to another verdict. The verdict is undecided.",
+    )
+
+
+def test_one_way_to_score_is_compared_with_nothing(monkeypatch):
+    assert answered(monkeypatch, FRICTION) == (FRICTION, [])
+    assert answered(monkeypatch, QUIET, by_effort=FRICTION) == (QUIET, [])
+
+
+def test_a_comparison_for_which_there_is_no_time_is_told(monkeypatch):
+    found, asked = answered(monkeypatch, FRICTION, by_effort=FRICTION, budget=0.0)
+    assert asked == [] and found.notes == ()
+    assert [line for line in found.excluded if "the time given was spent" in line] == [
+        "a comparison with the recorded effort: the time given was spent"
+    ]

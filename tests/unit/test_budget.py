@@ -1,0 +1,69 @@
+"""A budget of time: whatever it cuts off is told, by motion and by effort, and nothing where there is time enough."""
+
+from collections.abc import Iterator
+from itertools import chain, repeat
+
+import pytest
+from axes import CATALOGUE as EVERYTHING
+from axes import axis, axis_model
+
+from machines import CATALOGUE, SHORT, hopper, only, records
+from rhythmid.diagnose.answer.result import Diagnosis
+from rhythmid.diagnose.case import SPENT, Budget
+from rhythmid.diagnose.diagnosis import diagnose
+
+FEW = ("coulomb_friction", "cubic_stiffness", "quadratic_drag")
+FRICTION = {"force": 0.02, "transition": 0.002}
+
+
+def cut_off(found: Diagnosis) -> list[str]:
+    """What was not tried for want of time."""
+    return [line.removesuffix(f": {SPENT}") for line in found.excluded if line.endswith(SPENT)]
+
+
+def spent(monkeypatch: pytest.MonkeyPatch, *answers: bool) -> None:
+    """Whether a budget is spent, asked again and again; the last answer stands."""
+    asked: Iterator[bool] = chain(answers, repeat(answers[-1]))
+    monkeypatch.setattr(Budget, "spent", property(lambda _: next(asked)))
+
+
+def by_motion() -> Diagnosis:
+    machine = hopper().with_element(CATALOGUE["coulomb_friction"], FRICTION)
+    return diagnose(records(machine, SHORT[:2]), hopper(), catalogue=only(*FEW)).diagnosis
+
+
+def by_effort() -> Diagnosis:
+    known = EVERYTHING.without(*(name for name in EVERYTHING if name not in (*FEW, "viscous_damper")))
+    return diagnose([axis(length=10.0)], axis_model(), catalogue=known).diagnosis
+
+
+def test_by_motion_a_budget_that_is_spent_at_once_tells_elements_and_other_explanations(monkeypatch):
+    spent(monkeypatch, True)
+    elements, others = cut_off(by_motion())
+    assert "coulomb_friction" in elements and "freed values" in others
+
+
+def test_by_motion_a_budget_that_is_spent_after_an_effect_tells_that_it_was_not_tried_without(monkeypatch):
+    spent(monkeypatch, False, True)
+    found = by_motion()
+    assert found.missing[0].element == "coulomb_friction"
+    assert "backward elimination" in cut_off(found)
+
+
+def test_by_effort_a_budget_that_is_spent_at_once_tells_all_candidates(monkeypatch):
+    spent(monkeypatch, True)
+    found = by_effort()
+    assert found.scoring.kind == "effort" and not found.missing
+    assert {"coulomb_friction", "quadratic_drag", "input_delay.delay"} <= set(cut_off(found))
+
+
+def test_by_effort_a_budget_that_is_spent_after_an_effect_tells_that_no_further_one_was_tried(monkeypatch):
+    spent(monkeypatch, False, True)
+    found = by_effort()
+    assert [effect.element for effect in found.missing] == ["coulomb_friction"]
+    assert cut_off(found) == ["further effects beside coulomb_friction"]
+
+
+@pytest.mark.parametrize("scored", [by_motion, by_effort])
+def test_with_time_enough_nothing_is_cut_off(scored):
+    assert cut_off(scored()) == []
