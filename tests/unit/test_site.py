@@ -167,7 +167,11 @@ def test_the_rates_on_the_first_page_and_in_the_texts_are_those_of_the_campaigns
     )
     assert f"nothing named in {of_clean} clean cases, nor in {of_untidy} with untidy logs" in readme
     assert f"in 0 of {of_clean} clean cases" in summary and f"in 0 of {of_untidy} with untidy logs" in summary
-    for page in (readme, summary, (DOCS / "missing_physics.md").read_text(encoding="utf-8")):
+    package = (ROOT / "analysis" / "README.md").read_text(encoding="utf-8")
+    assert (
+        f"first in {first} of {of_first} cases" in package and f"named in {of_clean + of_untidy}." in package
+    )
+    for page in (readme, summary, package, (DOCS / "missing_physics.md").read_text(encoding="utf-8")):
         assert f"{relative} of {of_relative}" in page
 
 
