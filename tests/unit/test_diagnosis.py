@@ -10,7 +10,7 @@ from json_schema import conforming
 from machines import CATALOGUE, SHORT, hopper, only, records
 from rhythmid.diagnose.case import SPENT
 from rhythmid.diagnose.constants import LEFT, PRACTICAL
-from rhythmid.diagnose.diagnosis import BY_MOTION, Answer, diagnose
+from rhythmid.diagnose.diagnosis import BY_MOTION, Answer, diagnose, with_unit_warning
 from rhythmid.diagnose.rejections import RULES
 from rhythmid.diagnose.replay import redecide
 from rhythmid.errors import InputError
@@ -42,6 +42,15 @@ def test_the_augmented_model_is_better_on_what_it_has_not_seen(friction):
     fit = friction.diagnosis
     assert fit.augmented.heldout_nrmse < 0.8 * fit.refitted_nominal.heldout_nrmse
     assert fit.augmented.train_nrmse < 1.05 * fit.detection.noise_floor_nrmse
+
+
+def test_a_channel_seems_to_be_in_another_unit_only_where_the_values_stay_shifted(friction):
+    def notes(stiffness: float, stance: float) -> tuple[str, ...]:
+        given = hopper().with_values({"linear_spring.stiffness": stiffness, "switched_damper.stance": stance})
+        return with_unit_warning(friction, given, "another unit").diagnosis.notes
+
+    assert "another unit" not in notes(230.0, 1.5)
+    assert "another unit" in notes(230.0 / 1000.0, 1.5 / 1000.0)
 
 
 def test_delays_and_nominal_parameters_are_right_once_the_effect_is_modelled(friction):

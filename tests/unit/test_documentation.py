@@ -54,7 +54,7 @@ def test_the_signals_file_that_is_shown(tmp_path):
     assert Signals.load(tmp_path / "signals.yaml").use == (10.0, 90.0)
 
 
-@pytest.mark.parametrize("machine", ["joint", "axis", "servo", "motor", "pendulum", "rig", "film"])
+@pytest.mark.parametrize("machine", ["joint", "axis", "servo", "wheel", "motor", "pendulum", "rig", "film"])
 def test_the_files_of_other_machines_are_read_and_fit_together(machine, tmp_path):
     text = (ROOT / "docs" / "machines.md").read_text(encoding="utf-8")
     shown = {name: found[1] for name in ("signals", "model")

@@ -83,6 +83,11 @@ def test_no_row_of_effort_lies_where_nothing_was_recorded():
     assert len(motion.bridged) == BURSTS and nearest.max() < 1.0 / RATE
 
 
+def test_a_single_bridged_gap_is_told_in_the_singular():
+    (note,) = Balance.of(whole(lossy(axis(), np.array([2500]), BURST)), axis_model()).notes
+    assert note.startswith("axis 0: a gap of 0.0") and " s is bridged" in note
+
+
 def test_a_gap_that_is_long_beside_the_effort_s_shortest_period_cuts_the_record():
     shortest = 1.0 / Balance.of([axis()], axis_model()).bandwidth.effort
     count = int(4.0 * QUARTER * shortest * RATE)

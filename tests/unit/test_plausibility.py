@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.channel_change import Change
 from rhythmid.identify.identify import identify
@@ -174,3 +175,38 @@ def test_a_sound_record_is_usable_without_a_warning_and_says_why_there_are_no_tr
     assert (found["usable"], found["warnings"], found["harmonics"]) == (True, [], [])
     assert found["transfer_functions"]["missing"].startswith("no periodic forcing is known")
     assert found["methods"]["paper"] == {}
+
+
+TURNTABLE = Model.from_text("""
+inertia: {mass: {value: 2.35, unit: kg*m^2}}
+force:
+  - viscous_damper: {damping: {value: 3.0, unit: N*m*s/rad}}
+""")
+RUBBING = {"force": 12.0, "transition": 0.01}
+
+
+def turning(truth: Model, torque: float, ripple: float) -> Record:
+    """6 s of a machine that a nearly constant torque turns from rest in one direction, at 100 Hz with a little noise."""
+    time = np.arange(0.0, 6.0, 0.01)
+    effort = torque + ripple * np.sin(2.0 * np.pi * 1.3 * time)
+    motion = simulate(truth, time, zero_order_hold(time, effort), None, (0.0, 0.0)).output
+    motion = motion + 1e-3 * np.random.default_rng(4).standard_normal(len(time))
+    return Record("turning", Channel(time, motion, "rad"), Channel(time, effort, "N*m"))
+
+
+def test_dry_friction_that_scales_inertia_and_damping_alike_is_no_unit():
+    # one torque T in one direction leaves T − F for mass and damper: without the friction both come out T / (T − F) times larger
+    rubbing = TURNTABLE.with_element(load_catalogue()["coulomb_friction"], RUBBING)
+    assert likely_mend(TURNTABLE, [turning(rubbing, 15.0, 0.2)]) is None
+    told = likely_mend(TURNTABLE, [spoilt(turning(TURNTABLE, 3.0, 0.2), Change("input", 5.0))])
+    assert (
+        told is not None and told.change.role == "input" and told.change.factor == pytest.approx(0.2, rel=0.1)
+    )
+
+
+def test_a_friction_that_is_missing_too_does_not_hide_the_unit():
+    rubbing = slide(True).with_element(
+        load_catalogue()["coulomb_friction"], {"force": 0.2, "transition": 0.01}
+    )
+    told = likely_mend(slide(False), [spoilt(driven(rubbing, "m", 0.5), Change("input", 12.0))])
+    assert told is not None and told.change.factor == pytest.approx(1.0 / 12.0, rel=0.3)

@@ -32,7 +32,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.declared import with_declared
 from rhythmid.identify.inverse_dynamics.applicability import Applicability, applicable
 from rhythmid.identify.joint_covariance import JointCovariance
-from rhythmid.identify.plausibility import check_plausible
+from rhythmid.identify.plausibility import BACK, check_plausible, shift
 from rhythmid.identify.record_zero import without_record_zero
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
@@ -220,6 +220,7 @@ def diagnose(
         case = Case(model, given.records, given.holdout, known, pool, tell, Budget(budget))
         whole = replace(case, records=given.whole_records, holdout=given.whole_holdout)
         effort = applicable(whole.records, model)
+        warned = check_plausible(case.nominal, case.records, case.pool)
         made: list[Answer] = []
         untried: list[str] = []
         answers = _answers(case, whole, effort, given, untried)
@@ -240,7 +241,8 @@ def diagnose(
                 untried.append("a comparison with the recorded effort")
             else:
                 made.append(_by_effort(whole, effort, (), len(chosen.diagnosis.missing)))
-        return _with_untried(_compared(chosen, made), untried)
+        answer = _with_untried(_compared(chosen, made), untried)
+        return with_unit_warning(answer, case.nominal, warned)
 
 
 def _answers(
@@ -250,12 +252,11 @@ def _answers(
 
     A free run that follows the machine comes first. Else the recorded effort does where it is at least as large as the
     inertial force, so that it moves the machine against other forces, and windows where the machine swings by itself.
-    Effort is scored on the `whole` case, whose records nothing cuts. With an answer in hand no further way begins once the budget is spent; what the next one would have been joins `untried`.
+    Effort is scored on the `whole` case, whose records nothing cuts. With an answer in hand no further way begins once the budget
+    is spent; what the next one would have been joins `untried`.
     """
-    warned = check_plausible(case.nominal, case.records, case.pool)
-    more = () if warned is None else (warned,)
     bridged = () if effort.balance is None else effort.balance.notes
-    effort_notes = (*given.whole_notes, *bridged, *more)
+    effort_notes = (*given.whole_notes, *bridged)
     driven = effort.applies and effort.effort_share >= DRIVES_IT
 
     def late(way: str) -> bool:
@@ -278,7 +279,7 @@ def _answers(
             if number and late(f"scoring {HOW[scoring.kind]}"):
                 return
             result = free_run(case, scoring)
-            diagnosis = compose(case, result, (*given.notes, *more))
+            diagnosis = compose(case, result, given.notes)
             model = without_record_zero(without_free_maps(result.search.fit.model))
             yield Answer(diagnosis, causal(model), result)
 
@@ -336,3 +337,12 @@ def _with_untried(answer: Answer, ways: Sequence[str]) -> Answer:
     found = answer.diagnosis
     late = tuple(f"{way}: {SPENT}" for way in ways)
     return replace(answer, diagnosis=replace(found, excluded=(*found.excluded, *late)))
+
+
+def with_unit_warning(answer: Answer, nominal: Model, warned: str | None) -> Answer:
+    """The answer with the warning that a channel seems to be in another unit, unless the values are near the given ones once what is
+    missing is modelled: a wrong unit would still shift them."""
+    if warned is None or shift(nominal, answer.model) < BACK:
+        return answer
+    first = answer.diagnosis
+    return replace(answer, diagnosis=replace(first, notes=(*first.notes, warned)))

@@ -4,6 +4,11 @@ Natural frequency and damping ratio do not depend on the scale of a channel; gai
 changed as a user may have declared it by mistake, the model is refitted to each, and a change is believed where it explains
 what the record as it is declared leaves. Where a free inertia makes up for a scale, no error shows: there the values tell, which
 all come out shifted, and go back to the given ones under the right change.
+
+Physics that the model lacks shifts values, too. At one amplitude and speed dry friction looks like more damping, and where the
+damping is all that the motion tells, like more of everything. So no change is believed before the record as it is declared has been
+tried with a dry friction and a constant force beside the model's own: they leave a wrong scale as it is, for they do not
+accelerate a mass.
 """
 
 import math
@@ -14,11 +19,13 @@ from functools import partial
 
 import numpy as np
 
+from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.channel_change import Change, guess, instruction, likely_changes
 from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.descent import WHITE
 from rhythmid.identify.free_run import with_series
+from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.joint import POOR_MOTION, Search, explained, prepared_model
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.series import Series, dominant_frequency, prepare
@@ -42,6 +49,7 @@ LEAST_UNIT_FACTOR = (
     4.0  # factor below which a gain is physics (a gain element, a wrong nominal value) and no unit
 )
 STEP = 0.01  # relative step by which the effect of a gain is taken
+TRANSITION = 0.1  # of the usual speed, over which the sign of a friction that is tried turns at first
 GAINS = (0.01, 0.03, 0.1, 10.0, 30.0, 100.0)  # from which the scale of an input in a foreign unit is sought
 
 
@@ -93,7 +101,7 @@ def likely_mend(
         tried = partial(_tried, record=record, model=own_model(model, record), pool=pool)
         declared = _declared(record, own_model(model, record), pool)
         if declared.unexplained < POOR_MOTION:
-            return _shift(record, declared, model, tried) if declared.shift > SHIFTED else None
+            return _shift(record, declared, model, tried, pool) if declared.shift > SHIFTED else None
         mend = _misfit(record, declared, model, tried, pool)
         if mend is not None:
             return mend
@@ -117,8 +125,8 @@ def _misfit(
     if not _convinces(best, declared):
         return None
     again = _searched_again(best, record, model, pool)
-    if again is not None:  # the search had only lost its way
-        return _shift(record, again, model, tried) if again.shift > SHIFTED else None
+    if again is not None:  # the search had only lost its way, or a friction is missing
+        return _shift(record, again, model, tried, pool) if again.shift > SHIFTED else None
     alike = [one for one in trials if one.unexplained <= EQUAL * best.unexplained + SAME]
     return Mend(alike[0].change, _words(record, model, declared, alike), True)
 
@@ -141,15 +149,23 @@ def _searched_again(
         again = _tried(AS_DECLARED, record, model.with_values(within), pool, model, periods)
         if again is not None and again.unexplained < POOR_MOTION:
             return again
-    return None
+    rubbing = _with_friction(record, model, pool)
+    return rubbing if rubbing is not None and rubbing.unexplained < POOR_MOTION else None
 
 
 def _convinces(trial: Trial, declared: Trial) -> bool:
     return trial.unexplained < min(POOR_MOTION, BETTER_UNIT * declared.unexplained)
 
 
-def _shift(record: Record, declared: Trial, model: Model, tried: partial[Trial | None]) -> Mend | None:
-    """The change that leads all values back, where they are shifted as declared and the error is none the larger for it."""
+def _shift(
+    record: Record,
+    declared: Trial,
+    model: Model,
+    tried: partial[Trial | None],
+    pool: ThreadPoolExecutor | None,
+) -> Mend | None:
+    """The change that leads all values back, where they are shifted as declared and the error is none the larger for it, and no
+    friction does that."""
     trials = [one for change in likely_changes(record, model) if (one := tried(change)) is not None]
     back = _back(trials, declared)
     if not back:  # no unit with a name, such as amperes
@@ -157,6 +173,9 @@ def _shift(record: Record, declared: Trial, model: Model, tried: partial[Trial |
         one = None if common is None else tried(Change("input", 1.0 / common))
         back = [] if one is None else _back([one], declared)
     if not back:
+        return None
+    rubbing = _with_friction(record, model, pool)
+    if rubbing is not None and _back([rubbing], declared):
         return None
     best = min(one.shift for one in back)
     alike = [one for one in back if one.shift <= best + 0.1 * BACK]
@@ -167,6 +186,29 @@ def _back(trials: Sequence[Trial], declared: Trial) -> list[Trial]:
     """Trials that lead the values back and explain the record as well."""
     most = EQUAL * declared.unexplained + SAME
     return [one for one in trials if one.shift < BACK and one.unexplained <= most]
+
+
+def _with_friction(record: Record, model: Model, pool: ThreadPoolExecutor | None) -> Trial | None:
+    """The record as it is declared, by the model with a dry friction and a constant force besides; None where it has them already, or
+    the effort along the motion does not tell how large they are about."""
+    own = own_model(model, record)
+    try:
+        balance = Balance.of([record], own)
+    except InputError:
+        return None
+    catalogue, speed = load_catalogue(), balance.mechanical[:, 1]
+    missing = balance.measured - balance.predicted(own)
+    friction, offset = np.linalg.lstsq(np.column_stack([np.sign(speed), np.ones(len(speed))]), missing)[0]
+    rubbing = own
+    if own.term("coulomb_friction") is None:
+        transition = TRANSITION * float(np.median(np.abs(speed)))
+        force = max(float(friction), 0.0)
+        rubbing = rubbing.with_element(
+            catalogue["coulomb_friction"], {"force": force, "transition": transition}
+        )
+    if own.term("constant_force") is None:
+        rubbing = rubbing.with_element(catalogue["constant_force"], {"force": float(offset)})
+    return None if rubbing is own else _tried(AS_DECLARED, record, rubbing, pool, model)
 
 
 def _common_factor(fit: Fit | None, given: Model) -> float | None:

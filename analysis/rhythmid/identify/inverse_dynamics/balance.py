@@ -143,10 +143,15 @@ class Balance:
         for motion in self.motions:
             if motion.bridged:
                 found.setdefault(motion.name, []).extend(end - begin for begin, end in motion.bridged)
-        return [
-            f"{name}: {len(gaps)} gaps of at most {max(gaps):.2g} s ({sum(gaps):.3g} s in all) are bridged, short beside the effort's "
-            "shortest period; they count neither in fits nor in scores"
+        counted = {
+            name: f"a gap of {gaps[0]:.2g} s is"
+            if len(gaps) == 1
+            else f"{len(gaps)} gaps of at most {max(gaps):.2g} s ({sum(gaps):.3g} s in all) are"
             for name, gaps in found.items()
+        }
+        return [
+            f"{name}: {said} bridged, short beside the effort's shortest period; what lies within counts neither in fits nor in scores"
+            for name, said in counted.items()
         ]
 
     @property
