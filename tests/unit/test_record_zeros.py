@@ -9,6 +9,9 @@ from machines import CATALOGUE, hopper, only, records
 from rhythmid.diagnose.baseline import calibrate
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.diagnose.record_zeros import with_zeros
+from rhythmid.identify.identify import identify
+from rhythmid.identify.joint import best_fit
+from rhythmid.identify.own_zeros import with_own_zeros
 from rhythmid.identify.record_zero import RECORD_ZERO
 from rhythmid.identify.series import hold_out_tail, prepare
 from rhythmid.identify.zero_estimates import zeros_told
@@ -99,6 +102,21 @@ def test_zeros_are_adopted_only_where_they_differ(machine, zeros, adopted):
         np.testing.assert_array_equal(one.value, other.value)
 
 
+@pytest.mark.parametrize(("zeros", "count"), [(ZEROS, 1), (SAME, 0)])
+def test_identify_tells_zeros_that_differ_and_its_model_is_that_of_the_first_record(zeros, count):
+    machine = nominal().with_values({"linear_spring.stiffness": 21.0, "viscous_damper.damping": 0.25})
+    found = identify(decays(machine, zeros), nominal())
+    told = [note for note in found.notes if "zero differs" in note]
+    assert len(told) == count
+    for note in told:
+        assert_told(note)
+    assert found.usable and found.model.term(RECORD_ZERO.name) is None
+    for name, truth in {"linear_spring.stiffness": 21.0, "linear_spring.rest_length": 0.2}.items():
+        estimate = found.parameters[name]
+        assert estimate.value is not None and estimate.std is not None
+        assert abs(estimate.value - truth) < 4.0 * estimate.std < 0.1
+
+
 def test_a_mean_that_shifts_with_the_amplitude_is_physics_and_no_zero():
     """A hopper whose spring is not symmetric, at two amplitudes."""
     machine = hopper().with_element(CATALOGUE["quadratic_stiffness"], {"coefficient": 600.0})
@@ -107,3 +125,5 @@ def test_a_mean_that_shifts_with_the_amplitude_is_physics_and_no_zero():
     plain = calibrate(hopper(), series, CATALOGUE)
     found, _ = with_zeros(plain, hopper(), unseen, only("quadratic_stiffness", "coulomb_friction"))
     assert found is plain
+    alone = best_fit(records(machine, protocol), hopper())
+    assert with_own_zeros(alone) == (alone, ())

@@ -22,11 +22,13 @@ from rhythmid.identify.inner_delays import dead_times
 from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit, explained
 from rhythmid.identify.large_shifts import large_shifts
 from rhythmid.identify.natural_size import sizes_of
+from rhythmid.identify.own_zeros import with_own_zeros
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
 from rhythmid.identify.paper_conditions import lacks_paper_method, lacks_transfer_functions
 from rhythmid.identify.paper_delays import combined, paper_delays
 from rhythmid.identify.paper_quality import MISFIT, notes_of, quality_of
 from rhythmid.identify.plausibility import SHIFTED, check_plausible, shift
+from rhythmid.identify.record_zero import without_record_zero
 from rhythmid.identify.timing import compensated, measurement_jitter
 from rhythmid.identify.weighting import efficient_fit
 from rhythmid.ltp.harmonic_estimate import HarmonicEstimates
@@ -320,10 +322,12 @@ def _by_likelihood(
             return None
         check_plausible(seen.nominal, records)
         raise
+    found, zeros = with_own_zeros(found)
     if unforced and not found.search.arrived and paper[0].fit.misfit < MISFIT:
         return None
     tell("looking for clocks that drift and commands that are held")
     joint, notes = compensated(found) if found.search.arrived else (found, ())
+    notes = (*zeros, *notes)
     late = command_jitter(joint.fit) if joint.search.arrived else None
     if late is not None:
         joint, notes = replace(joint, fit=weighed(joint.fit, late)), (*notes, late.words)
@@ -366,7 +370,7 @@ def _by_likelihood(
     results = paper if shown.paper else (None,) * len(records)
     notes += tuple(note for result, one in zip(results, records) for note in notes_of(one, result))
     return Identification(
-        fit.model, records, parameters, delays, shown, paper, quality, notes, joint, cautions,
+        without_record_zero(fit.model), records, parameters, delays, shown, paper, quality, notes, joint, cautions,
     )  # fmt: skip
 
 

@@ -1,0 +1,73 @@
+"""Zeros that differ from record to record, noticed by a fit to several records: each becomes a nuisance of the fit."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.errors import InputError
+from rhythmid.identify.joint import JointFit, explained
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.output_error import Fit, estimate, minimise
+from rhythmid.identify.record_zero import others_marked, with_record_zero
+from rhythmid.identify.robust_covariance import widening
+from rhythmid.identify.sensitivity import Problem
+from rhythmid.identify.series import record_of
+from rhythmid.identify.timing import EVIDENT_BY
+from rhythmid.identify.zero_estimates import zeros_told
+
+Array = NDArray[np.float64]
+# of the squared error, that zeros may leave of it: they are nearly all that is wrong. Else it may be physics by which the mean of a motion
+# shifts with its amplitude, which a search among effects can tell and this cannot (a hopper with a quadratic spring leaves 0.36)
+LEFT = 0.2
+
+
+def zero_scores(fit: Fit) -> Array:
+    """How many standard deviations each record's zero, but the first's, is off that of the first, (r - 1,), to first order.
+
+    Under white noise, for what a model lacks is none, and with standard deviations that the scores of blocks bear out.
+    """
+    left = np.concatenate([r[one.used] for r, one in zip(fit.residuals, fit.run.series, strict=True)])
+    white = NoiseModel(np.empty(0), math.sqrt(float(np.mean(left**2))))
+    fit = minimise(fit.model, fit.run, fit.names, white, fit.starts, 10, differences=fit.differences)
+    here, series = fit.linearisation, fit.run.series
+    problem = Problem(fit.run, fit.names, fit.noise, None)
+    names = tuple(dict.fromkeys(record_of(one) for one in series))[1:]
+    parts = []
+    for index, (one, basis) in enumerate(zip(series, here.bases, strict=True)):
+        constant = problem.whitened(index, np.ones(one.blocks))
+        constant = constant - basis @ (basis.T @ constant)
+        parts.append(np.outer(constant, [float(record_of(one) == name) for name in names]))
+    columns = np.hstack([here.jacobian, np.concatenate(parts)])
+    norms = np.linalg.norm(columns, axis=0)
+    norms[norms == 0.0] = 1.0
+    inverse = np.linalg.pinv((columns / norms).T @ (columns / norms), rcond=1e-12)
+    step = -inverse @ ((columns / norms).T @ here.residual)
+    std = np.sqrt(np.maximum(np.diag(inverse), 1e-300))
+    remainder = here.residual + (columns / norms) @ step
+    factors = widening(columns / norms, remainder, here.pieces, inverse, std)
+    return (step / (std * factors))[-len(names) :]
+
+
+def with_own_zeros(joint: JointFit) -> tuple[JointFit, tuple[str, ...]]:
+    """The fit with a zero of each record where the records have them, and what was found, in words."""
+    fit, kept = joint.fit, (joint, ())
+    series = fit.run.series
+    several = len({record_of(one) for one in series}) > 1
+    if not several or series[0].measured != "position" or any(one.ignored is not None for one in series):
+        return kept
+    try:
+        if np.abs(zero_scores(fit)).max() < EVIDENT_BY:
+            return kept
+        free = estimate(with_record_zero(fit.model), others_marked(series), max_step=fit.run.max_step)
+        # a fit that was stuck gains by being made again, whatever else is free
+        values = {name: free.model.value(name) for name in fit.names}
+        again = estimate(fit.model.with_values(values), series, max_step=fit.run.max_step)
+    except InputError:
+        return kept
+    before, other, after = (sum(float(r @ r) for r in one.residuals) for one in (fit, again, free))
+    before = min(before, other)
+    if after > LEFT * before:
+        return kept
+    return replace(joint, fit=free, search=explained(free, joint.pumping)), zeros_told(free)
