@@ -19,7 +19,7 @@ from rhythmid.record.quality import clipped_samples
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-MOSTLY = 0.5  # share of clipped samples beyond which a record is useless
+MOST_CLIPPED = 0.5  # share of clipped samples beyond which a record is useless
 DECAYS = 0.7  # of the motion's size from the first quarter to the last, above which it may be driven
 
 
@@ -71,7 +71,7 @@ def without_clipped(record: Record) -> tuple[Record, tuple[str, ...]]:
         return record, ()
     share = float(bad.mean())
     limits = " and ".join(f"{v:.6g}" for v in np.unique(channel.value[bad]))
-    if share > MOSTLY:
+    if share > MOST_CLIPPED:
         raise InputError(
             f"{record.name}: {100 * share:.0f} % of the output is clipped at {limits} {channel.unit}; choose a wider range of the sensor"
         )

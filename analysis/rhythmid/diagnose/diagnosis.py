@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.diagnose.admission import admitted
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
-from rhythmid.diagnose.answer.result import Diagnosis
+from rhythmid.diagnose.answer.result import Diagnosis, Untried
 from rhythmid.diagnose.baseline import causal, check_free
 from rhythmid.diagnose.case import SPENT, Budget, Case
 from rhythmid.diagnose.constants import DRIVES_IT, LEFT
@@ -215,7 +215,7 @@ def diagnose(
         unscored = effort.applies and all(one.diagnosis.scoring.kind != "effort" for one in made)
         if unscored and chosen.stands:
             if case.budget.spent:
-                return _with_excluded(chosen, f"a comparison with the recorded effort: {SPENT}")
+                return _with_excluded(chosen, Untried("a comparison with the recorded effort", SPENT))
             made.append(_by_effort(case, effort, (), len(chosen.diagnosis.missing)))
         return _compared(chosen, made)
 
@@ -266,9 +266,9 @@ def _by_effort(case: Case, effort: Applicability, notes: Sequence[str], most: in
     return Answer(compose_effort(case, result, notes), result.chosen.model, result)
 
 
-def _with_excluded(answer: Answer, line: str) -> Answer:
+def _with_excluded(answer: Answer, untried: Untried) -> Answer:
     found = answer.diagnosis
-    return replace(answer, diagnosis=replace(found, excluded=(*found.excluded, line)))
+    return replace(answer, diagnosis=replace(found, excluded=(*found.excluded, untried)))
 
 
 def _compared(answer: Answer, made: Sequence[Answer]) -> Answer:

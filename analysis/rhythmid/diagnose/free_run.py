@@ -29,12 +29,12 @@ from rhythmid.diagnose.search.score_tests import Trajectories, trajectories, und
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.shape import shape_of
+from rhythmid.diagnose.tick_interval import ticks_followed
 from rhythmid.diagnose.verdict import Decision, decide
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.robust_covariance import with_robust_covariance
-from rhythmid.identify.sample_clock.tick_interval import ticks_followed
 from rhythmid.identify.series import Series, scales
 from rhythmid.identify.student import autocorrelation_time
 

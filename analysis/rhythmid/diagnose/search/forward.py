@@ -64,7 +64,7 @@ NEAR = 60.0
 # leaves; and how many of them get it
 PLAIN, SECOND = 100.0, 2
 UNDERSTATED = 0.1  # share of what a refit gains that a score shows at least, where an effect is far from its first guess
-MOST_EFFECTS = 3  # effects at once
+EFFECTS_AT_ONCE = 3  # effects at once
 RIVALS_COMPARED = 4  # models of each number of effects that are compared at the end
 OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
@@ -180,11 +180,10 @@ def search(
     while (
         now.p_value < LEVEL
         and _could_pay(now, best, max(WORTH, SHARE * gained), current)
-        and len(best.added) < MOST_EFFECTS
+        and len(best.added) < EFFECTS_AT_ONCE
     ):
         if budget.spent:
-            untried = [score.element.name for score, _ in distinct(now.scores, REFITTED)]
-            excluded.append((tuple(untried), SPENT))
+            excluded += [((score.element.name,), SPENT) for score, _ in distinct(now.scores, REFITTED)]
             break
         count = REFITTED if not best.added else REFITTED - 1
         proposals, enough = _proposals(here.model, replace(now, added=here.added), count, here.chi2)
@@ -234,7 +233,7 @@ def search(
         trials[tuple(sorted(best.added))] = best
         tell(f"{best.added[-1]} explains it better by {gain:.0f}; looking for more")
         current = whole_fit(best, series, noise, step, pool=pool)
-        if len(best.added) >= MOST_EFFECTS:
+        if len(best.added) >= EFFECTS_AT_ONCE:
             break
         now, current = one_round(current, best.added, catalogue, pool)
         here = under_noise([best], series, current.noise, step, 0)[0]
@@ -244,7 +243,7 @@ def search(
     elif best.added:
         margin = max(WORTH, SHARE * gained)
         reduced, more = eliminate(
-            best, series, catalogue, trials, noise, step, rounds, margin, MOST_EFFECTS, tell
+            best, series, catalogue, trials, noise, step, rounds, margin, EFFECTS_AT_ONCE, tell
         )
         trials |= more
         if reduced is not best:
