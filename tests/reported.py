@@ -51,7 +51,7 @@ def result(
         "delays": delays,
         "next_experiment": "a step of bias force",
         "calibration": ["linear_spring.stiffness: 180 in the nominal model, 200 ± 0.1 N/m in the records"],
-        "excluded": ["second_mode: the model diverges"],
+        "excluded": [{"name": "second_mode", "reason": "the model diverges"}],
         "heldout": "held out: h1",
         "hypotheses": [
             hypothesis("effects", 0.0, 0.98, [element]), hypothesis("effects", 12.0, 0.02, ["stribeck_friction"]),

@@ -34,6 +34,12 @@ SEEDS = st.integers(0, 2**31)
 FEW = settings(max_examples=30, deadline=None)
 
 
+def without_priors(residual: np.ndarray, jacobian: np.ndarray) -> Linearised:
+    """A fit whose parameters have no priors."""
+    none = np.zeros(jacobian.shape[1])
+    return Linearised(residual, jacobian, none, none)
+
+
 def rows_of(lengths: list[int]) -> np.ndarray:
     """The record of each row of records of these lengths."""
     return np.repeat(np.arange(len(lengths)), lengths)
@@ -50,7 +56,7 @@ def line(rows: int, columns: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray
 def least_squares(measured: np.ndarray, design: np.ndarray) -> Linearised:
     """The regression as a fit, at its least-squares solution."""
     solution = np.linalg.lstsq(design, measured, rcond=None)[0]
-    return Linearised.without_priors(design @ solution - measured, design)
+    return without_priors(design @ solution - measured, design)
 
 
 # blocks
@@ -217,7 +223,7 @@ def test_a_column_of_noise_predicts_worse_than_none_and_the_true_one_better():
     idle = np.random.default_rng(9).standard_normal((1200, 12))
     without, true, wide = predict(
         [
-            Linearised.without_priors(-measured, np.empty((1200, 0))),
+            without_priors(-measured, np.empty((1200, 0))),
             least_squares(measured, design),
             least_squares(measured, np.hstack([design, idle])),
         ],
@@ -250,7 +256,7 @@ def test_rows_that_no_fit_sees_are_predicted_by_the_fit_of_all_others():
     wild = measured.copy()
     wild[400:] += 1e3
     again = cross_validate(
-        Linearised.without_priors(least_squares(measured, design).residual - (wild - measured), design),
+        without_priors(least_squares(measured, design).residual - (wild - measured), design),
         blocks,
     )
     np.testing.assert_allclose(again.error[:400], found.error[:400], atol=1e-9)

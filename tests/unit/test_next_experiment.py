@@ -1,12 +1,15 @@
-"""The menu of next experiments: what the machine, and the sampling of its records, can bear."""
+"""The next experiment: what the machine, and the sampling of its records, can bear, and whether one is needed at all."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from answers import diagnosed
 
 from machines import CATALOGUE, SHORT, hopper, records, search_of
 from rhythmid.diagnose.answer.next_experiment import MORE_FREE, _menu, next_experiment, separation
+from rhythmid.diagnose.joints.joint_compose import _next
 from rhythmid.excitation.sequence import build
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import Series, prepare, scales
@@ -65,3 +68,28 @@ def test_no_experiment_excites_what_the_sampling_cannot_show(highest):
 def test_every_experiment_of_the_menu_can_be_built():
     for words, spec, factor in _menu(1.0, 6.0, 10.0, 100.0):
         assert build(spec).duration > 0.0 and factor > 0.0 and words
+
+
+@pytest.mark.parametrize(
+    ("verdict", "groups", "expected"),
+    [
+        ("missing_physics", (), True),
+        ("missing_physics", (("coulomb_friction", "stribeck_friction"),), False),
+        ("undecided", (), False),
+        ("unknown_physics", (), False),
+    ],
+)
+def test_only_names_that_nothing_might_stand_for_need_no_further_experiment(verdict, groups, expected):
+    found = replace(diagnosed(verdict, "coulomb_friction", kind="effort"), indistinguishable=groups)
+    assert found.settled is expected
+
+
+def test_the_joint_that_needs_an_experiment_most_is_told_and_none_where_all_are_sure():
+    sure = diagnosed("missing_physics", "coulomb_friction", kind="effort")
+    open_one = replace(
+        diagnosed("missing_physics", "backlash"), indistinguishable=(("backlash", "freeplay"),)
+    )
+    open_one = replace(open_one, next_experiment="slow reversals")
+    answers = {"hip": sure, "knee": open_one}
+    assert _next(answers, {"hip", "knee"}, (), ()) == "joint knee: slow reversals"
+    assert _next({"hip": sure}, {"hip"}, (), ()) == sure.next_experiment

@@ -17,6 +17,7 @@ from rhythmid.diagnose.answer.result import (
     MissingEffect,
     Remainder,
     Scored,
+    Untried,
 )
 from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.diagnose.joints.printed import left_words
@@ -61,7 +62,7 @@ ANSWER = Diagnosis(
     "a slow reversal [of the speed]",
     Scored("effort", 12.0, "a controller holds the machine"),
     assumptions=("The recorded effort is taken to be true in scale.",),
-    excluded=("sensor_lag: not seen", "sensor_drift: not seen"),
+    excluded=(Untried("sensor_lag", "not seen"), Untried("sensor_drift", "not seen")),
 )
 
 
@@ -141,8 +142,8 @@ def test_the_nominal_model_alone_has_no_probability():
 
 
 def test_the_verdict_is_not_said_twice():
-    told = printed(replace(ANSWER, verdict="undecided", summary="Undecided: two names do equally well."))
-    assert told.startswith("undecided: two names do equally well.")
+    told = printed(replace(ANSWER, verdict="undecided", summary="Two names do equally well."))
+    assert told.startswith("undecided: Two names do equally well.")
 
 
 def test_several_names_come_with_their_joint_probability():

@@ -131,7 +131,7 @@ def test_links_lead_to_sections_with_distinct_names(html: str) -> None:
 
 def test_names_from_recordings_stay_text() -> None:
     told = result()
-    told["next_experiment"] = told["excluded"][0] = EVIL
+    told["next_experiment"] = told["excluded"][0]["name"] = EVIL
     html = SCRIPT.sub("", render(diagnosis_page(findings(told, name=EVIL))))
     assert "<img" not in html
     assert "&lt;img" in html and "\\u003cimg" in html  # as text, and as data

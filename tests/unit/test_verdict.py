@@ -307,6 +307,14 @@ def test_a_second_name_that_is_open_does_not_take_the_first_one_with_it():
     assert all(decision.probability[label] < 0.8 for label in ("a", "b") if label in decision.probability)
 
 
+def test_the_summary_says_why_and_does_not_repeat_the_verdict():
+    pair = [supposed(name, predicted(0.1, 700.0, seed=i)) for i, name in enumerate("ab")]
+    said = summary_of(
+        decided(contest(NOMINAL, *pair))[1], [], FitQuality(0.1, 0.1), FitQuality(0.1, 0.1), "motion"
+    )
+    assert said.startswith("The evidence does not separate several explanations. They are ")
+
+
 def test_names_that_are_not_stood_by_have_no_high_joint_probability():
     score = predicted(0.1).score
     rivals = [supposed(name, predicted(0.1, score, seed=i)) for i, name in enumerate("abc")]

@@ -18,7 +18,7 @@ from rhythmid.compare.align import Alignment, align
 from rhythmid.compare.explain import Explanation, explain
 from rhythmid.compare.pair import Pair, harmonic_columns, pair_of
 from rhythmid.compare.place import HARMONICS, Place, place_of
-from rhythmid.diagnose.answer.wording import SENTENCES
+from rhythmid.elements.places import SENTENCES
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import estimate, start_only
 from rhythmid.identify.series import prepare

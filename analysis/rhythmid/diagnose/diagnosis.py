@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.diagnose.admission import Admitted, admitted
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
-from rhythmid.diagnose.answer.result import Diagnosis
+from rhythmid.diagnose.answer.result import Diagnosis, Untried
 from rhythmid.diagnose.baseline import causal, check_free
 from rhythmid.diagnose.case import SPENT, Budget, Case
 from rhythmid.diagnose.constants import DRIVES_IT, LEFT
@@ -335,7 +335,7 @@ def _with_untried(answer: Answer, ways: Sequence[str]) -> Answer:
     if not ways:
         return answer
     found = answer.diagnosis
-    late = tuple(f"{way}: {SPENT}" for way in ways)
+    late = tuple(Untried(way, SPENT) for way in ways)
     return replace(answer, diagnosis=replace(found, excluded=(*found.excluded, *late)))
 
 

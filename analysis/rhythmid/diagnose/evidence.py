@@ -54,12 +54,6 @@ class Linearised:
     precision: Array
     departure: Array
 
-    @classmethod
-    def without_priors(cls, residual: Array, jacobian: Array) -> "Linearised":
-        """A fit whose parameters have no priors."""
-        none = np.zeros(jacobian.shape[1])
-        return cls(residual, jacobian, none, none)
-
 
 @dataclass(frozen=True)
 class Blocks:

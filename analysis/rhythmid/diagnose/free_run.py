@@ -34,6 +34,7 @@ from rhythmid.diagnose.search.score_tests import Trajectories, changes_of, proje
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.shape import shape_of
+from rhythmid.diagnose.tick_interval import ticks_followed
 from rhythmid.diagnose.verdict import Decision, decide
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Scales
@@ -42,7 +43,6 @@ from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.covariance import covariance_of
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.robust_covariance import with_robust_covariance
-from rhythmid.identify.sample_clock.tick_interval import ticks_followed
 from rhythmid.identify.series import Series, scales
 from rhythmid.identify.student import autocorrelation_time
 

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 END = 2.0  # standard deviations at which chi2 should have risen by their square
 FURTHER_DEVIATIONS = 8.0, 32.0  # further ones at which it is looked whether it has
 ODD = 2.0  # times more or less than that rise, from which on the others are fitted again;
-LITTLE = 8.0  # times less further on, where few likelihoods are parabolas
+ODD_FURTHER = 8.0  # times less further on, where few likelihoods are parabolas
 FLAT = 0.25  # of that rise with the others fitted, below which an interval is too narrow
 FALLS = 2.0  # by how much chi2 has to be lower elsewhere to go there
 WIDEST = 2.0**20  # standard deviations up to which the rise is sought,
@@ -105,7 +105,7 @@ def _odd(way: _Way, rise: float) -> bool:
     """Whether chi2 rises otherwise than a parabola along a way."""
     due = way.deviations**2
     if abs(way.deviations) > END:
-        return rise < due / LITTLE
+        return rise < due / ODD_FURTHER
     return rise < due / ODD or ODD * due < rise < math.inf
 
 

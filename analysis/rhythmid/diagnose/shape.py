@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 
 from rhythmid.diagnose.constants import FAR_RANGES, REACH
 from rhythmid.diagnose.search.score_tests import Trajectories
-from rhythmid.diagnose.static_law import SAME, curved
+from rhythmid.diagnose.static_law import INSTANTS, SAME, curved
 from rhythmid.elements.element import Element, Scales
 from rhythmid.model import Model, Term
 from rhythmid.simulation.effect import Path, effect_along
 
 Array = NDArray[np.float64]
-INSTANTS = 400  # instants at which an effect is tried
-DAMPING = "damping_ratio"  # of a resonance: it is as wide as this share of its frequency
 
 
 def shape_of(model: Model, added: Sequence[str], known: Trajectories, sizes: Scales) -> dict[str, float]:
@@ -80,7 +78,7 @@ def _own_frequency(term: Term, sizes: Scales) -> float:
     if term.element.kernel is None or forcing <= 0.0:
         return math.inf
     found = [term.values[one.name].value for one in term.element.parameters if one.unit == "Hz"]
-    damping = term.values[DAMPING].value if DAMPING in term.values else 0.0
+    damping = term.values[term.element.width].value if term.element.width else 0.0
     narrow = [abs(f - round(f / forcing) * forcing) / line for f in found if damping * f < line]
     return min(narrow, default=math.inf)
 

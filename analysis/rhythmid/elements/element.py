@@ -146,7 +146,8 @@ class Element:
     or the nominal model says the same. `against` says whether a friction or a damper acts between mass and base or between
     mass and room; None where that is no choice. `takes` is the unit of the signal that an actuator is fed with, where that
     is no force. `clock` names the parameter that is the period of a clock of its own, which no descent finds: a fit seeks
-    it on a grid as fine as the ticks of the last second of a record ask for. `history` names signals that a kernel is given, and
+    it on a grid as fine as the ticks of the last second of a record ask for. `width` names the parameter of a resonance that is its width
+    as a share of its frequency. `history` names signals that a kernel is given, and
     wants as they were earlier, too, by the time that the parameter `dead_time` says; before a simulation's start they are what
     command and forcing were, with the machine's states led back along their first rates.
     `switches` says where its force changes form: at the value of a parameter, its own or one that it borrows, of position "x" or
@@ -192,6 +193,7 @@ class Element:
     against: Against | None = None
     takes: str = ""
     clock: str = ""
+    width: str = ""
     switches: tuple[Literal["x", "v"], str] | None = None
     source: str = ""  # file that defines it
 

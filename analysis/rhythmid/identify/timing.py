@@ -28,8 +28,6 @@ from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
 DRIFTS = ("clock_skew", "input_delay_drift")
-DRIFT_PARAMETER = {"clock_skew": "skew", "input_delay_drift": "rate"}
-ALIKE = {"clock_skew": ("delay_drift",)}  # the same to first order
 EVIDENT_BY = 5.0  # standard deviations from which a timing effect becomes part of the model
 SMEARS = 3  # widths of command jitter that are tried
 ROLL_OFF_SAMPLES = (
@@ -49,7 +47,8 @@ def drift_score(fit: Fit, element: str) -> tuple[float, float]:
 
     C. R. Rao, Proc. Cambridge Phil. Soc. 44 (1948) 50.
     """
-    model = fit.model.with_element(load_catalogue()[element], {DRIFT_PARAMETER[element]: 0.0})
+    drift = load_catalogue()[element]
+    model = fit.model.with_element(drift, {drift.size: 0.0})
     name = next(n for n in model.parameters if n not in fit.model.parameters)
     run = prepare_run(model, fit.run.series, fit.run.max_step)
     problem = Problem(run, (name,), fit.noise, None)
@@ -84,7 +83,7 @@ def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tupl
         scores = {
             name: drift_score(fit, name)
             for name in DRIFTS
-            if not any(t.element.name in (name, *ALIKE.get(name, ())) for t in fit.model.terms)
+            if not any(t.element.name in (name, *catalogue[name].same_as) for t in fit.model.terms)
             and (name != "input_delay_drift" or fit.model.term("input_delay") is not None)
         }
         shown = {name: value / std for name, (value, std) in scores.items() if abs(value) > EVIDENT_BY * std}
@@ -92,9 +91,9 @@ def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tupl
             break
         name = max(shown, key=lambda n: abs(shown[n]))
         before = fit
-        extended = fit.model.with_element(catalogue[name], {DRIFT_PARAMETER[name]: scores[name][0]})
+        extended = fit.model.with_element(catalogue[name], {catalogue[name].size: scores[name][0]})
         fit = estimate(extended, fit.run.series, pool=pool, max_step=fit.run.max_step)
-        parameter = f"{name}.{DRIFT_PARAMETER[name]}"
+        parameter = f"{name}.{catalogue[name].size}"
         value, std = fit.model.value(parameter), fit.std[parameter]
         small = abs(value) * max(float(np.ptp(one.time)) for one in fit.run.series) < 1e-6
         if abs(value) < EVIDENT_BY * std or small or fit.noise.variance > before.noise.variance:

@@ -225,8 +225,7 @@ def _kin_of(clutter: Sequence[str], catalogue: Catalogue) -> set[str]:
 
 def by_effort(answer: dict[str, Any]) -> bool:
     """Whether the answer was reached by comparing forces."""
-    scoring = answer.get("scoring") or ""
-    return scoring.get("kind") == "effort" if isinstance(scoring, dict) else "balance of forces" in scoring
+    return (answer.get("scoring") or {}).get("kind") == "effort"
 
 
 def _heldout(truth: dict[str, Any], answer: dict[str, Any]) -> float | None:

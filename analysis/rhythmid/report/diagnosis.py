@@ -87,8 +87,7 @@ def _joined(words: Iterable[str]) -> str:
 def _words(found: Findings) -> str:
     """The verdict in two sentences: the summary, and the error where that is a single one."""
     result = found.result
-    summary = str(result["summary"]).removeprefix(f"{VERDICTS[result['verdict']][0]}: ")
-    summary = summary[:1].upper() + summary[1:]
+    summary = str(result["summary"])
     if ". " in summary:
         return summary
     detection, whole = result["detection"], found.compared.quantity

@@ -52,7 +52,9 @@ def hypotheses_section(found: Findings) -> Section:
     if found.result["excluded"]:
         blocks += [
             Heading("What was not tried"),
-            Bullets(tuple(map(plain, grouped(found.result["excluded"])))),
+            Bullets(
+                tuple(map(plain, grouped([(one["name"], one["reason"]) for one in found.result["excluded"]])))
+            ),
         ]
     return Section("The hypotheses", (*blocks, *_scores(found)))
 
@@ -106,15 +108,12 @@ def most_weighed(hypotheses: Sequence[tuple[Sequence[str], float]]) -> int:
     return max((len(effects) for effects, chance in hypotheses if chance > 0.0), default=0) or -1
 
 
-def grouped(excluded: Sequence[str]) -> list[str]:
-    """Lines "name: reason" as one line for each reason, with all its names."""
+def grouped(excluded: Sequence[tuple[str, str]]) -> list[str]:
+    """What was not tried, as (name, reason), in one line for each reason, with all its names."""
     names: dict[str, list[str]] = {}
-    for line in excluded:
-        name, _, reason = line.partition(": ")
+    for name, reason in excluded:
         names.setdefault(reason, []).append(name)
-    return [
-        f"{', '.join(group)}: {reason}" if reason else ", ".join(group) for reason, group in names.items()
-    ]
+    return [f"{', '.join(group)}: {reason}" for reason, group in names.items()]
 
 
 def _named(found: Findings, elements: Sequence[str]) -> str:

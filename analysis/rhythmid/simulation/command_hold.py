@@ -43,11 +43,6 @@ class CommandHold:
         self._given = 0.0
         self._step = 0  # of the ramp, the next one
 
-    @property
-    def lapsed(self) -> bool:
-        """Whether the newest command was not renewed in time."""
-        return self._step > 0
-
     def renew(self, stamp_ns: int, effort: float) -> None:
         """A command [N] that holds from `stamp_ns` on."""
         self._renewed_ns, self._given, self.effort, self._step = stamp_ns, effort, effort, 0

@@ -53,7 +53,6 @@ class Observer:
     def __init__(self, simulation: Simulation, given: Filter, sizes: Array | None) -> None:
         self.simulation, self.given, self.sizes = simulation, given, sizes
         self.start: Start | None = None
-        self.restarts = 0
 
     def begin(self, stamps: Array, values: Array) -> None:
         """Begin at the last of some samples, with position and velocity of the straight line through them."""
@@ -81,7 +80,6 @@ class Observer:
         run = self.simulation.run(given, self.start, block, scatter, self.sizes)
         found = None if run is None else self._correct(run, given, values)
         if found is None:
-            self.restarts += 1
             self.begin(stamps, values)
         return found
 

@@ -15,6 +15,7 @@ from rhythmid.diagnose.answer.result import (
     MissingEffect,
     Remainder,
     Scored,
+    Untried,
 )
 from rhythmid.diagnose.answer.wording import freed_value, location_of, recalibrated, summary_of
 from rhythmid.diagnose.case import Case
@@ -34,7 +35,7 @@ from rhythmid.model import Model
 
 SHOWN = 8  # alternatives listed
 ONE_CLOCK = "The clocks of command and measurement agree: an offset between them counts as delay."
-WORTH = 10.0  # difference of the information criterion within which a rival is worth an experiment
+RIVALS = 10.0  # difference of the information criterion within which a rival is worth an experiment
 
 
 def explanations(contest: Contest, decision: Decision) -> tuple[Explanation, ...]:
@@ -69,7 +70,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     )
     plain = FitQuality(found.nominal.nrmse(), contest.nominal.heldout_nrmse)
     augmented = FitQuality(found.fit.nrmse(), result.selection.chosen.heldout_nrmse)
-    rivals = [t for t in found.trials if len(t.added) == len(best.added) and t.bic() - best.bic() < WORTH]
+    rivals = [t for t in found.trials if len(t.added) == len(best.added) and t.bic() - best.bic() < RIVALS]
     heldout = {tuple(sorted(one.elements)): one.heldout_nrmse for one in contest.hypotheses}
     alternatives = tuple(
         Alternative(
@@ -113,7 +114,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
             *zeros_told(fit),
             *recalibrated(case.nominal, fit.model, {name: fit.std[name] for name in fit.names}),
         ),
-        excluded=tuple(f"{' + '.join(added)}: {why}" for added, why in found.excluded),
+        excluded=tuple(Untried(" + ".join(added), why) for added, why in found.excluded),
         heldout=held,
         notes=tuple(notes),
         assumptions=(ONE_CLOCK,) if any(one.command is not None for one in series) else (),

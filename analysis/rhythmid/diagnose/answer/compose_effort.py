@@ -14,11 +14,14 @@ from rhythmid.diagnose.answer.result import (
     MissingEffect,
     Remainder,
     Scored,
+    Untried,
+    settled,
 )
-from rhythmid.diagnose.answer.wording import SENTENCES, freed_value, listed, recalibrated, summary_of
+from rhythmid.diagnose.answer.wording import freed_value, listed, recalibrated, summary_of
 from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.run import EffortResult
+from rhythmid.elements.places import SENTENCES
 from rhythmid.identify.inverse_dynamics.estimate import size_of
 
 NO_SENSOR = "The measurement is assumed to be the motion: effects in the sensor and in the measurement's time are not among the candidates."
@@ -66,7 +69,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         scoring=Scored("effort", result.applicability.bandwidth, result.applicability.reason),
         assumptions=(FIXED_SCALE, NO_SENSOR),
         calibration=recalibrated(case.nominal, chosen.fit.model, chosen.std()),
-        excluded=tuple(f"{name}: {why}" for name, why in result.search.not_tried.items()),
+        excluded=tuple(Untried(name, why) for name, why in result.search.not_tried.items()),
         heldout=held if result.heldout is not None else "held out: every block of the records in its turn",
         notes=tuple(notes),
     )
@@ -124,7 +127,7 @@ def effort_delays(fitted: Fitted) -> dict:
 def _next_experiment(result: EffortResult) -> str:
     """What to record next."""
     decision = result.decision
-    if decision.verdict == "missing_physics" and not decision.equivalent:
+    if settled(decision.verdict, decision.equivalent):
         return (
             "none needed for these records; other speeds, loads and positions would exclude smaller effects"
         )

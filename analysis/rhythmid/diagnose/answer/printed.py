@@ -23,7 +23,7 @@ def show(found: Diagnosis, console: Console) -> None:
     """Print a diagnosis."""
     lines = _Lines(console)
     verdict = found.verdict.replace("_", " ")
-    lines.told(verdict, found.summary.removeprefix(f"{verdict.capitalize()}: "))
+    lines.told(verdict, found.summary)
     lines.said("where", found.location.where)
     for effect in found.missing:
         sizes = f"{_percent(effect.share)} of the mismatch"
@@ -49,7 +49,7 @@ def show(found: Diagnosis, console: Console) -> None:
     for label, group in (
         ("assumption", found.assumptions),
         ("calibration", found.calibration),
-        ("not tried", grouped(found.excluded)),
+        ("not tried", grouped([(one.name, one.reason) for one in found.excluded])),
         ("note", found.notes),
     ):
         for line in group:

@@ -115,6 +115,19 @@ class Scored:
 
 
 @dataclass(frozen=True)
+class Untried:
+    """A candidate that was not tried, or what else was not, and the reason."""
+
+    name: str
+    reason: str
+
+
+def settled(verdict: Verdict, indistinguishable: tuple[tuple[str, ...], ...]) -> bool:
+    """Whether nothing has to be recorded to make sure of an answer: it names effects, and no others might stand in their place."""
+    return verdict == "missing_physics" and not indistinguishable
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """The answer to: which physics does the model lack?"""
 
@@ -136,7 +149,7 @@ class Diagnosis:
     scoring: Scored
     assumptions: tuple[str, ...] = ()
     calibration: tuple[str, ...] = ()
-    excluded: tuple[str, ...] = ()
+    excluded: tuple[Untried, ...] = ()
     heldout: str = ""
     notes: tuple[str, ...] = field(default=())
 
@@ -149,6 +162,11 @@ class Diagnosis:
     def augmented(self) -> FitQuality:
         """Error of the model with the named effects."""
         return self.fit["augmented"]
+
+    @property
+    def settled(self) -> bool:
+        """Whether nothing has to be recorded to make sure of it."""
+        return settled(self.verdict, self.indistinguishable)
 
     def to_dict(self) -> dict[str, Any]:
         """The diagnosis as plain JSON data; a number that is not finite is null."""

@@ -9,16 +9,9 @@ from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.verdict import Decision
+from rhythmid.elements.places import SENTENCES
 from rhythmid.model import Model
 from rhythmid.report.quantity import in_words, rounded
-
-SENTENCES = {
-    "command": "between the command u and the point where the forcing joins it",
-    "actuator": "in the actuator, which turns forcing plus command into force",
-    "force": "in the balance of forces on the mass",
-    "sensor": "between the mass and the measurement",
-    "timing": "in the clocks: stamps and delays that change",
-}
 
 
 def location_of(
@@ -63,7 +56,7 @@ def summary_of(
     """
     names = listed([effect.element for effect in missing])
     if freed is not None:
-        return f"Undecided: {freed}"
+        return freed[:1].upper() + freed[1:]
     if decision.verdict == "consistent":
         said = "Nothing of practical size is missing: with its parameters refitted, the nominal model explains the records"
         left = decision.unexplained
@@ -90,7 +83,7 @@ def summary_of(
             said += f" {100 * left.share:.0f} % of the mismatch is left and goes with {left.goes_with}."
         return said
     if decision.verdict == "undecided":
-        said = f"Undecided: {decision.reason}."
+        said = f"{decision.reason[:1].upper()}{decision.reason[1:]}."
         if decision.equivalent:
             groups = "; and ".join(listed(group, "or") for group in decision.equivalent)
             return f"{said} They are {groups}."

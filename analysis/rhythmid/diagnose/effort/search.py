@@ -28,7 +28,7 @@ from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.reference import reference_of
 from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.diagnose.evidence import Blocks, Linearised, predict
-from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction, special_case
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind, special_case
 from rhythmid.diagnose.rejections import Claim, keeps_shape, rejections_of, replaces
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
@@ -58,10 +58,9 @@ class EffortSearch:
     ----------
     balance : rows and motions that all hypotheses share.
     nominal : the nominal model, its free values fitted.
-    hypotheses : all that were fitted, the nominal among them, best prediction first.
-    predictions : of each of them.
+    hypotheses : all that were fitted, the nominal among them.
     ruled_out : what was fitted, too, and explains no motion.
-    reference, beyond : the nominal model, and the chosen one, with a free map beside them; and what the first predicts.
+    reference, beyond : the nominal model, and the chosen one, with a free map beside them.
     chosen : the hypothesis with which the search ended.
     condition : of the nominal model's scaled columns.
     not_tried : why candidates of the catalogue took no part, by name; and what the budget cut off.
@@ -72,11 +71,9 @@ class EffortSearch:
     blocks: Blocks
     nominal: Fitted
     hypotheses: tuple[Fitted, ...]
-    predictions: tuple[Prediction, ...]
     ruled_out: tuple[Fitted, ...]
     chosen: Fitted
     reference: Linearised
-    reference_prediction: Prediction
     beyond: Linearised
     condition: float
     not_tried: Mapping[str, str]
@@ -132,14 +129,8 @@ def search_effort(
     for one in (chosen, best) if best is not chosen else (chosen,):
         search.reduce(one)
     beyond = reference_of(balance, chosen, search.blocks)
-    made = predict(
-        [one.linearised for one in search.found] + [reference, beyond], search.blocks, balance.record
-    )
-    order = sorted(range(len(search.found)), key=lambda index: -made[index].score)
     return EffortSearch(
-        balance, search.blocks, nominal, tuple(search.found[i] for i in order), tuple(made[i] for i in order),
-        search.set_aside, chosen,
-        reference, made[-2], beyond, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)) | cut, len(search.tried),
+        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)) | cut, len(search.tried),
     )  # fmt: skip
 
 

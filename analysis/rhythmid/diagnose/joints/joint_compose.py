@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 from rhythmid.body.body import BODY
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
-from rhythmid.diagnose.answer.wording import SENTENCES
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, name_of
+from rhythmid.elements.places import SENTENCES
 from rhythmid.identify.inverse_dynamics.estimate import size_of
 from rhythmid.model import INERTIA
 from rhythmid.report.quantity import in_words
@@ -179,7 +179,7 @@ def _next(
 ) -> str:
     """What to record next, for the joint that needs it most."""
     for joint in (*undecided, *unknown, *(j for j in answers if j in named)):
-        if not answers[joint].next_experiment.startswith("none"):
+        if not answers[joint].settled:
             return f"joint {joint}: {answers[joint].next_experiment}"
     return next(iter(answers.values())).next_experiment
 

@@ -64,7 +64,7 @@ NEAR = 60.0
 # leaves; and how many of them get it
 PLAIN, SECOND = 100.0, 2
 UNDERSTATED = 0.1  # share of what a refit gains that a score shows at least, where an effect is far from its first guess
-MOST_EFFECTS = 3  # effects at once
+EFFECTS_AT_ONCE = 3  # effects at once
 RIVALS_COMPARED = 4  # models of each number of effects that are compared at the end
 OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
@@ -144,7 +144,7 @@ def search(
     pool: ThreadPoolExecutor | None,
     tell: Tell = lambda _: None,
     budget: Budget | None = None,
-    most: int = MOST_EFFECTS,
+    most: int = EFFECTS_AT_ONCE,
 ) -> Search:
     """Search the catalogue for what the nominal model lacks; `nominal` is the fit to the same series of the one `given`.
 
@@ -184,8 +184,7 @@ def search(
         and len(best.added) < most
     ):
         if budget.spent:
-            untried = [score.element.name for score, _ in distinct(now.scores, REFITTED)]
-            excluded.append((tuple(untried), SPENT))
+            excluded += [((score.element.name,), SPENT) for score, _ in distinct(now.scores, REFITTED)]
             break
         count = REFITTED if not best.added else REFITTED - 1
         proposals, enough = _proposals(here.model, replace(now, added=here.added), count, here.chi2)

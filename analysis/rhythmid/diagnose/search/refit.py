@@ -28,7 +28,7 @@ from rhythmid.progress import Tell, counted, silent
 Array = NDArray[np.float64]
 SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
 STEEP = 0.8  # of chi2, below which as many iterations as in a sketch have to bring a descent that goes on
-PROMISING = 0.3  # share of the spread of chi2 within which a model is carried to convergence
+CARRIED_ON = 0.3  # share of the spread of chi2 within which a model is carried to convergence
 # share of its ceiling, above which the best of a round has found so little that all minima of all trials are gone through
 LITTLE = 0.5
 HOPS = 12  # at most, from one minimum to the next
@@ -262,7 +262,7 @@ def run_trials(
 def _promising(trial: Trial, trials: Sequence[Trial]) -> bool:
     """Whether a trial is near the best of all."""
     best, worst = min(one.chi2 for one in trials), max(one.chi2 for one in trials)
-    return trial.chi2 - best <= PROMISING * max(worst - best, trial.samples)
+    return trial.chi2 - best <= CARRIED_ON * max(worst - best, trial.samples)
 
 
 def whole_fit(

@@ -68,6 +68,7 @@ ELEMENT = Element(
     states=("position", "velocity"),
     initial=lambda x, v, f, mass, frequency, damping_ratio, step: (x, v),
     size="mass",
+    width="damping_ratio",
     starts=starts,
     # slower than the motion it is a mass at rest, and its damper a viscous one; faster than the samples, an added mass;
     # overdamped, something that relaxes

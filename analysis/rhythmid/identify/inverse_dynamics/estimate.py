@@ -72,10 +72,6 @@ class EffortFit:
         """rms of the residual, in the effort's unit."""
         return float(np.sqrt(np.mean(self.residual**2)))
 
-    def std_of(self, name: str) -> float:
-        """Standard deviation of one estimated parameter."""
-        return float(self.std[1 + self.names.index(name)])
-
 
 def size_of(balance: Balance) -> float:
     """Size (rms) of the recorded effort at the rows; of a constant effort it is that constant."""
