@@ -75,7 +75,7 @@ def test_a_further_effect_has_to_gain_more_than_a_small_share_of_what_is_explain
     assert found(monkeypatch, 2e5, gain) == ORDER[:granted]  # 100 is the share of 200 000
 
 
-@pytest.mark.parametrize(("gain", "granted"), [(15.0, 0), (60.0, 1)])
+@pytest.mark.parametrize(("gain", "granted"), [(20.0, 0), (60.0, 1)])
 def test_the_first_effect_has_to_gain_more_than_a_difference_that_tells_nothing(monkeypatch, gain, granted):
     # its two parameters cost 15 of the criterion
     assert found(monkeypatch, gain) == ORDER[:granted]

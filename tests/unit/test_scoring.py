@@ -10,7 +10,8 @@ from answers import diagnosed
 from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.diagnose import diagnosis as module
 from rhythmid.diagnose import scoring
-from rhythmid.diagnose.diagnosis import diagnose
+from rhythmid.diagnose.answer.result import FitQuality
+from rhythmid.diagnose.diagnosis import Answer, diagnose
 from rhythmid.diagnose.scoring import ALL_THE_SAME, FOLLOWS, FREE_RUN, INTEGRATES, Scoring, settle
 from rhythmid.identify.multiple_shooting import forgets
 from rhythmid.identify.series import prepare
@@ -198,3 +199,48 @@ def test_windows_are_the_way_to_score_where_they_lower_the_error_to_less_than_60
     monkeypatch, errors, kept
 ):
     assert tried(monkeypatch, *errors)[0] == kept
+
+
+def asked(monkeypatch: pytest.MonkeyPatch, means: bool, share: float, error: float = 0.2) -> list[str]:
+    """What is scored, in order, where nothing is named and the model does not follow the machine in free run.
+
+    `means` says whether a free run means something, `share` is the effort's of the inertial force, `error` what is left of it.
+    """
+    order: list[str] = []
+
+    def by_effort(*_) -> Answer:
+        order.append("effort")
+        fit = FitQuality(error, error)
+        found = diagnosed("undecided", kind="effort")
+        found = replace(found, fit={"refitted_nominal": fit, "augmented": fit})
+        return Answer(found, hopper(), SimpleNamespace())  # type: ignore[arg-type]
+
+    def free_run(_, scoring) -> SimpleNamespace:
+        order.append(scoring.kind)
+        return SimpleNamespace(search=SimpleNamespace(fit=SimpleNamespace(model=hopper())))
+
+    effort = SimpleNamespace(applies=True, free_run_means_something=means, effort_share=share)
+    monkeypatch.setattr(module, "applicable", lambda *_: effort)
+    monkeypatch.setattr(module, "_by_effort", by_effort)
+    monkeypatch.setattr(
+        module, "settle", lambda *given: [SimpleNamespace(kind="windows")] if given[-1] else []
+    )
+    monkeypatch.setattr(module, "free_run", free_run)
+    monkeypatch.setattr(module, "compose", lambda *_: diagnosed("undecided", kind="windows"))
+    found = diagnose(records(hopper(), SHORT[2:]), hopper(), catalogue=CATALOGUE).diagnosis
+    assert found.scoring.kind == order[0]
+    return order
+
+
+@pytest.mark.parametrize(("left", "expected"), [(0.02, ["effort"]), (0.2, ["effort", "windows"])])
+def test_windows_are_tried_where_the_effort_is_left_by_more_than_models_of_real_machines_leave(
+    monkeypatch, left, expected
+):
+    assert asked(monkeypatch, False, 2.0, left) == expected
+
+
+@pytest.mark.parametrize(("share", "expected"), [(1.5, ["effort", "windows"]), (0.5, ["windows", "effort"])])
+def test_an_effort_that_moves_the_machine_comes_before_windows_and_one_beside_which_it_swings_after(
+    monkeypatch, share, expected
+):
+    assert asked(monkeypatch, True, share) == expected
