@@ -158,7 +158,7 @@ def resting(error_at_rest, least):
     """Log density of errors of unit scale with one block at rest, where the model errs by this."""
     error = np.random.default_rng(5).standard_t(4, 600)
     error[200:250] = error_at_rest
-    none = Linearised.without_priors(error, np.zeros((600, 0)))
+    none = Linearised(error, np.zeros((600, 0)), np.zeros(0), np.zeros(0))
     return predict([none], Blocks.of(rows_of([600]), least=least), rows_of([600]))[0].score
 
 

@@ -169,6 +169,9 @@ def tried(monkeypatch: pytest.MonkeyPatch, *errors: float) -> tuple[list[float],
     monkeypatch.setattr(scoring, "calibrate", calibrated)
     monkeypatch.setattr(scoring, "_error", lambda fit: fit.error)
     monkeypatch.setattr(scoring, "hold_out_tail", lambda cut: (cut, ()))
+    monkeypatch.setattr(
+        scoring, "with_zeros", lambda calibration, _, unseen, *__: (calibration, list(unseen))
+    )
     found = settle(hopper(), [], [], CATALOGUE)
     return [one.error for one in found], asked
 
@@ -219,7 +222,7 @@ def asked(monkeypatch: pytest.MonkeyPatch, means: bool, share: float, error: flo
         order.append(scoring.kind)
         return SimpleNamespace(search=SimpleNamespace(fit=SimpleNamespace(model=hopper())))
 
-    effort = SimpleNamespace(applies=True, free_run_means_something=means, effort_share=share)
+    effort = SimpleNamespace(applies=True, free_run_means_something=means, effort_share=share, balance=None)
     monkeypatch.setattr(module, "applicable", lambda *_: effort)
     monkeypatch.setattr(module, "_by_effort", by_effort)
     monkeypatch.setattr(

@@ -291,7 +291,7 @@ def test_one_effect_is_and_two_are_too_uncertain_to_be_named():
 
 def test_names_that_are_not_separated_are_listed_with_and_and_alternatives_with_or():
     groups = (("friction", "bouc_wen"), ("a", "b", "c"))
-    assert "do not separate friction and bouc wen; nor a, b and c." in named_beside(0, groups)
+    assert "do not separate friction and Bouc-Wen; nor a, b and c." in named_beside(0, groups)
     assert listed(("a",)) == "a" and listed(("a", "b_c", "d"), "or") == "a, b c or d" and listed(()) == ""
 
 

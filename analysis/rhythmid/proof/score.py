@@ -229,7 +229,8 @@ def by_effort(answer: dict[str, Any]) -> bool:
 
 
 def _heldout(truth: dict[str, Any], answer: dict[str, Any]) -> float | None:
-    if by_effort(answer):
+    # where an effort was recorded, its own noise moves a free run
+    if by_effort(answer) or (truth.get("rig") or {}).get("recorded") == "effort":
         return None
     error = ((answer.get("fit") or {}).get("augmented") or {}).get("heldout_nrmse")
     floor = truth["floors"].get(str(answer.get("block")))
