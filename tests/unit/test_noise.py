@@ -55,3 +55,10 @@ def test_a_constant_residual_does_not_divide_by_zero():
 def test_runs_are_the_unbroken_stretches():
     used = np.array([1, 1, 0, 1, 0, 0, 1], bool)
     assert [(s.start, s.stop) for s in runs(used)] == [(0, 2), (3, 4), (6, 7)]
+
+
+@pytest.mark.parametrize("length", [0, 1, 2, 3])
+def test_stretches_no_longer_than_the_noise_remembers_are_whitened_as_the_beginning_of_longer_ones(length):
+    model = NoiseModel(np.array([0.5, -0.2, 0.1]), 0.3)
+    samples = np.random.default_rng(0).standard_normal(20)
+    assert model.whiten(samples[:length]) == pytest.approx(model.whiten(samples)[:length])

@@ -62,6 +62,8 @@ class NoiseModel:
         white = np.empty_like(samples, dtype=float)
         for k, (predictor, std) in enumerate(self._beginnings[:n]):
             white[k] = (samples[k] - predictor @ samples[:k][::-1]) / std
+        if n <= p:
+            return white
         after = samples[p:].astype(float)
         for lag, coefficient in enumerate(self.coefficients, start=1):
             after -= coefficient * samples[p - lag : n - lag]
