@@ -3,7 +3,8 @@
 A zero of each record is a hypothesis like any other. It is not missing physics, and what it can do, physics can do as well:
 the mean of a motion shifts with its amplitude where a stiffness is not symmetric. So it is adopted, for all hypotheses alike, where
 it predicts data that the fit has not seen decisively better, both beside the nominal model and beside the effect of the catalogue that
-explains the records best. The output is linear in its zeros, so that cross-validation to first order is exact in them.
+explains the records best, and where with both the machine is followed: a zero is a calibration, and does not stand for a machine that
+has changed from record to record. The output is linear in its zeros, so that cross-validation to first order is exact in them.
 """
 
 import math
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.baseline import Calibration
-from rhythmid.diagnose.constants import PRACTICAL
+from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
 from rhythmid.diagnose.contenders import Rows, linearised, rows_of
 from rhythmid.diagnose.evidence import Linearised, predict, weight_for
 from rhythmid.diagnose.location import FreeMap, Reach, beside, following, reach_of
@@ -65,11 +66,14 @@ class _Seen:
         return beside(self.fit, self.base, FreeMap("zero", columns, none, none), self.rows, self.reach)
 
 
-def _told(seen: _Seen) -> bool:
-    """Whether zeros predict unseen data decisively better than the fit alone, and by a practical size."""
+def _told(seen: _Seen, most: float = math.inf) -> bool:
+    """Whether zeros predict unseen data decisively better than the fit alone, and by a practical size; with an error of `most` at
+    the most, as a share of the motion."""
     found = predict([seen.with_zeros(), seen.base], seen.rows.blocks, seen.rows.record)
+    size = seen.rows.size / seen.rows.noise.std  # errors are in units of the noise
     removed = found[1].mean_square - found[0].mean_square
-    return weight_for(found[0], found[1]) > decisive(1) and removed > (PRACTICAL * seen.rows.size) ** 2
+    decided = weight_for(found[0], found[1]) > decisive(1) and removed > (PRACTICAL * size) ** 2
+    return decided and found[0].mean_square < (most * size) ** 2
 
 
 def with_zeros(
@@ -91,7 +95,7 @@ def with_zeros(
         return kept
     tell("the output's zero seems to differ from record to record; looking for an effect that says the same")
     known = catalogue.within(scales(series, fit.model))
-    if not _told(_Seen.of(search(series, fit, given, known, pool, tell, most=1).fit, pool)):
+    if not _told(_Seen.of(search(series, fit, given, known, pool, tell, most=1).fit, pool), FOLLOWS):
         return kept
     tell("refitting with a zero of each record")
     try:
