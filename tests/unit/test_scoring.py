@@ -12,7 +12,7 @@ from rhythmid.diagnose import diagnosis as module
 from rhythmid.diagnose import scoring
 from rhythmid.diagnose.answer.result import FitQuality
 from rhythmid.diagnose.diagnosis import Answer, diagnose
-from rhythmid.diagnose.scoring import ALL_THE_SAME, FOLLOWS, FREE_RUN, INTEGRATES, Scoring, settle
+from rhythmid.diagnose.scoring import DISTURBED_FREE_RUN, FOLLOWS, FREE_RUN, INTEGRATES, Scoring, settle
 from rhythmid.identify.multiple_shooting import forgets
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
@@ -80,7 +80,7 @@ def test_a_free_run_that_follows_a_machine_that_integrates_comes_after_the_windo
     value = value + 1e-3 * np.random.default_rng(1).standard_normal(len(time))
     found = settle(cart, prepare([Record("cart", Channel(time, value, "m"), pushed)]), [], CATALOGUE)
     assert [one.kind for one in found] == ["windows", "free_run"]
-    assert found[0].reason.endswith(INTEGRATES) and found[1].reason == ALL_THE_SAME
+    assert found[0].reason.endswith(INTEGRATES) and found[1].reason == DISTURBED_FREE_RUN
     assert found[1].calibration.fit.nrmse() < FOLLOWS
 
 

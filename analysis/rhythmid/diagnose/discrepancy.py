@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi2
 
+from rhythmid.identify.least_squares import orthonormal
+
 Array = NDArray[np.float64]
 # chance that noise alone makes a scale other than nothing as likely as that: below it nothing is added
 CHANCE = 0.05
 # decades of the candidates' common scale that are looked through, about the one at which they are as large as the residual
 DECADES = 4.0
-FAINT = 1e-6  # of a candidate, below which what the parameters leave of it is rounding
+ROUNDING = 1e-6  # of a candidate, below which what the parameters leave of it is rounding
 
 
 def mean_product(jacobian: Array, residual: Array, candidates: Array, inverse: Array) -> Array:
@@ -35,7 +37,7 @@ def mean_product(jacobian: Array, residual: Array, candidates: Array, inverse: A
     """
     size = np.linalg.norm(candidates, axis=0)
     columns = candidates[:, size > 0.0] / size[size > 0.0]
-    basis = _span(jacobian)
+    basis = orthonormal(jacobian)
     left = columns - basis @ (basis.T @ columns)
     rest = residual - basis @ (basis.T @ residual)
     free = len(rest) - basis.shape[1] - left.shape[1]
@@ -43,7 +45,7 @@ def mean_product(jacobian: Array, residual: Array, candidates: Array, inverse: A
         return np.zeros_like(inverse)
     # in these directions the residual is what is missing and noise, in all others noise
     directions, strengths, mixing = np.linalg.svd(left, full_matrices=False)
-    seen = strengths > FAINT
+    seen = strengths > ROUNDING
     shown, strengths = -(directions[:, seen].T @ rest), strengths[seen]
     # what is left may be more than the noise was taken for, and neighbouring rows may repeat one another, so that all are less
     noise = max((float(rest @ rest) - float(shown @ shown)) / free, 1.0)
@@ -55,15 +57,6 @@ def mean_product(jacobian: Array, residual: Array, candidates: Array, inverse: A
     spread = scale**2 * (np.eye(len(mean)) - (mixing[seen].T * (share * strengths)) @ mixing[seen])
     moved = inverse @ (jacobian.T @ columns)
     return moved @ (spread + np.outer(mean, mean)) @ moved.T
-
-
-def _span(columns: Array) -> Array:
-    """Orthonormal basis (n, r) of what these columns (n, p) span."""
-    norms = np.linalg.norm(columns, axis=0)
-    if not np.any(norms > 0.0):
-        return np.zeros((len(columns), 0))
-    left, singular, _ = np.linalg.svd(columns[:, norms > 0.0] / norms[norms > 0.0], full_matrices=False)
-    return left[:, singular > 1e-9 * singular[0]]
 
 
 def _scale(shown: Array, strengths: Array, noise: float) -> float:

@@ -30,7 +30,14 @@ from rhythmid.diagnose.scoring import Scoring
 from rhythmid.diagnose.search.forward import Search, search
 from rhythmid.diagnose.search.refit import reach_of, whole_fit
 from rhythmid.diagnose.search.round import distinct
-from rhythmid.diagnose.search.score_tests import Trajectories, changes_of, projected, trajectories, under
+from rhythmid.diagnose.search.score_tests import (
+    Trajectories,
+    changes_of,
+    projected,
+    trajectories,
+    under,
+    whitened,
+)
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.shape import shape_of
@@ -153,7 +160,7 @@ def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.floa
     if not changes or not known.any():
         return made
     line = fit.linearisation
-    columns = np.column_stack([projected(fit, one) for one in changes])
+    columns = np.column_stack([projected(fit, whitened(fit, one.outputs, fit.noise)) for one in changes])
     priors = [fit.model.parameters[name].prior for name, one in zip(fit.names, known) if one]
     inverse = covariance_of(line.jacobian[:, known], priors)
     made[np.ix_(known, known)] = mean_product(line.jacobian[:, known], line.residual, columns, inverse)

@@ -118,10 +118,10 @@ def _over_simpler(claim: Claim) -> float:
 def _needed_over_simpler(claim: Claim) -> float:
     if claim.simpler is None or not special_case(claim.simpler, claim.hypothesis):
         return decisive(1)
-    return decisive(1) if _stands_for_nothing(claim, claim.simpler) else APART
+    return decisive(1) if _leaves_most(claim, claim.simpler) else APART
 
 
-def _stands_for_nothing(claim: Claim, simpler: Hypothesis) -> bool:
+def _leaves_most(claim: Claim, simpler: Hypothesis) -> bool:
     """Whether a simpler law leaves most of the mismatch, most of which the richer one removes: it is no name for what is missing,
     though the two may be hard to tell apart."""
     left = simpler.prediction.mean_square - claim.floor

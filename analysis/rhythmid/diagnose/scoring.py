@@ -31,7 +31,9 @@ INTEGRATES = (
 )
 FREE_RUN = "the model follows the machine in free run"
 LOSES = "in free run the nominal model does not follow the machine"
-ALL_THE_SAME = "the model follows the machine in free run, although every small disturbance adds up there"
+DISTURBED_FREE_RUN = (
+    "the model follows the machine in free run, although every small disturbance adds up there"
+)
 
 
 @dataclass(frozen=True)
@@ -103,14 +105,14 @@ def settle(
     longest, best = tried[0], tried[-1]
     if longest.kind != "free_run":
         chosen = longest if best.error >= BETTER_TOGETHER * longest.error else best
-        return (chosen, *_all_the_same(model, series, separate, catalogue, pool, tell))
+        return (chosen, *_disturbed_free_run(model, series, separate, catalogue, pool, tell))
     if best.error >= BETTER_TOGETHER * longest.error:
         return (longest,)
     near = longest.calibration.fit.nrmse() < HOPELESS
     return (best, longest) if near and best is not longest else (best,)
 
 
-def _all_the_same(
+def _disturbed_free_run(
     model: Model,
     series: Sequence[Series],
     separate: Sequence[Series],
@@ -132,7 +134,7 @@ def _all_the_same(
         return ()
     if calibration.reconstructed:
         unseen = [reconstructed(one) for one in unseen]
-    return (Scoring(calibration, tuple(unseen), "free_run", ALL_THE_SAME),)
+    return (Scoring(calibration, tuple(unseen), "free_run", DISTURBED_FREE_RUN),)
 
 
 @dataclass(frozen=True)

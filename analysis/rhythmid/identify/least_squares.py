@@ -23,3 +23,12 @@ def reduced(parts: Iterable[tuple[Array, Array]], most: int = KEPT_ROWS) -> tupl
             kept = [np.asarray(np.linalg.qr(np.concatenate(kept), mode="r"))]
     joined = np.concatenate(kept)
     return np.ascontiguousarray(joined[:, :-1]), joined[:, -1].copy()
+
+
+def orthonormal(columns: Array) -> Array:
+    """Orthonormal basis (n, r) of what these columns (n, p) span; those that depend on others, or are nothing, add nothing."""
+    norms = np.linalg.norm(columns, axis=0)
+    if not np.any(norms > 0.0):
+        return np.zeros((len(columns), 0))
+    left, singular, _ = np.linalg.svd(columns[:, norms > 0.0] / norms[norms > 0.0], full_matrices=False)
+    return left[:, singular > 1e-9 * singular[0]]

@@ -31,6 +31,7 @@ BLOCKS = 4  # of a segment at least
 KICKS = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # candidates, of the usual speed in a segment
 TUNED = 60  # segments that random forces are tuned on
 PASSES = 3  # for each candidate, at most
+FORCE_PASSES = 3  # in which the constant force is learnt, each with a filter tuned to what is left of it
 CLOSE = 0.1  # change of the noise's variance from pass to pass that is none
 SETTLED = 15  # segments until the beginning is forgotten, three of the seconds of which a minute has sixty
 ROUGH = 3  # differences of the measurement that leave noise and take motion away
@@ -67,6 +68,30 @@ class Calibration:
         return self.filter.samples * self.period
 
 
+@dataclass(frozen=True)
+class Stretch:
+    """Samples of the healthy machine, taken in segments of `size` samples and averaged over blocks of `block` of them."""
+
+    output: Samples
+    command: Samples
+    forcing: Samples | None
+    block: int
+    size: int
+
+    @property
+    def pieces(self) -> list[slice]:
+        """The samples of each segment."""
+        return segments(self.output.time, self.size)
+
+    def innovations(self, observer: Observer, pieces: Sequence[slice]) -> list[Innovations]:
+        """What an observer finds of these segments, without those that it cannot follow."""
+        found = [
+            observer.take(self.output.time[at], self.output.value[at], self.command, self.forcing)
+            for at in pieces
+        ]
+        return [one for one in found if one is not None]
+
+
 def segments(time: Array, size: int) -> list[slice]:
     """Whole segments of so many samples."""
     return [slice(i, i + size) for i in range(0, len(time) - size + 1, size)]
@@ -97,17 +122,17 @@ def calibrate(
     extended, changes = watched(model, catalogue, speed, settings.input_kind)
     simulation = Simulation(extended, changes, settings, period)
     scatter = _scatter(simulation, output, period, settings)
-    pieces = segments(output.time, size)
+    stretch = Stretch(output, command, forcing, block, size)
     force = model.mass.value * speed**2 / max(float(np.std(output.value)), 1e-300)
     sizes = np.array([_size(extended.value(c.name), c, force, speed, scatter[0]) for c in changes])
-    filter, found = _followed(simulation, output, command, forcing, pieces, block, size, scatter, sizes)
-    for _ in range(PASSES):
+    filter, found = _followed(simulation, stretch, scatter, sizes)
+    for _ in range(FORCE_PASSES):
         constant, share = _constant_force(found, changes)
         if share < UNNOTICED:
             break
         extended = extended.with_values({CONSTANT: extended.value(CONSTANT) + constant})
         simulation = Simulation(extended, changes, settings, period)
-        filter, found = _followed(simulation, output, command, forcing, pieces, block, size, scatter, sizes)
+        filter, found = _followed(simulation, stretch, scatter, sizes)
     noise = estimate_noise([np.concatenate([one.white for one in found])])
     whitener = Whitener(noise, len(changes))
     scores = [whitener(one) for one in found]
@@ -151,28 +176,12 @@ def _size(value: float, change: Change, force: float, speed: float, position: fl
     return position if unit in ("m", "rad") else 1.0
 
 
-def _innovations(
-    observer: Observer, output: Samples, command: Samples, forcing: Samples | None, pieces: Sequence[slice]
-) -> list[Innovations]:
-    found = [observer.take(output.time[at], output.value[at], command, forcing) for at in pieces]
-    return [one for one in found if one is not None]
-
-
 def _followed(
-    simulation: Simulation,
-    output: Samples,
-    command: Samples,
-    forcing: Samples | None,
-    pieces: Sequence[slice],
-    block: int,
-    size: int,
-    scatter: Array,
-    sizes: Array,
+    simulation: Simulation, stretch: Stretch, scatter: Array, sizes: Array
 ) -> tuple[Filter, list[Innovations]]:
     """The filter tuned to the machine, and its innovations with what changes do to them, once the beginning is forgotten."""
-    filter = _tuned(simulation, output, command, forcing, pieces, block, size, scatter)
-    observer = Observer(simulation, filter, sizes)
-    return filter, _innovations(observer, output, command, forcing, pieces)[SETTLED:]
+    filter = _tuned(simulation, stretch, scatter)
+    return filter, stretch.innovations(Observer(simulation, filter, sizes), stretch.pieces)[SETTLED:]
 
 
 def _constant_force(found: Sequence[Innovations], changes: Sequence[Change]) -> tuple[float, float]:
@@ -189,29 +198,20 @@ def _constant_force(found: Sequence[Innovations], changes: Sequence[Change]) -> 
     return force, force**2 * information / max(float(white @ white), 1e-300)
 
 
-def _tuned(
-    simulation: Simulation,
-    output: Samples,
-    command: Samples,
-    forcing: Samples | None,
-    pieces: Sequence[slice],
-    block: int,
-    size: int,
-    scatter: Array,
-) -> Filter:
+def _tuned(simulation: Simulation, stretch: Stretch, scatter: Array) -> Filter:
     """Noise and random forces under which the innovations are most likely.
 
     Each candidate of the forces is tried with the noise that its own innovations show.
     """
-    some = pieces[: SETTLED + TUNED]
-    averaged = output.value[: len(output.value) // block * block].reshape(-1, block).mean(axis=1)
+    some, block, value = stretch.pieces[: SETTLED + TUNED], stretch.block, stretch.output.value
+    averaged = value[: len(value) // block * block].reshape(-1, block).mean(axis=1)
     rough = float(np.var(np.diff(averaged, ROUGH)))
     noise = max(rough / comb(2 * ROUGH, ROUGH), (LEAST * scatter[0]) ** 2, 1e-300)
     best, best_density = None, -np.inf
     for kick in KICKS:
         for _ in range(PASSES):
-            given = Filter(noise, (kick * scatter[1]) ** 2, scatter, block, size)
-            found = _innovations(Observer(simulation, given, None), output, command, forcing, some)[SETTLED:]
+            given = Filter(noise, (kick * scatter[1]) ** 2, scatter, block, stretch.size)
+            found = stretch.innovations(Observer(simulation, given, None), some)[SETTLED:]
             if len(found) < len(some) // 2:
                 break
             squares = float(np.mean([np.mean(one.white**2) for one in found]))

@@ -11,7 +11,7 @@ from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.elements.places import SENTENCES
 from rhythmid.model import Model
-from rhythmid.report.quantity import in_words, rounded
+from rhythmid.report.quantity import in_words, number, rounded
 
 
 def location_of(
@@ -80,7 +80,9 @@ def summary_of(
             )
         left = decision.unexplained
         if left.significant and left.share > 0.0:
-            said += f" {100 * left.share:.0f} % of the mismatch is left and goes with {left.goes_with}."
+            said += (
+                f" {number(100.0 * left.share, 2)} % of the mismatch is left and goes with {left.goes_with}."
+            )
         return said
     if decision.verdict == "undecided":
         said = f"{decision.reason[:1].upper()}{decision.reason[1:]}."

@@ -14,6 +14,7 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import Alignment, EffortFit, size_of
+from rhythmid.identify.least_squares import orthonormal
 from rhythmid.identify.student import weights_of
 from rhythmid.model import INERTIA, Model
 from rhythmid.simulation.transport import INPUT_DELAY
@@ -119,7 +120,7 @@ def screen(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> list
     weight = weights_of(parent.residual, parent.scale) / parent.scale**2
     root = np.sqrt(weight)
     # priors are rows of their own
-    basis = _basis(np.vstack([parent.jacobian * root[:, None], np.diag(np.sqrt(parent.precision))]))
+    basis = orthonormal(np.vstack([parent.jacobian * root[:, None], np.diag(np.sqrt(parent.precision))]))
     target = np.concatenate([parent.residual * root, np.sqrt(parent.precision) * parent.departure])
     left = target - basis @ (basis.T @ target)
     base = balance.predicted(parent.model, parent.alignment)
@@ -167,12 +168,6 @@ def _column(balance: Balance, parent: EffortFit, start: Start, base: Array) -> A
     return balance.predicted(grown, parent.alignment) - base
 
 
-def _basis(columns: Array) -> Array:
-    norms = np.linalg.norm(columns, axis=0)
-    left, singular, _ = np.linalg.svd(columns[:, norms > 0.0] / norms[norms > 0.0], full_matrices=False)
-    return left[:, singular > 1e-9 * singular[0]]
-
-
 def late_start(balance: Balance, parent: EffortFit) -> tuple[Alignment, float]:
     """What a longer delay may be, and the one [s] that fits best beside the parent's parameters as they stand to first order."""
     most = max(LONGEST_DELAY / balance.bandwidth.dominant, 2.0 * balance.period)
@@ -181,7 +176,7 @@ def late_start(balance: Balance, parent: EffortFit) -> tuple[Alignment, float]:
     shift = balance.shift(parent.model)
     weight = weights_of(parent.residual, parent.scale) / parent.scale**2
     root = np.sqrt(weight)
-    basis = _basis(parent.jacobian[:, 1:] * root[:, None]) if parent.names else np.zeros((len(root), 0))
+    basis = orthonormal(parent.jacobian[:, 1:] * root[:, None]) if parent.names else np.zeros((len(root), 0))
     best, place = math.inf, parent.alignment
     for late in np.linspace(0.0, most, 1 + min(60, math.ceil(2.0 * most / balance.period))):
         error = root * (balance.rows(required, shift + float(late)) - balance.measured)

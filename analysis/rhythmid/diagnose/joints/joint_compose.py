@@ -159,8 +159,7 @@ def _summary(
     if unknown:
         words += f" At {', '.join(unknown)} something is missing that the catalogue does not know."
     if undecided:
-        reason = answers[undecided[0]].summary.removeprefix("Undecided: ")
-        words += f" At {', '.join(undecided)} the records do not decide: {reason}"
+        words += f" At {', '.join(undecided)} the records do not decide: {answers[undecided[0]].summary}"
     return words.strip() or "Nothing of practical size is missing at any joint."
 
 

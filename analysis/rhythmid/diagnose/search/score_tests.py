@@ -252,9 +252,8 @@ def whitened(fit: Fit, samples: Sequence[Array], noise: NoiseModel) -> list[Arra
     return found
 
 
-def projected(fit: Fit, change: Change) -> Array:
-    """A change (n,) as the fit's rows see it: whitened, what initial states can do projected out."""
-    white = whitened(fit, change.outputs, fit.noise)
+def projected(fit: Fit, white: Sequence[Array]) -> Array:
+    """A whitened change of each series as the fit's rows (n,) see it, what initial states can do projected out."""
     return np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])
 
 
@@ -327,7 +326,7 @@ def score(fit: Fit, changes: Sequence[Change]) -> list[Score]:
     for one in changes:
         white = whitened(fit, one.outputs, fit.noise)
         raw = math.sqrt(sum(float(w @ w) for w in white))
-        joined = np.concatenate([w - b @ (b.T @ w) for w, b in zip(white, fit.linearisation.bases)])
+        joined = projected(fit, white)
         change = joined - left @ (left.T @ joined)
         strength = float(change @ change)
         if not math.isfinite(strength) or raw == 0.0 or strength <= (1e-6 * raw) ** 2:

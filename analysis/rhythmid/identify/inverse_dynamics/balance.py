@@ -21,9 +21,9 @@ from rhythmid.identify.inverse_dynamics.motion import (
     high_pass,
     low_pass,
     motion_of,
-    runs,
     stretches,
 )
+from rhythmid.identify.noise import runs
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.record.record import Record
 from rhythmid.simulation.effect import MAX_STEP, Path, effect_along
@@ -340,7 +340,8 @@ def stuck(slow: Mask, memory: float) -> Mask:
     """Samples (n,) to leave out: all `slow` ones, and within half the filter's `memory` [samples] of a rest as long as that, for
     what the friction did meanwhile has come there through the filter."""
     out, half = slow.copy(), math.ceil(0.5 * memory)
-    for first, end in runs(slow):
+    for part in runs(slow):
+        first, end = part.start, part.stop
         if end - first >= memory:
             out[max(first - half, 0) : end + half] = True
     return out

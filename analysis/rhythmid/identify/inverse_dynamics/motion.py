@@ -19,6 +19,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
+from rhythmid.identify.noise import runs
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 from rhythmid.simulation.effect import Path, effect_along
@@ -130,11 +131,11 @@ def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> 
             drive = grid.input if grid.forcing is None else grid.input + grid.forcing
         bridged = short_gaps(grid.missing, int(longest / grid.period)) | (grid.missing & grid.valid)
         output, drive = (across(signal, ~grid.missing, bridged) for signal in (grid.output, drive))
-        for first, end in runs(~grid.missing | bridged):
+        for part in runs(~grid.missing | bridged):
+            first, end = part.start, part.stop
             if end - first < SHORTEST:
                 continue
-            part = slice(first, end)
-            spans = ((first + a - 1, first + b) for a, b in runs(bridged[part]))
+            spans = ((first + gap.start - 1, first + gap.stop) for gap in runs(bridged[part]))
             kind = record.input_kind if base else "force"
             found.append(
                 Stretch(
@@ -147,16 +148,11 @@ def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> 
     return found
 
 
-def runs(marked: Mask) -> list[tuple[int, int]]:
-    """Where samples (n,) are marked one after the other: of each run the first, and the one after its last."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(int), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-
-
 def short_gaps(missing: Mask, longest: int) -> Mask:
     """Samples (n,) in gaps of at most so many samples, with at least four recorded ones near either side."""
     found = np.zeros(len(missing), dtype=bool)
-    for first, end in runs(missing):
+    for gap in runs(missing):
+        first, end = gap.start, gap.stop
         beside = max(end - first, LEAST_BESIDE)
         before, after = ~missing[max(first - beside, 0) : first], ~missing[end : end + beside]
         if end - first <= longest and min(before.sum(), after.sum()) >= LEAST_BESIDE:
@@ -168,7 +164,8 @@ def across(signal: Array, recorded: Mask, bridged: Mask) -> Array:
     """A signal (n,) with its `bridged` runs on the polynomial through what is recorded on either side, by least squares: a spline
     through noisy samples would set out with the slope of their noise."""
     made = signal.copy()
-    for first, end in runs(bridged):
+    for gap in runs(bridged):
+        first, end = gap.start, gap.stop
         beside = max(end - first, LEAST_BESIDE)
         near = np.arange(max(first - beside, 0), min(end + beside, len(signal)))
         near = near[recorded[near]]
