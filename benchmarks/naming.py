@@ -31,9 +31,10 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  #
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.excitation.sequence import build
-from rhythmid.experiment import Delay, Experiment, Forcing, Noise, TimeMode, perform
+from rhythmid.experiment import Delay, Experiment, Forcing, Noise, TimeMode
 from rhythmid.identify.identify import paper_hopper
 from rhythmid.model import Model
+from rhythmid.offline_run import perform
 from rhythmid.record.bag_writer import write_bag
 from rhythmid.record.read import load_records
 from rhythmid.record.record import Record

@@ -77,3 +77,14 @@ def verdict(made: Contest, detectable: float = SEEN) -> tuple[str, tuple[str, ..
     """The verdict that a user reads, and the names that come with it."""
     decision = decided(made, detectable)[1]
     return decision.verdict, decision.named
+
+
+NOMINAL = supposed("", predicted(1.0))
+LEFT_BY_FRICTION = 0.1
+NAMED = ("missing_physics", ("friction",))  # what `verdict` gives for it
+NOTHING = ("consistent", ())
+
+
+def friction(mean_square: float = LEFT_BY_FRICTION, **changes) -> Hypothesis:
+    """A model with friction, of this mean squared error."""
+    return supposed("friction", predicted(mean_square, changes.pop("score", None)), **changes)

@@ -6,10 +6,11 @@ from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.excitation.sequence import build
-from rhythmid.experiment import Delay, Experiment, Forcing, Noise, TimeMode, perform
+from rhythmid.experiment import Delay, Experiment, Forcing, Noise, TimeMode
 from rhythmid.identify.output_error import Fit
 from rhythmid.identify.start_cost import felt_starts, start_cost
 from rhythmid.model import Model
+from rhythmid.offline_run import perform
 from rhythmid.record.record import Channel, Record
 
 CATALOGUE = load_catalogue()

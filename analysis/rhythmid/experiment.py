@@ -21,7 +21,6 @@ from rhythmid.errors import InputError
 from rhythmid.excitation.excitation import Excitation
 from rhythmid.excitation.sequence import IN_FOLDER, AnyExcitation
 from rhythmid.model import Model
-from rhythmid.record.messages import Messages
 from rhythmid.settings import KEYS, Delay, Forcing, Noise, Recording, Safety, TimeMode
 from rhythmid.validation import ByShape, InKeys, Number, Plain, Whole, validated
 
@@ -262,41 +261,6 @@ def ramped(
     if safety.ramp > 0.0:
         value = value * np.clip(np.minimum(time, duration - time) / safety.ramp, 0.0, 1.0)
     return np.clip(value, -safety.max_effort, safety.max_effort)
-
-
-def perform(experiment: Experiment) -> dict[str, Messages]:
-    """Run the experiment without ROS: what each topic of the graph carries, by topic name within the namespace.
-
-    Equals the graph's lockstep run, sample by sample and stamp by stamp. Raises InputError for a run too long to keep.
-    """
-    # the compiler behind the plant is slow to load, and most nodes need no plant
-    from rhythmid.simulation.command_hold import RAMP, CommandHold
-    from rhythmid.simulation.plant import Plant
-
-    if experiment.count > LONGEST_RUN:
-        raise InputError(
-            f"{experiment.count} samples are too many to simulate at once; the limit is {LONGEST_RUN}"
-        )
-    period = experiment.time.period_ns
-    stamps = np.arange(experiment.count, dtype=np.int64) * period
-    time = (stamps * 1e-9).astype(np.float64)
-    effort = ramped(experiment.excitation, experiment.safety, time, experiment.count * period * 1e-9)
-    arrival = experiment.input_delay.release(stamps)
-    plant = Plant(experiment.plant_model, period, experiment.seed, experiment.initial)
-    plant.push_many(*CommandHold(experiment.safety.command_timeout, RAMP, period).fill(arrival, effort))
-    samples = plant.advance(int(stamps[-1]))
-    seen = experiment.measurement_delay.release(stamps)
-    return {
-        "excitation": Messages(stamps, effort=effort),
-        "command": Messages(arrival, effort=effort),
-        "forcing": Messages(stamps, effort=samples.forcing),
-        "plant/joint_states": Messages(
-            stamps, position=samples.position, velocity=samples.velocity, effort=samples.effort
-        ),
-        "joint_states": Messages(
-            seen, position=samples.position, velocity=samples.velocity, effort=samples.effort
-        ),
-    }
 
 
 def _of_seconds(value: float) -> float:

@@ -5,10 +5,10 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Any, cast
 
 import yaml
-from pydantic import ConfigDict, Field, StrictBool, TypeAdapter
+from pydantic import ConfigDict, TypeAdapter
 
 from rhythmid.document import Node, parse, read
 from rhythmid.elements.candidates import Setting
@@ -17,31 +17,12 @@ from rhythmid.elements.element import SLOTS, Against, Element, Parameter
 from rhythmid.errors import InputError
 from rhythmid.output import write_text
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
-from rhythmid.validation import NUMBER, Number, Range, Word, validated
+from rhythmid.validation import validated
+from rhythmid.value import Value, entry_of, value_of
 
 INERTIA = "inertia.mass"
 CONTROLLER = "position_control"  # what an element that acts on a controller's measurements asks for where there is none
 MASS = Parameter("mass", "kg", "inertia", bounds=(0.0, math.inf))
-
-
-@dataclass(frozen=True)
-class Prior:
-    """Gaussian knowledge of a parameter before the data."""
-
-    __pydantic_config__ = ConfigDict(extra="forbid")
-    mean: Number
-    std: Annotated[Number, Field(gt=0)]
-
-
-@dataclass(frozen=True)
-class Value:
-    """A parameter's value in a model; one that is not `fixed` is estimated."""
-
-    value: float
-    unit: str
-    fixed: bool = False
-    bounds: tuple[float, float] = (-math.inf, math.inf)
-    prior: Prior | None = None
 
 
 @dataclass(frozen=True)
@@ -277,30 +258,6 @@ def _body(term: Term) -> dict[str, Any]:
     return body | ({"against": "room"} if term.against == "room" else {})
 
 
-def entry_of(value: Value, usual: Parameter) -> dict[str, Any]:
-    """A parameter as a file holds it, without what is usual."""
-    entry: dict[str, Any] = {"value": float(value.value), "unit": value.unit}
-    if value.fixed or usual.fixed:
-        entry["fixed"] = value.fixed
-    if tuple(value.bounds) != tuple(usual.bounds):
-        entry["bounds"] = [float(value.bounds[0]), float(value.bounds[1])]
-    if value.prior is not None:
-        entry["prior"] = {"mean": float(value.prior.mean), "std": float(value.prior.std)}
-    return entry
-
-
-@dataclass(frozen=True)
-class _Entry:
-    """A parameter as it is written: {value: …, unit: …}."""
-
-    __pydantic_config__ = ConfigDict(extra="forbid")
-    value: Number
-    unit: Word | None = None
-    fixed: StrictBool | None = None
-    bounds: Range | None = None
-    prior: Prior | None = None
-
-
 @dataclass(frozen=True)
 class _UnitNames:
     __pydantic_config__ = ConfigDict(extra="forbid")
@@ -310,24 +267,7 @@ class _UnitNames:
 
 
 _AGAINST: TypeAdapter[Against] = TypeAdapter(Against)
-_ENTRY: TypeAdapter[_Entry] = TypeAdapter(_Entry)
 _UNIT_NAMES: TypeAdapter[_UnitNames] = TypeAdapter(_UnitNames)
-
-
-def value_of(node: Node, parameter: Parameter, units: Units) -> Value:
-    """Parameter from `{value: …, unit: …}` or from a bare number in the machine's own units."""
-    whole = isinstance(node.value, dict)
-    given = validated(node, _ENTRY) if whole else _Entry(validated(node, NUMBER))
-    unit = units.of(parameter.unit)
-    if given.unit is not None:
-        units.check(given.unit, parameter.unit, f"{node.at('unit').place}: {node.path}")
-    low, high = parameter.bounds
-    if given.bounds is not None:
-        low, high = max(given.bounds[0], low), min(given.bounds[1], high)
-    if not low <= given.value <= high:
-        node.fail(f"{given.value:g} {unit} is outside [{low:g}, {high:g}] ({parameter.description})")
-    fixed = parameter.fixed if given.fixed is None else given.fixed
-    return Value(given.value, unit, fixed, (low, high), given.prior)
 
 
 def _units(document: dict[str, Node], mass: Node) -> Units:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from rhythmid.elements.catalogue import load_catalogue
-from rhythmid.experiment import Experiment, perform
+from rhythmid.errors import InputError
+from rhythmid.experiment import LONGEST_RUN, Experiment, ramped
 from rhythmid.model import Model
 from rhythmid.output import require_new
 from rhythmid.plain_yaml import plain_yaml
@@ -192,3 +193,38 @@ def _described(
     if elements:
         content["elements"] = [*content.get("elements", ()), *elements]
     return Experiment.from_text(plain_yaml(content, "experiment"))
+
+
+def perform(experiment: Experiment) -> dict[str, Messages]:
+    """Run the experiment without ROS: what each topic of the graph carries, by topic name within the namespace.
+
+    Equals the graph's lockstep run, sample by sample and stamp by stamp. Raises InputError for a run too long to keep.
+    """
+    # the compiler behind the plant is slow to load, and most nodes need no plant
+    from rhythmid.simulation.command_hold import RAMP, CommandHold
+    from rhythmid.simulation.plant import Plant
+
+    if experiment.count > LONGEST_RUN:
+        raise InputError(
+            f"{experiment.count} samples are too many to simulate at once; the limit is {LONGEST_RUN}"
+        )
+    period = experiment.time.period_ns
+    stamps = np.arange(experiment.count, dtype=np.int64) * period
+    time = (stamps * 1e-9).astype(np.float64)
+    effort = ramped(experiment.excitation, experiment.safety, time, experiment.count * period * 1e-9)
+    arrival = experiment.input_delay.release(stamps)
+    plant = Plant(experiment.plant_model, period, experiment.seed, experiment.initial)
+    plant.push_many(*CommandHold(experiment.safety.command_timeout, RAMP, period).fill(arrival, effort))
+    samples = plant.advance(int(stamps[-1]))
+    seen = experiment.measurement_delay.release(stamps)
+    return {
+        "excitation": Messages(stamps, effort=effort),
+        "command": Messages(arrival, effort=effort),
+        "forcing": Messages(stamps, effort=samples.forcing),
+        "plant/joint_states": Messages(
+            stamps, position=samples.position, velocity=samples.velocity, effort=samples.effort
+        ),
+        "joint_states": Messages(
+            seen, position=samples.position, velocity=samples.velocity, effort=samples.effort
+        ),
+    }

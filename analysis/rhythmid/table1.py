@@ -11,10 +11,11 @@ from rich.console import Console
 from threadpoolctl import threadpool_limits
 
 from rhythmid.errors import InputError
-from rhythmid.experiment import Experiment, perform
+from rhythmid.experiment import Experiment
 from rhythmid.identify.identification import Identification
 from rhythmid.identify.identify import identify, paper_hopper
 from rhythmid.ltp.htf import theoretical_htf
+from rhythmid.offline_run import perform
 from rhythmid.parallel import fork_map
 from rhythmid.progress import Tell, counted, silent
 from rhythmid.record.bag_writer import write_bag

@@ -14,7 +14,8 @@ from importlib.resources import files
 import numpy as np
 
 from rhythmid.errors import InputError
-from rhythmid.experiment import Experiment, perform
+from rhythmid.experiment import Experiment
+from rhythmid.offline_run import perform
 from rhythmid.parallel import fork_map
 from rhythmid.record.record import Channel, Record
 from rhythmid.simulation.machine_code import cache_folder

@@ -9,8 +9,9 @@ from legible import DRAWINGS, FAINT, OVER_THE_EDGE
 from rhythmid.diagnose.answer.present import present
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.elements.catalogue import load_catalogue
-from rhythmid.experiment import Experiment, perform
+from rhythmid.experiment import Experiment
 from rhythmid.identify.identify import paper_hopper
+from rhythmid.offline_run import perform
 from rhythmid.record.record import Channel, Record
 from rhythmid.report.page import write_page
 

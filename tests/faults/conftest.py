@@ -1,14 +1,18 @@
 """What the tests of bad input share: bags that can be spoilt."""
 
+import resource
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fuzz import MEMORY_LIMIT
 
 from rhythmid.record.bag_writer import write_bag
 from rhythmid.record.messages import Messages
 
+SECONDS = 10.0  # of the processor that a few hostile kB may take: without the limits it would be hours
 N = 3000
 STAMPS = np.arange(N, dtype=np.int64) * 1_000_000
 TIME = 1e-9 * STAMPS
@@ -37,3 +41,15 @@ def bag(tmp_path) -> Callable[..., Path]:
         return write_bag(tmp_path / name, topics, **options)
 
     return write
+
+
+@pytest.fixture
+def bounded():
+    """The test takes little time and memory; the process gets no more."""
+    before, begun = resource.getrlimit(resource.RLIMIT_AS), time.process_time()
+    with open("/proc/self/statm", encoding="ascii") as file:
+        used = int(file.read().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + (2 * MEMORY_LIMIT << 20), before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_AS, before)
+    assert time.process_time() - begun < SECONDS

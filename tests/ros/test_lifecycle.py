@@ -16,7 +16,8 @@ from rosbags.rosbag2 import Reader
 from sensor_msgs.msg import JointState
 
 from rhythmid.errors import InputError
-from rhythmid.experiment import Experiment, perform
+from rhythmid.experiment import Experiment
+from rhythmid.offline_run import perform
 from rhythmid_nodes.command_guard import CommandGuard
 from rhythmid_nodes.compose import EXECUTABLES
 from rhythmid_nodes.delay_injector import DelayInjector

@@ -18,7 +18,8 @@ from rclpy.utilities import try_shutdown
 from rosbags.rosbag2 import Reader
 from sensor_msgs.msg import JointState
 
-from rhythmid.experiment import Experiment, perform
+from rhythmid.experiment import Experiment
+from rhythmid.offline_run import perform
 from rhythmid_nodes.joint_state import JointStateReader
 
 MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"

@@ -11,8 +11,9 @@ from scipy.interpolate import PPoly
 
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.elements.element import Scales
-from rhythmid.experiment import Experiment, perform
+from rhythmid.experiment import Experiment
 from rhythmid.model import Model
+from rhythmid.offline_run import perform
 from rhythmid.record.record import Channel, Record
 from rhythmid.simulation.signal import zero_order_hold
 from rhythmid.simulation.simulate import Trajectory, simulate

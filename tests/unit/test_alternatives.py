@@ -18,7 +18,8 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.series import dominant_frequency, prepare
-from rhythmid.model import INERTIA, Model, Prior
+from rhythmid.model import INERTIA, Model
+from rhythmid.value import Prior
 
 NOISE = NoiseModel(np.empty(0), 0.5e-4)  # of averages of four samples
 LAGS = ("actuator_lag", "command_lag", "sensor_lag")

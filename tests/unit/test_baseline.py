@@ -10,9 +10,10 @@ from rhythmid.diagnose import baseline
 from rhythmid.diagnose.baseline import NO_ORIGIN, calibrate, with_delays
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.series import Series, prepare
-from rhythmid.model import Model, Prior
+from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 from rhythmid.simulation.transport import INPUT_DELAY
+from rhythmid.value import Prior
 
 CATALOGUE = load_catalogue()
 NOMINAL = """

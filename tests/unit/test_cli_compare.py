@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from rhythmid.experiment import Experiment, perform
+from rhythmid.experiment import Experiment
+from rhythmid.offline_run import perform
 from rhythmid.record.bag_writer import write_bag
 
 EXPERIMENT = """

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import rhythmid as package
-from rhythmid.experiment import Experiment, perform
+from rhythmid.experiment import Experiment
+from rhythmid.offline_run import perform
 from rhythmid.report.terminal_table import estimate_cells
 
 PAPER = Path(package.__file__).parent / "models" / "paper_hopper.yaml"

@@ -9,7 +9,8 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 import rhythmid as package
-from rhythmid.experiment import Experiment, perform
+from rhythmid.experiment import Experiment
+from rhythmid.offline_run import perform
 
 PAPER = Path(package.__file__).parent / "models" / "paper_hopper.yaml"
 EXPERIMENT = """\

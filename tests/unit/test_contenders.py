@@ -20,7 +20,8 @@ from rhythmid.diagnose.evidence import difference
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.series import Series, hold_out_tail, prepare
-from rhythmid.model import Model, Prior
+from rhythmid.model import Model
+from rhythmid.value import Prior
 
 NOISE = NoiseModel(np.array([0.3, 0.1]), 0.5e-4)
 FRICTION = {"force": 0.05, "transition": 0.002}

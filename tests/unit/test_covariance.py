@@ -7,7 +7,7 @@ import pytest
 
 from machines import hopper
 from rhythmid.identify.covariance import EDGE, covariance_of, on_the_edge
-from rhythmid.model import Prior
+from rhythmid.value import Prior
 
 STANCE = "switched_damper.stance"
 

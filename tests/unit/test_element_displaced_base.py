@@ -13,7 +13,8 @@ from rhythmid.errors import InputError
 from rhythmid.identify.free_run import prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate, start_only
-from rhythmid.identify.series import Series, prepare, scales
+from rhythmid.identify.record_scales import scales
+from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 

@@ -9,7 +9,8 @@ from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.elements.element import Scales
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import start_only
-from rhythmid.identify.series import prepare, scales
+from rhythmid.identify.record_scales import scales
+from rhythmid.identify.series import prepare
 
 PROTOCOL, DELAYS = SHORT[1:2], (0.0203, 0.0151)
 WHITE = NoiseModel(np.empty(0), 0.5e-4)  # of averages of four samples

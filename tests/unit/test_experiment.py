@@ -11,7 +11,8 @@ from hypothesis import strategies as some
 
 import rhythmid
 from rhythmid.errors import InputError
-from rhythmid.experiment import Delay, Experiment, Forcing, perform, ramped
+from rhythmid.experiment import Delay, Experiment, Forcing, ramped
+from rhythmid.offline_run import perform
 from rhythmid.simulation.signal import zero_order_hold
 from rhythmid.simulation.simulate import simulate
 

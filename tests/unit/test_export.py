@@ -17,13 +17,14 @@ from scipy.signal import lsim
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
-from rhythmid.experiment import Experiment, perform
+from rhythmid.experiment import Experiment
 from rhythmid.export.export import WRITERS, exported
 from rhythmid.export.from_model import READERS, joint_of
 from rhythmid.export.joint import Joint
 from rhythmid.export.link import STANDARD_GRAVITY, link_of
 from rhythmid.export.matlab import linear_part
 from rhythmid.model import Model
+from rhythmid.offline_run import perform
 
 CHIRP = "{type: chirp, amplitude: %s, band: [0.5, 6], sweep: 2.0}"
 DRIVEN = """\

@@ -12,8 +12,9 @@ import rhythmid
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.elements.element import STEP, Element
 from rhythmid.errors import InputError
-from rhythmid.model import Model, Prior, Term, Value
+from rhythmid.model import Model, Term
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
+from rhythmid.value import Prior, Value
 
 PAPER = Path(rhythmid.__file__).parent / "models" / "paper_hopper.yaml"
 CATALOGUE = load_catalogue()

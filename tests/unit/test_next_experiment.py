@@ -12,7 +12,8 @@ from rhythmid.diagnose.answer.next_experiment import MORE_FREE, _menu, next_expe
 from rhythmid.diagnose.joints.joint_compose import _next
 from rhythmid.excitation.sequence import build
 from rhythmid.identify.output_error import estimate
-from rhythmid.identify.series import Series, prepare, scales
+from rhythmid.identify.record_scales import scales
+from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 

@@ -12,8 +12,9 @@ from rhythmid.identify.multiple_shooting import split, windows
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate, start_only
 from rhythmid.identify.series import block_length, hold_out_tail, prepare
-from rhythmid.model import Model, Prior
+from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
+from rhythmid.value import Prior
 
 TRUTH = {
     "input_delay.delay": 0.0203,

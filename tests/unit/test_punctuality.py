@@ -5,9 +5,10 @@ from pathlib import Path
 import pytest
 
 from rhythmid.diagnose.admission import admitted
-from rhythmid.experiment import Experiment, perform
+from rhythmid.experiment import Experiment
 from rhythmid.identify.identify import identify
 from rhythmid.model import Model
+from rhythmid.offline_run import perform
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.bag_writer import write_bag
 from rhythmid.record.punctuality import punctuality_notes

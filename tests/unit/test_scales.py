@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper
-from rhythmid.identify.series import Series, scales
+from rhythmid.identify.record_scales import scales
+from rhythmid.identify.series import Series
 from rhythmid.simulation.signal import spline
 
 

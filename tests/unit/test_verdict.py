@@ -4,27 +4,28 @@ from dataclasses import replace
 from typing import get_args
 
 import pytest
-from contests import BLOCKS, SEEN, SIZE, contest, decided, ends, predicted, supposed, verdict
+from contests import (
+    BLOCKS,
+    NAMED,
+    NOMINAL,
+    NOTHING,
+    SEEN,
+    SIZE,
+    contest,
+    decided,
+    ends,
+    friction,
+    predicted,
+    supposed,
+    verdict,
+)
 
 from rhythmid.diagnose.answer.result import FitQuality, MissingEffect
-from rhythmid.diagnose.answer.wording import freed_value, listed, summary_of
+from rhythmid.diagnose.answer.wording import summary_of
 from rhythmid.diagnose.constants import APART
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.rejections import RULES
-from rhythmid.diagnose.verdict import significance
 from rhythmid.diagnose.verdict_rules import VERDICT_RULES
-from rhythmid.elements.catalogue import load_catalogue
-from rhythmid.identify.identify import paper_hopper
-
-NOMINAL = supposed("", predicted(1.0))
-NAMED = ("missing_physics", ("friction",))
-NOTHING = ("consistent", ())
-LEFT_BY_FRICTION = 0.1
-
-
-def friction(mean_square: float = LEFT_BY_FRICTION, **changes):
-    return supposed("friction", predicted(mean_square, changes.pop("score", None)), **changes)
-
 
 # what is missing
 
@@ -274,27 +275,6 @@ def test_a_small_effect_beside_a_large_one_is_stated_where_nothing_of_its_size_i
     assert ("With it and cubic, which is too uncertain to be named, the error" in said) == (len(named) == 1)
 
 
-def named_beside(count: int, groups: tuple[tuple[str, ...], ...] = ()) -> str:
-    """What is said of friction, of so many effects beside it that are too uncertain, and of names that nothing separates."""
-    _, decision = decided(contest(NOMINAL, friction(0.02)))
-    decision = replace(decision, beside=("constant_force", "position_ripple")[:count], equivalent=groups)
-    named = [MissingEffect("friction", "force", "", 1.0, 1.0, {})]
-    return summary_of(decision, named, FitQuality(0.1, 0.1), FitQuality(0.01, 0.01), "motion")
-
-
-def test_one_effect_is_and_two_are_too_uncertain_to_be_named():
-    assert "With it and constant force, which is too uncertain to be named, the" in named_beside(1)
-    assert "and constant force and position ripple, which are too uncertain to be named, the" in named_beside(
-        2
-    )
-
-
-def test_names_that_are_not_separated_are_listed_with_and_and_alternatives_with_or():
-    groups = (("friction", "bouc_wen"), ("a", "b", "c"))
-    assert "do not separate friction and Bouc-Wen; nor a, b and c." in named_beside(0, groups)
-    assert listed(("a",)) == "a" and listed(("a", "b_c", "d"), "or") == "a, b c or d" and listed(()) == ""
-
-
 def test_a_second_name_that_is_open_does_not_take_the_first_one_with_it():
     first = friction(0.2)
     score = predicted(0.05).score
@@ -305,14 +285,6 @@ def test_a_second_name_that_is_open_does_not_take_the_first_one_with_it():
     assert (decision.verdict, decision.named) == NAMED
     assert decision.joint >= 0.8
     assert all(decision.probability[label] < 0.8 for label in ("a", "b") if label in decision.probability)
-
-
-def test_the_summary_says_why_and_does_not_repeat_the_verdict():
-    pair = [supposed(name, predicted(0.1, 700.0, seed=i)) for i, name in enumerate("ab")]
-    said = summary_of(
-        decided(contest(NOMINAL, *pair))[1], [], FitQuality(0.1, 0.1), FitQuality(0.1, 0.1), "motion"
-    )
-    assert said.startswith("The evidence does not separate several explanations. They are ")
 
 
 def test_names_that_are_not_stood_by_have_no_high_joint_probability():
@@ -360,82 +332,6 @@ def test_one_free_law_that_predicts_as_well_as_a_series_of_names_is_unknown_phys
     alone = [supposed(name, predicted(ms)) for name, ms in (("quadratic", 0.4), ("cubic", 0.3))]
     made = contest(NOMINAL, *alone, supposed("quadratic cubic", predicted(0.0098)), one)
     assert verdict(made)[0] == expected
-
-
-# what is left
-
-
-@pytest.mark.parametrize(
-    ("left", "expected"), [(0.75, "unknown_physics"), (0.6, "unknown_physics"), (0.01, "missing_physics")]
-)
-def test_names_that_leave_most_of_what_a_free_map_explains_are_unknown_physics(left, expected):
-    made = contest(NOMINAL, friction(left), maps={"velocity": predicted(1e-4)})
-    _, decision = decided(made)
-    assert (decision.verdict, decision.named) == (expected, ("friction",))
-    assert decision.unexplained.share == pytest.approx(left, abs=0.02)
-    assert decision.unexplained.goes_with == "velocity"
-
-
-@pytest.mark.parametrize(("left", "mainly"), [(0.3, True), (0.7, False)])
-def test_names_that_leave_a_part_are_mainly_right_and_such_that_leave_most_are_not(left, mainly):
-    _, decision = decided(contest(NOMINAL, friction(left), maps={"velocity": predicted(1e-4)}))
-    assert (decision.verdict, decision.named) == ("unknown_physics", ("friction",))
-    assert ("mainly" in decision.reason) is mainly
-    assert "velocity" in decision.reason and decision.joint < 0.8
-
-
-@pytest.mark.parametrize(("left", "expected"), [(0.01, "unknown_physics"), (0.6, "missing_physics")])
-def test_what_more_effects_would_explain_though_they_are_not_granted_is_left_over(left, expected):
-    more = supposed("friction play", predicted(left), shape={"within_bounds": 0.0})
-    _, decision = decided(contest(NOMINAL, friction(0.6), more, maps={"velocity": predicted(0.58, 0.0)}))
-    assert decision.verdict == expected and decision.named == ("friction",)
-    assert (decision.unexplained.goes_with == "further effects (play)") is (expected == "unknown_physics")
-
-
-def test_a_small_structured_remainder_does_not_take_the_name_away():
-    made = contest(NOMINAL, friction(0.02), maps={"position": predicted(0.01)})
-    _, decision = decided(made)
-    assert (decision.verdict, decision.named) == NAMED
-    assert decision.unexplained.significant and 0.0 < decision.unexplained.share < 0.02
-    assert decision.probability["friction"] >= 0.8
-
-
-def test_what_no_name_explains_but_a_free_map_does_is_unknown_physics_and_told_by_its_quantity():
-    maps = {"position": predicted(0.5), "velocity": predicted(0.1)}
-    _, decision = decided(contest(NOMINAL, friction(0.999), maps=maps))
-    assert (decision.verdict, decision.named) == ("unknown_physics", ())
-    assert "velocity" in decision.reason and decision.unexplained.goes_with == "velocity"
-
-
-def test_what_a_free_map_explains_by_chance_or_of_no_practical_size_is_nothing():
-    chance = predicted(0.1, NOMINAL.prediction.score + 5.0, mood=10.0)
-    assert verdict(contest(NOMINAL, maps={"velocity": chance})) == NOTHING
-    tiny = supposed("", predicted(1e-8 + (0.001 * SIZE) ** 2, 0.0))
-    assert verdict(contest(tiny, maps={"velocity": predicted(1e-8, 1e4)})) == NOTHING
-
-
-def test_more_rivals_and_fewer_blocks_ask_for_more_of_what_is_left():
-    one = predicted(0.1)
-    few = replace(one, log_density=one.log_density[:6])
-    assert significance(one, 1) < significance(one, 30) < significance(few, 30)
-    assert significance(one, 0) == significance(one, 1)
-
-
-@pytest.mark.parametrize(("detectable", "expected"), [(0.001, "consistent"), (0.8, "undecided")])
-def test_records_that_would_not_show_an_effect_decide_nothing(detectable, expected):
-    assert verdict(contest(NOMINAL, friction(0.999)), detectable)[0] == expected
-
-
-@pytest.mark.parametrize(("missed", "expected"), [(0.1, "consistent"), (0.5, "undecided")])
-def test_a_model_that_misses_much_is_not_called_consistent_though_nothing_explains_it(missed, expected):
-    nominal = supposed("", predicted((missed * SIZE) ** 2))
-    _, decision = decided(contest(nominal))
-    assert decision.verdict == expected
-    assert ("misses" in decision.reason) is (expected == "undecided")
-
-
-def test_records_that_would_not_show_a_small_effect_still_show_a_large_one():
-    assert verdict(contest(NOMINAL, friction()), 0.8) == NAMED
 
 
 def test_every_verdict_but_consistent_and_missing_physics_has_a_reason_in_words():
@@ -490,18 +386,3 @@ def test_two_effects_have_to_beat_the_nominal_model_where_one_alone_predicts_wor
     pair = supposed("friction cubic", predicted(0.1, score))
     selection, _ = decided(contest(supposed("", predicted(1.0, 0.0)), alone, pair))
     assert set(selection.chosen.elements) == set(named)
-
-
-@pytest.mark.parametrize(
-    ("elements", "said"),
-    [
-        (("inertia.mass",), "comes out at 0.3, and that predicts"),
-        (("coulomb_friction", "inertia.mass"), "and that with Coulomb friction predicts"),
-        (("inertia.mass", "coulomb_friction"), "and that with Coulomb friction predicts"),
-        (("inertia.mass", "linear_spring.stiffness"), "0.3. linear_spring.stiffness is held at 200 N/m"),
-    ],
-)
-def test_a_freed_value_is_told_wherever_it_stands_among_the_effects(elements, said):
-    fitted = paper_hopper().with_element(load_catalogue()["coulomb_friction"], {"force": 0.1})
-    fitted = fitted.with_values({"inertia.mass": 0.3})
-    assert said in freed_value(paper_hopper(), fitted, elements)

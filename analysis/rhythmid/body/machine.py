@@ -30,10 +30,11 @@ from rhythmid.document import Node, read
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.elements.element import SLOTS, Element, Parameter
 from rhythmid.errors import InputError
-from rhythmid.model import INERTIA, Model, Value, entry_of, value_of
+from rhythmid.model import INERTIA, Model
 from rhythmid.output import write_text
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 from rhythmid.validation import Number, validated
+from rhythmid.value import Value, entry_of, value_of
 
 KINDS = ("mjcf", "urdf")
 LONGEST_STEP = 0.01  # [s] of an integration: ten times what contacts bear

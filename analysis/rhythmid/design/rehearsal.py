@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from rhythmid.design.waveform import Waveform
 from rhythmid.errors import InputError
-from rhythmid.experiment import Experiment, perform
+from rhythmid.experiment import Experiment
+from rhythmid.offline_run import perform
 from rhythmid.settings import Noise, Safety
 
 Array = NDArray[np.float64]

@@ -23,7 +23,8 @@ from rhythmid.diagnose.static_law import laws_of
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales, Slot
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.series import Series, dominant_frequency, scales
+from rhythmid.identify.record_scales import scales
+from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.simulation.compiled import compile_model
 from rhythmid.simulation.generated_source import DRIVES

@@ -16,11 +16,13 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import split
 from rhythmid.identify.output_error import Fit, estimate, minimise, with_bounds
-from rhythmid.identify.series import REST_LENGTH, Series, dominant_frequency
-from rhythmid.model import INERTIA, Model, Prior
+from rhythmid.identify.record_scales import REST_LENGTH
+from rhythmid.identify.series import Series, dominant_frequency
+from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.simulation.signal import band_limited, first_order_hold
 from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
+from rhythmid.value import Prior
 
 NO_ORIGIN = "No position was measured, so that its origin is arbitrary: the spring's rest length is kept as it was given."
 EVEN = 1e-3  # of the period; spread of the times between samples that still counts as even

@@ -49,8 +49,9 @@ from rhythmid.errors import InputError
 from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.covariance import covariance_of
 from rhythmid.identify.output_error import Fit, start_only
+from rhythmid.identify.record_scales import scales
 from rhythmid.identify.robust_covariance import with_robust_covariance
-from rhythmid.identify.series import Series, scales
+from rhythmid.identify.series import Series
 from rhythmid.identify.student import autocorrelation_time
 
 # what competes beside the effects that were searched for, where there is time

@@ -27,8 +27,9 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, estimate, start_only
+from rhythmid.identify.record_scales import scales
 from rhythmid.identify.record_zero import moved, others_marked, with_record_zero
-from rhythmid.identify.series import Series, record_of, scales
+from rhythmid.identify.series import Series, record_of
 from rhythmid.identify.zero_estimates import zeros_of
 from rhythmid.model import Model
 from rhythmid.progress import Tell

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
-from rhythmid.experiment import Experiment, Noise, perform
+from rhythmid.experiment import Experiment, Noise
 from rhythmid.identify.joint import cycle_columns, prepared_model
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, minimise, start_only
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
+from rhythmid.offline_run import perform
 from rhythmid.record.messages import Messages
 from rhythmid.record.record import Channel, Record
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from rhythmid.elements.element import Scales
 from rhythmid.elements.first_guess import powers
-from rhythmid.identify.series import Series, scales
+from rhythmid.identify.record_scales import scales
+from rhythmid.identify.series import Series
 from rhythmid.model import INERTIA, Model
 
 Array = NDArray[np.float64]

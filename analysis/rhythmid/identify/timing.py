@@ -20,9 +20,10 @@ from rhythmid.identify.free_run import FreeRun, prepare_run
 from rhythmid.identify.identification import Estimate
 from rhythmid.identify.joint import JointFit
 from rhythmid.identify.output_error import Fit, estimate, minimise
+from rhythmid.identify.record_scales import scales
 from rhythmid.identify.sample_clock.clock import clock_of
 from rhythmid.identify.sensitivity import Problem
-from rhythmid.identify.series import Series, scales
+from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.transport import INPUT_DELAY
 

@@ -9,12 +9,14 @@ import numpy as np
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.force.pendulum_gravity import LEAST_SWING
 from rhythmid.errors import InputError
-from rhythmid.identify.series import prepare, scales
-from rhythmid.model import INERTIA, MASS, Model, Value
+from rhythmid.identify.record_scales import scales
+from rhythmid.identify.series import prepare
+from rhythmid.model import INERTIA, MASS, Model
 from rhythmid.record.record import Channel, Record
 from rhythmid.start.balance import Law, Rows
 from rhythmid.start.roles import Roles
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
+from rhythmid.value import Value
 
 EARNS_PLACE = (
     0.9  # of what a balance leaves: by so much an element has to lower it to be among the first guesses

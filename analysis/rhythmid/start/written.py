@@ -5,13 +5,14 @@ import textwrap
 from collections.abc import Sequence
 
 from rhythmid.elements.element import SLOTS
-from rhythmid.model import INERTIA, Term, Value
+from rhythmid.model import INERTIA, Term
 from rhythmid.record.inventory import Inventory, Recorded, header_clock
 from rhythmid.record.signals import ROLES, Clock
 from rhythmid.start.meaning import force_unit_of, meaning_of
 from rhythmid.start.nominal import Nominal
 from rhythmid.start.roles import Choice, Roles
 from rhythmid.units import Units
+from rhythmid.value import Value
 
 WIDTH = 110
 LISTED = 8  # alternatives that a comment names

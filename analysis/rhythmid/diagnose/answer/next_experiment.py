@@ -20,7 +20,8 @@ from rhythmid.excitation.excitation import Excitation
 from rhythmid.excitation.sequence import build
 from rhythmid.identify.descent import first_guess
 from rhythmid.identify.free_run import prepare_run, start_of
-from rhythmid.identify.series import Series, dominant_frequency, scales
+from rhythmid.identify.record_scales import scales
+from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import Model
 from rhythmid.simulation.signal import spline, zero_order_hold
 

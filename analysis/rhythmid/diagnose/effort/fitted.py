@@ -9,8 +9,9 @@ from rhythmid.diagnose.evidence import Linearised
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction, names_of, richer_of
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit
-from rhythmid.model import Model, Prior
+from rhythmid.model import Model
 from rhythmid.simulation.transport import INPUT_DELAY
+from rhythmid.value import Prior
 
 
 @dataclass(frozen=True, eq=False)

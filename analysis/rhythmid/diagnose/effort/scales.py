@@ -4,7 +4,7 @@ import numpy as np
 
 from rhythmid.elements.element import Scales
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.series import NO_SPRING, REST_LENGTH
+from rhythmid.identify.record_scales import NO_SPRING, REST_LENGTH
 from rhythmid.model import Model
 
 

@@ -41,9 +41,10 @@ from rhythmid.identify.inverse_dynamics.estimate import (
     priors_of,
     size_of,
 )
-from rhythmid.model import Model, Prior
+from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
+from rhythmid.value import Prior
 
 MOST_EFFECTS = 4  # effects that are looked for: a fifth was never real on recordings that were tried
 REFINED = 10  # additions that are fitted in earnest in each round: the right one was among the first five of a score test always

@@ -8,7 +8,8 @@ from rhythmid.diagnose.search.trial import Proposal, Trial, propose
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.series import Series, scales
+from rhythmid.identify.record_scales import scales
+from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.simulation.compiled import compile_model

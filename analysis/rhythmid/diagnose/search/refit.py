@@ -18,9 +18,10 @@ from rhythmid.identify.descent import Descent, descend, out_of_reach
 from rhythmid.identify.free_run import FreeRun, prepare_run, start_of
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, minimise
+from rhythmid.identify.record_scales import scales
 from rhythmid.identify.sample_clock.clock import has_clock
 from rhythmid.identify.sample_clock.tick_scan import scanned
-from rhythmid.identify.series import Series, scales
+from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.parallel import fork_map
 from rhythmid.progress import Tell, counted, silent

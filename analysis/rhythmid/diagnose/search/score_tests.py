@@ -26,7 +26,7 @@ from rhythmid.identify.drive import controlled
 from rhythmid.identify.free_run import FreeRun, prepare_run, with_series
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, minimise
-from rhythmid.identify.series import scales
+from rhythmid.identify.record_scales import scales
 from rhythmid.model import Model
 from rhythmid.simulation.effect import Path, effect_along
 from rhythmid.simulation.generated_source import DRIVES

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.student import autocorrelation_time, cost_of, scale_of, weights_of
-from rhythmid.model import INERTIA, Model, Prior
+from rhythmid.model import INERTIA, Model
+from rhythmid.value import Prior
 
 Array = NDArray[np.float64]
 SPREAD = 0.7  # relative standard deviation of a value that the file states without a prior: a factor of two either way (ln 2)

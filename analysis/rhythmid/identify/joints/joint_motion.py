@@ -24,8 +24,9 @@ from rhythmid.identify.inverse_dynamics.bandwidth import (
 )
 from rhythmid.identify.inverse_dynamics.motion import FINER, Motion, Stretch, low_pass
 from rhythmid.identify.joints.joint_stretch import JointStretch, joint_stretches
-from rhythmid.model import Model, Term, Value
+from rhythmid.model import Model, Term
 from rhythmid.record.joint_record import JointRecord, Taken
+from rhythmid.value import Value
 
 Array = NDArray[np.float64]
 # periods of the cut-off at both ends of a stretch, in which a filter that begins there errs by several times the noise (measured on

@@ -1,0 +1,86 @@
+"""Sizes that records show: how far and how fast a machine moves, and what drives it. First guesses of parameters are measured by them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
+
+from rhythmid.elements.element import Scales
+from rhythmid.identify.series import Series, dominant_frequency
+from rhythmid.model import Model
+from rhythmid.simulation.signal import FOR_EVER
+
+Array = NDArray[np.float64]
+REST_LENGTH = "linear_spring.rest_length"
+NO_SPRING = 1e-4  # of the inertia's own stiffness m ω², below which a spring sets no scale
+
+
+def scales(series: Sequence[Series], model: Model) -> Scales:
+    """Sizes that the records show, for first guesses of parameters."""
+    biggest = max(series, key=lambda s: float(np.std(s.averaged)))
+    frequency = dominant_frequency(biggest)
+    motions = [_motion(one) for one in series]
+    position = max(max(float(np.std(x)) for x, _ in motions), 1e-12)
+    velocity = max(float(np.std(v)) for _, v in motions)
+    inertial = model.mass.value * (2 * np.pi * frequency) ** 2
+    spring = model.borrowed("linear_spring.stiffness", 0.0) or 0.0
+    stiffness = spring if spring > NO_SPRING * inertial else inertial
+    effort, peak, pumping, reference = 0.0, 0.0, 0.0, 0.0
+    # by a forcing or a controller of the model's own
+    driven = any(term.element.acts in ("drive", "feedback") for term in model.terms)
+    fed = any(term.element.takes for term in model.terms)  # by a voltage, say: what is recorded is no force
+    for one in series:
+        total = np.zeros(len(one.time))
+        for signal in (one.command, one.forcing):
+            if signal is not None:
+                inside = (one.time >= signal.x[0]) & (one.time <= min(signal.x[-1], FOR_EVER))
+                total[inside] += signal(one.time[inside])
+        driven = driven or bool(np.any(total))
+        if one.kind == "reference":
+            reference = max(reference, float(np.std(total)))
+        elif not fed:
+            effort = max(effort, float(np.std(total)))
+            peak = max(peak, float(np.abs(total).max(initial=0.0)))
+    forced = [one for one in series if one.forcing is not None]
+    if forced:
+        longest = max(forced, key=lambda one: one.time[-1] - one.time[0])
+        assert longest.forcing is not None
+        line = replace(longest, value=np.asarray(longest.forcing(longest.time)))
+        pumping = dominant_frequency(line, finer=16)
+    return Scales(
+        position=position,
+        velocity=max(velocity, 1e-12),
+        effort=effort or stiffness * position,
+        centre=float(np.mean(np.concatenate([x for x, _ in motions]))),
+        low=min(float(x.min()) for x, _ in motions),
+        high=max(float(x.max()) for x, _ in motions),
+        mass=model.mass.value,
+        stiffness=float(stiffness),
+        frequency=frequency,
+        duration=max(float(s.time[-1] - s.time[0]) for s in series),
+        period=biggest.period,
+        forcing_frequency=pumping,
+        reference=reference,
+        peak_effort=peak,
+        rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
+        displaced_base=any(one.kind == "base_displacement" for one in series),
+        idle=not driven,
+    )
+
+
+def _motion(series: Series) -> tuple[Array, Array]:
+    """Position and velocity that the force elements of the model see, as the measurement tells roughly: (blocks,) each.
+
+    Relative to the base where that moves; what is not measured is integrated, its mean set to zero.
+    """
+    step, value = series.period * series.block, series.averaged
+    if series.kind == "base_displacement" and series.command is not None and series.measured == "position":
+        value = value - series.command(series.centres)
+    for _ in range({"position": 0, "velocity": 1, "acceleration": 2}[series.measured]):
+        value = value - value.mean()
+        value = cumulative_trapezoid(value, dx=step, initial=0.0)
+    if series.measured == "velocity":
+        return value, series.averaged
+    return value, np.gradient(value, step) if len(value) > 2 else np.zeros_like(value)

@@ -1,0 +1,55 @@
+"""A diagnosis in sentences."""
+
+from dataclasses import replace
+
+import pytest
+from contests import NOMINAL, contest, decided, friction, predicted, supposed
+
+from rhythmid.diagnose.answer.result import FitQuality, MissingEffect
+from rhythmid.diagnose.answer.wording import freed_value, listed, summary_of
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.identify.identify import paper_hopper
+
+
+def named_beside(count: int, groups: tuple[tuple[str, ...], ...] = ()) -> str:
+    """What is said of friction, of so many effects beside it that are too uncertain, and of names that nothing separates."""
+    _, decision = decided(contest(NOMINAL, friction(0.02)))
+    decision = replace(decision, beside=("constant_force", "position_ripple")[:count], equivalent=groups)
+    named = [MissingEffect("friction", "force", "", 1.0, 1.0, {})]
+    return summary_of(decision, named, FitQuality(0.1, 0.1), FitQuality(0.01, 0.01), "motion")
+
+
+def test_one_effect_is_and_two_are_too_uncertain_to_be_named():
+    assert "With it and constant force, which is too uncertain to be named, the" in named_beside(1)
+    assert "and constant force and position ripple, which are too uncertain to be named, the" in named_beside(
+        2
+    )
+
+
+def test_names_that_are_not_separated_are_listed_with_and_and_alternatives_with_or():
+    groups = (("friction", "bouc_wen"), ("a", "b", "c"))
+    assert "do not separate friction and Bouc-Wen; nor a, b and c." in named_beside(0, groups)
+    assert listed(("a",)) == "a" and listed(("a", "b_c", "d"), "or") == "a, b c or d" and listed(()) == ""
+
+
+def test_the_summary_says_why_and_does_not_repeat_the_verdict():
+    pair = [supposed(name, predicted(0.1, 700.0, seed=i)) for i, name in enumerate("ab")]
+    said = summary_of(
+        decided(contest(NOMINAL, *pair))[1], [], FitQuality(0.1, 0.1), FitQuality(0.1, 0.1), "motion"
+    )
+    assert said.startswith("The evidence does not separate several explanations. They are ")
+
+
+@pytest.mark.parametrize(
+    ("elements", "said"),
+    [
+        (("inertia.mass",), "comes out at 0.3, and that predicts"),
+        (("coulomb_friction", "inertia.mass"), "and that with Coulomb friction predicts"),
+        (("inertia.mass", "coulomb_friction"), "and that with Coulomb friction predicts"),
+        (("inertia.mass", "linear_spring.stiffness"), "0.3. linear_spring.stiffness is held at 200 N/m"),
+    ],
+)
+def test_a_freed_value_is_told_wherever_it_stands_among_the_effects(elements, said):
+    fitted = paper_hopper().with_element(load_catalogue()["coulomb_friction"], {"force": 0.1})
+    fitted = fitted.with_values({"inertia.mass": 0.3})
+    assert said in freed_value(paper_hopper(), fitted, elements)
