@@ -105,15 +105,19 @@ def one_round(
 
     What is missing, such as a slow drift, would otherwise pass for the colour of the noise, in later rounds as in the first.
     """
-    known = trajectories(fit)
-    changes = changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
-    noise = noise_without(fit, changes)
+    noise = noise_without(fit, _changes(fit, catalogue, pool))
     if fit.nrmse() > MISFIT and noise.variance > PREDICTED * noise.std**2:
         # motion that is missed, not noise: do not whiten it away
         noise = NoiseModel(np.empty(0), noise.variance**0.5)
     fit = under(fit, noise, pool)
-    scores = score(fit, changes)
+    scores = score(fit, _changes(fit, catalogue, pool))
     return Round(tuple(scores), p_value(scores), added, tuple(scored_in_windows(fit, catalogue, pool))), fit
+
+
+def _changes(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> list[Change]:
+    """Changes that the whole catalogue makes at a fit: they are told from what its parameters do only where these are linearised."""
+    known = trajectories(fit)
+    return changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
 
 
 def not_tried(nominal: Fit, catalogue: Catalogue, first: Round) -> list[tuple[tuple[str, ...], str]]:
@@ -138,9 +142,9 @@ def scored_in_windows(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor |
     try:
         run = prepare_run(fit.model, cut, fit.run.max_step)
         local = minimise(fit.model, run, fit.names, _within(fit.noise, cut), None, 10, pool)
-        known = trajectories(local)
-        changes = changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
-        return score(under(local, _within(noise_without(local, changes), cut), pool), changes)
+        noise = _within(noise_without(local, _changes(local, catalogue, pool)), cut)
+        local = under(local, noise, pool)
+        return score(local, _changes(local, catalogue, pool))
     except InputError:
         return []
 

@@ -1,0 +1,40 @@
+"""A round of the search scores the catalogue at the fit that it returns."""
+
+import pytest
+
+import rhythmid as rh
+from rhythmid.diagnose.search.round import one_round
+from rhythmid.diagnose.search.score_tests import changes_of, guesses, score, sizes_along, trajectories
+from rhythmid.elements.catalogue import Catalogue, load_catalogue
+from rhythmid.identify.output_error import estimate
+from rhythmid.identify.series import prepare
+
+PENDULUM = """
+inertia: {mass: {value: 0.0057, unit: kg*m^2, fixed: true}}
+force:
+  - linear_spring: {stiffness: {value: 0.42, unit: N*m/rad}, rest_length: {value: 0.0, unit: rad, fixed: true}}
+  - viscous_damper: {damping: {value: 0.0013, unit: N*m*s/rad}}
+"""
+SWUNG = {
+    "duration": 20.0,
+    "excitation": {"type": "chirp", "amplitude": 0.05, "sweep": 20.0, "band": [0.5, 2.0]},
+    "noise": {"measurement_std": 1e-3},
+}
+
+
+def test_scores_are_those_of_changes_at_the_fit_that_the_noise_of_the_round_has_moved():
+    library = load_catalogue()
+    model = rh.Model.from_text(PENDULUM)
+    swinging = model.with_values({"linear_spring.stiffness": 0.0}).with_element(
+        library["pendulum_gravity"], {"moment": 0.42, "reference": 0.0}
+    )
+    fit = estimate(model, prepare([rh.simulate(swinging, SWUNG).record]))
+    catalogue = Catalogue({name: library[name] for name in ("pendulum_gravity", "cubic_stiffness")})
+    found, moved = one_round(fit, (), catalogue, None)
+    known = trajectories(moved)
+    again = score(moved, changes_of(known, guesses(catalogue, moved.model, sizes_along(known))))
+    # most of a pendulum's gravity is what a spring does: only at the same fit is that told from the rest
+    assert moved.values != pytest.approx(fit.values, rel=1e-3)
+    assert [one.statistic for one in found.scores] == pytest.approx(
+        [one.statistic for one in again], rel=1e-6
+    )
