@@ -1,5 +1,6 @@
 """The command `rhythmid`. Exit codes: 0 an answer was reached, 2 bad usage or bad input, 1 a failure of ours."""
 
+import errno
 import importlib
 import pkgutil
 import shutil
@@ -26,6 +27,7 @@ app = typer.Typer(
     rich_markup_mode="rich" if shutil.get_terminal_size().columns >= NARROW else None,
 )
 COMMAND_GROUP = "rhythmid.commands"
+UNUSABLE_PATHS = (errno.ENAMETOOLONG, errno.EACCES)  # of a path that the user gave, whoever looks at it first
 SEVERAL = ("--holdout", "--elements")  # options that may be followed by several values
 PARTS = (
     "begin",
@@ -71,6 +73,10 @@ def main() -> None:
         _refuse(str(error))
     except (typer.Abort, KeyboardInterrupt):
         sys.exit(130)
+    except OSError as error:
+        if error.errno not in UNUSABLE_PATHS or error.filename is None:
+            raise
+        _refuse(str(InputError(f"{error.filename}: {error.strerror}")))
     except Exception as error:
         describe = getattr(error, "format_message", None)  # bad usage, found by the parser
         if describe is None:

@@ -12,6 +12,7 @@ from typing import Any
 from rhythmid.errors import InputError
 
 STANDARD_OUTPUT = Path("-")  # the name by which JSON goes there instead of to a file
+PARTIAL = ".{}.partial"  # name of a result while it is written
 
 
 def require_new(*paths: Path | None) -> None:
@@ -28,6 +29,9 @@ def require_new(*paths: Path | None) -> None:
 def require_writable(path: Path) -> None:
     """Refuse a result that cannot be made; folders that are missing above it will be."""
     folder = next(parent for parent in path.absolute().parents if os.path.lexists(parent))
+    longest = os.pathconf(folder, "PC_NAME_MAX") - len(PARTIAL.format(""))
+    if any(len(os.fsencode(part)) > longest for part in path.parts):
+        raise InputError(f"{path}: cannot be written: a name in it is longer than {longest} bytes")
     try:  # permissions alone do not tell: file systems may be read-only, full, or no place for files
         probe, name = tempfile.mkstemp(prefix=".rhythmid.", dir=folder)
         os.close(probe)
@@ -38,7 +42,7 @@ def require_writable(path: Path) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a result file whole or not at all, and the folders above it that are missing."""
-    partial = path.with_name(f".{path.name}.partial")
+    partial = path.with_name(PARTIAL.format(path.name))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         partial.write_text(text, encoding="utf-8")

@@ -1,5 +1,6 @@
 """Bad input to every command, called as users call it: one line that says what is wrong, exit code 2, nothing written."""
 
+import errno
 import math
 import shutil
 from dataclasses import replace
@@ -321,10 +322,12 @@ TARGETS = {
     "folder": "folder: exists already",
     "/proc/out": "cannot be written to",
     "file/out": "file/out",
+    "a" * 250: "cannot be written: a name in it is longer than 246 bytes",
+    "none/" + "a" * 250: "cannot be written: a name in it is longer than 246 bytes",
 }
 
 
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target[:12])
 @pytest.mark.parametrize("writer", WRITERS, ids=lambda words: f"{words[0]} {words[-1]}")
 def test_a_result_is_refused_before_any_work_where_it_cannot_be_written(
     writer, target, tmp_path, refused, bag, topics
@@ -368,6 +371,46 @@ def test_two_results_are_not_written_over_one_another(refused, bag, topics):
 def test_bad_usage_is_refused_with_one_line(arguments, words, refused, bag, topics):
     bag(topics)
     assert words in refused(*arguments)
+
+
+LONG = "a" * 300  # characters; file systems take names of at most 255 bytes
+LONG_SOURCES = [
+    ("check", LONG),
+    ("identify", LONG),
+    ("diagnose", LONG, "--model", str(MODEL)),
+    ("diagnose", LONG, "--sim", LONG),
+    ("watch", str(MODEL), "--bag", LONG),
+    ("recover", LONG, "--out", "out"),
+    ("recover", LONG),
+    ("convert", LONG, "--out", "out"),
+    ("init", LONG),
+    ("batch", LONG),
+    ("export", LONG, "--to", "csv"),
+    ("design", LONG, "--duration", "9", "--band", "0", "7", "--max-effort", "1", "--noise-std", "1", "--output", "out"),
+    ("simulate", LONG, "--experiment", "experiment.yaml", "--out", "out"),
+    ("simulate", str(MODEL), "--experiment", LONG, "--out", "out"),
+    ("check", "bag", "--signals", LONG),
+    ("proof", "--out", LONG, "--cases", "1"),
+    ("run", LONG),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("arguments", LONG_SOURCES, ids=lambda words: " ".join(words).replace(LONG, "LONG"))
+def test_a_name_that_no_file_can_have_is_refused_with_one_line(arguments, refused, tmp_path):
+    if arguments[0] == "run":
+        needs_run()
+    (tmp_path / "experiment.yaml").write_text(EXPERIMENT)
+    line = refused(*arguments)
+    assert LONG in line and "File name too long" in line
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "experiment.yaml"]
+
+
+def test_a_recording_that_may_not_be_read_is_refused_with_one_line(refused, tmp_path, monkeypatch):
+    def forbidden(path, **_):
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "exists", forbidden)
+    assert refused("identify", "locked/run.mcap") == "locked/run.mcap: Permission denied"
 
 
 @pytest.mark.parametrize("reader", READERS)
