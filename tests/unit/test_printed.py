@@ -78,7 +78,7 @@ def printed(answer: Diagnosis = ANSWER) -> str:
     [
         "missing physics: The model lacks coulomb friction.",
         "probability 97 %, 92 % of the mismatch",
-        "left: 3 % of the mismatch, which goes with velocity",
+        "left: 3 % of the mismatch, which depends on velocity",
         "scored: by the recorded effort below 12 Hz: a controller holds the machine",
         "assumption: The recorded effort is taken to be true in scale.",
         "not tried: sensor_lag, sensor_drift: not seen",

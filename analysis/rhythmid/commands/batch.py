@@ -17,26 +17,28 @@ EXAMPLES = (
 
 
 def batch(
-    manifest: Annotated[Path, typer.Argument(help="Which recordings, joints and models, by which command.")],
+    manifest: Annotated[
+        Path, typer.Argument(help="YAML file: which recordings, joints and models, and by which command.")
+    ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="DIR", help="Folder of the answers; MANIFEST_batch if not given."),
+        typer.Option("--out", metavar="DIR", help="Folder for the answers; MANIFEST_batch by default."),
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option("--jobs", "-j", help="Processes that work at a time; by default one a processor."),
+        typer.Option("--jobs", "-j", help="Number of parallel processes; by default one per processor."),
     ] = None,
     scheduler: Annotated[
         str | None,
-        typer.Option("--scheduler", metavar="ADDRESS", help="Let the workers of a Dask scheduler answer."),
+        typer.Option("--scheduler", metavar="ADDRESS", help="Use the workers of this Dask scheduler."),
     ] = None,
     json: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
-    """Answer every recording of a manifest, and say which parameters agree from run to run and rig to rig.
+    """Identify or diagnose every recording of a manifest, and say which parameters agree between runs and between rigs.
 
-    Answers are kept as they come: the same command goes on where it was interrupted, and answers anew only what has changed. Exit code 1
-    where a recording could not be answered.
+    Each answer is saved as soon as it is found. The same command resumes after an interruption, and repeats only what has changed.
+    Exit code 1 if there is no answer for a recording.
     """
     from rhythmid.batch.batch import batch as run
     from rhythmid.progress_bar import progress

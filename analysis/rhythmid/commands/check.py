@@ -20,16 +20,18 @@ EXAMPLES = (
 def check(
     bags: Annotated[
         list[Path],
-        typer.Argument(help="Bag directories, .mcap/.db3 files, tables, or signals.yaml files of tables."),
+        typer.Argument(
+            help="Bag directories, .mcap/.db3 files, tables, or signals.yaml files that name tables."
+        ),
     ],
     signals: SignalsFile = None,
     json: JsonFile = None,
     report: ReportFile = None,
     quiet: Quiet = False,
 ) -> None:
-    """Report data quality: topics, rates, gaps, duplicates, jitter, clock. Exit code 2 if one cannot be used.
+    """Report data quality: topics, rates, gaps, duplicates, jitter, clock. Exit code 2 if a recording cannot be used.
 
-    Of several recordings one report follows the other, and the JSON is a list of them.
+    Several recordings are reported one after the other, and the JSON is then a list.
     """
     from rhythmid.errors import InputError
     from rhythmid.progress_bar import progress

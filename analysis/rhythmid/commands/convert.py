@@ -18,20 +18,21 @@ EXAMPLES = (
 
 def convert(
     table: Annotated[
-        Path, typer.Argument(help="Table (.csv, .mat, .npz, .parquet, …), or signals.yaml of tables.")
+        Path,
+        typer.Argument(help="Table (.csv, .mat, .npz, .parquet, …), or a signals.yaml that names tables."),
     ],
     out: Annotated[Path, typer.Option("--out", help="Bag to write: a new folder.")],
     signals: SignalsFile = None,
     joint: Annotated[str, typer.Option("--joint", help="Name of the joint in the messages.")] = "joint",
     rate: Annotated[
         float | None,
-        typer.Option("--rate", metavar="HZ", help="Rate of the rows, where the table holds no time."),
+        typer.Option("--rate", metavar="HZ", help="Sample rate of the table, if it has no column of times."),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Write a table as a rosbag2 (MCAP) of joint states, with a signals.yaml inside that reads it back.
 
-    Without --signals the columns are guessed as by `rhythmid init`, and the guesses are printed.
+    Without --signals the columns are guessed in the same way as by `rhythmid init`, and the guesses are printed.
     """
     from rhythmid.record.bag import is_bag
     from rhythmid.record.convert import write_record

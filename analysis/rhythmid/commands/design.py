@@ -18,7 +18,7 @@ EXAMPLES = (
 
 
 def design(
-    model: Annotated[Path, typer.Argument(help="Model file; its values are taken for the truth.")],
+    model: Annotated[Path, typer.Argument(help="Model file; its values are assumed to be true.")],
     duration: Annotated[float, typer.Option("--duration", help="Length of the run in s.")],
     band: Annotated[
         tuple[float, float], typer.Option("--band", help="Lowest and highest frequency of the command in Hz.")
@@ -30,7 +30,7 @@ def design(
         float,
         typer.Option(
             "--noise-std",
-            help="Standard deviation of a measured sample's noise in m (or the model's unit); of several joints that of a force in N*m.",
+            help="Standard deviation of a measured sample's noise in m (or the model's unit); for a machine with several joints, of a measured force in N*m.",
         ),
     ],
     output: Annotated[
@@ -41,8 +41,8 @@ def design(
         tuple[float, float] | None,
         typer.Option(
             "--envelope",
-            help="Lowest and highest position that may be measured, in m (or the model's unit); of several joints that of one whose "
-            "file states no range, about its reference pose.",
+            help="Lowest and highest position that may be measured, in m (or the model's unit); for a machine with several joints, about "
+            "the reference pose, of each joint whose file states no range.",
         ),
     ] = None,
     kind: Annotated[
@@ -57,21 +57,19 @@ def design(
         int | None,
         typer.Option(
             "--harmonics",
-            help="Sidebands on either side of a line whose responses are kept apart; 3 by default.",
+            help="Sidebands on either side of a spectral line whose responses are separated; 3 by default.",
         ),
     ] = None,
     forcing: Annotated[
         tuple[float, float] | None,
         typer.Option(
             "--forcing",
-            help="Amplitude in N and frequency in Hz of the forcing on the robot; the model's, or 1 1.",
+            help="Amplitude in N and frequency in Hz of the forcing on the robot; by default the model's, else 1 1.",
         ),
     ] = None,
     delays: Annotated[
         tuple[float, float] | None,
-        typer.Option(
-            "--delays", help="Input and measurement delay as expected, in s; the model's by default."
-        ),
+        typer.Option("--delays", help="Expected input and measurement delay in s; the model's by default."),
     ] = None,
     longest_delay: Annotated[
         float | None,
@@ -89,28 +87,32 @@ def design(
     shifts: Annotated[
         int | None,
         typer.Option(
-            "--shifts", help="comb: chirps, each starting at another phase; 2 harmonics + 3 by default."
+            "--shifts",
+            help="comb: number of chirps, each starting at another phase of the forcing; 2 harmonics + 3 by default.",
         ),
     ] = None,
     period: Annotated[
         float | None,
-        typer.Option("--period", help="multisine: its period in s; the longest that fits twice by default."),
+        typer.Option(
+            "--period",
+            help="multisine: period in s; by default the longest that fits twice into the duration.",
+        ),
     ] = None,
     spacing: Annotated[
         float | None,
         typer.Option(
             "--spacing",
-            help="multisine: distance of its lines in Hz; the closest that does not alias by default.",
+            help="multisine: spacing of its spectral lines in Hz; by default the closest that does not alias.",
         ),
     ] = None,
     seed: Annotated[
-        int, typer.Option("--seed", help="multisine: of the lines left out and the starting phases.")
+        int, typer.Option("--seed", help="multisine: seed of the omitted lines and of the starting phases.")
     ] = 0,
     elements: Elements = None,
     json: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
-    """Design an experiment: the signal to play, as large as the limits allow, and every parameter's predicted uncertainty."""
+    """Design an experiment: a signal as large as the limits allow, and the predicted uncertainty of every parameter."""
     of_one_axis = {
         "kind": kind, "harmonics": harmonics, "longest_delay": longest_delay, "max_distortion": max_distortion, "shifts": shifts,
         "period": period, "spacing": spacing,

@@ -33,14 +33,14 @@ def diagnose(
     sim: Annotated[
         Path | None,
         typer.Option(
-            "--sim", help="Record of a simulation to compare with directly; enough without a model."
+            "--sim", help="Record of a simulation to compare with directly; a model is then not required."
         ),
     ] = None,
     sim_signals: Annotated[
         Path | None,
         typer.Option(
             "--sim-signals",
-            help="Which channel of --sim is what; by default as --signals, or our own topics.",
+            help="signals.yaml for --sim; by default that of --signals, else rhythmid's own topics.",
         ),
     ] = None,
     holdout: Annotated[
@@ -58,15 +58,15 @@ def diagnose(
         typer.Option(
             "--budget",
             metavar="SECONDS",
-            help="Begin no further round of the search and no other way of scoring after so many seconds on the wall clock, "
-            "whatever else the computer does; the answer says what was not tried.",
+            help="Wall-clock time after which no new round of the search and no other scoring mode begins; "
+            "the answer says what was not tried.",
         ),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Say where records and model differ, which physics the model lacks, and how much better it fits with it.
+    """Say where records and model differ, which physics the model lacks, and how much adding it reduces the error.
 
-    With --sim the simulation's record is compared with the real one first; without --model, nothing else is done.
+    With --sim the simulation's record is first compared with the real one; without --model this comparison is all that is done.
     """
     from rhythmid.elements.catalogue import load_catalogue
     from rhythmid.model import Model

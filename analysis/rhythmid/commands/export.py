@@ -1,4 +1,4 @@
-"""`rhythmid export`: a model in the words of a simulator."""
+"""`rhythmid export`: a model in the format of a simulator."""
 
 from pathlib import Path
 from typing import Annotated
@@ -23,14 +23,12 @@ def export(
         str,
         typer.Option("--to", metavar="TARGET", help="mujoco, urdf, sdf, isaac, matlab, csv or nav2."),
     ],
-    out: Annotated[
-        Path | None, typer.Option("--out", help="File to write; without it, the terminal.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="File to write; by default the terminal.")] = None,
     joint: Annotated[str, typer.Option("--joint", help="Name of the joint in the target.")] = "joint",
     elements: Elements = None,
     quiet: Quiet = False,
 ) -> None:
-    """Write damping, friction, stiffness, gain, lag and delay of a model in the words of a simulator.
+    """Write damping, friction, stiffness, gain, lag and delay of a model in the format of a simulator.
 
     A comment names each effect of the model that the target cannot express.
     """

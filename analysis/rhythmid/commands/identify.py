@@ -21,7 +21,7 @@ def identify(
     bags: Bags,
     model: Annotated[
         Path | None,
-        typer.Option("--model", help="What is known of the machine; the paper's hopper by default."),
+        typer.Option("--model", help="Model file of the machine; the paper's hopper by default."),
     ] = None,
     signals: SignalsFile = None,
     elements: Elements = None,
@@ -31,7 +31,7 @@ def identify(
         Path | None, typer.Option("--save-model", help="Write the identified model.")
     ] = None,
     save: Annotated[
-        Path | None, typer.Option("--save", help="Write delays and model for a controller.")
+        Path | None, typer.Option("--save", help="Write the delays and the model for use in a controller.")
     ] = None,
     method: Annotated[
         str | None,
@@ -43,7 +43,7 @@ def identify(
         str | None,
         typer.Option(
             "--htf",
-            help="How transfer functions are found: auto (as the excitation allows, the default), separated_lines, "
+            help="Estimator of the transfer functions: auto (as the excitation allows, the default), separated_lines, "
             "local_rational or regularised_least_squares (the paper's).",
         ),
     ] = None,
@@ -57,11 +57,13 @@ def identify(
     ] = None,
     clock_offset: Annotated[
         tuple[float, float] | None,
-        typer.Option("--clock-offset", help="Bounds, in s, of that clock's offset, where it is unknown."),
+        typer.Option("--clock-offset", help="Bounds of that clock's offset in s, with clock_unknown."),
     ] = None,
     clock_offset_std: Annotated[
         float | None,
-        typer.Option("--clock-offset-std", help="Or its standard deviation, in s, about zero.", min=0.0),
+        typer.Option(
+            "--clock-offset-std", help="Or the standard deviation of that offset in s, about zero.", min=0.0
+        ),
     ] = None,
     quiet: Quiet = False,
 ) -> None:

@@ -25,20 +25,20 @@ def init(
     ],
     out: Annotated[Path, typer.Option("--out", help="Folder for signals.yaml and model.yaml.")] = Path(),
     joint: Annotated[
-        str | None, typer.Option("--joint", help="Joint to look at; by default the one that moves most.")
+        str | None, typer.Option("--joint", help="Joint to use; by default the one that moves most.")
     ] = None,
     rate: Annotated[
         float | None,
-        typer.Option("--rate", metavar="HZ", help="Rate of a table's rows, where it holds no time."),
+        typer.Option("--rate", metavar="HZ", help="Sample rate of a table, if it has no column of times."),
     ] = None,
     yes: Annotated[
-        bool, typer.Option("--yes", "--no-input", help="Take the best guess everywhere, without asking.")
+        bool, typer.Option("--yes", "--no-input", help="Take the best guess for everything, without asking.")
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite files that exist.")] = False,
     elements: Elements = None,
     quiet: Quiet = False,
 ) -> None:
-    """Guess which channel is what, and a nominal model to begin with; write both, every guess with its reason."""
+    """Guess what each channel is and a first nominal model; write both, every guess with its reason."""
     from rhythmid.elements.catalogue import load_catalogue
     from rhythmid.start.roles import first_answer
     from rhythmid.start.start import start

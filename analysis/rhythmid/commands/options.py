@@ -8,9 +8,12 @@ from typing import Annotated
 import typer
 
 Bags = Annotated[
-    list[Path], typer.Argument(help="Bag directories, .mcap/.db3 files, or signals.yaml files of tables.")
+    list[Path],
+    typer.Argument(help="Bag directories, .mcap/.db3 files, or signals.yaml files that name tables."),
 ]
-SignalsFile = Annotated[Path | None, typer.Option("--signals", help="Which recorded channel is what.")]
+SignalsFile = Annotated[
+    Path | None, typer.Option("--signals", help="signals.yaml: what each recorded channel is.")
+]
 JsonFile = Annotated[
     Path | None, typer.Option("--json", help="Write the result as JSON; - is standard output.")
 ]

@@ -27,28 +27,30 @@ def proof(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of all that is drawn.")] = 0,
     kind: Annotated[Kinds, typer.Option("--kind", help="What is concealed.")] = "all",
     machine: Annotated[
-        Machines, typer.Option("--machine", help="In which machine; all take turns by default.")
+        Machines, typer.Option("--machine", help="Which machine; by default all of them in turn.")
     ] = "all",
     cluttered: Annotated[
-        bool, typer.Option("--cluttered", help="With three small effects beside, and untidy logs.")
+        bool,
+        typer.Option(
+            "--cluttered",
+            help="Add three small effects beside the main one, and faults of the log: jitter, outliers, rounding.",
+        ),
     ] = False,
     budget: Annotated[
-        float, typer.Option("--budget", min=0.0, help="Seconds that each diagnosis may search; 0: no bound.")
+        float, typer.Option("--budget", min=0.0, help="Seconds that each diagnosis may search; 0: no limit.")
     ] = 0.0,
     jobs: Annotated[
-        int, typer.Option("--jobs", min=1, help="Cases at a time; they share the processors evenly.")
+        int, typer.Option("--jobs", min=1, help="Cases in parallel; they share the processors evenly.")
     ] = 2,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with a campaign.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted campaign.")] = False,
     again: Annotated[
-        bool, typer.Option("--replay", help="Score the answers in --out once more, without simulating.")
+        bool, typer.Option("--replay", help="Score the answers in --out again, without simulating.")
     ] = False,
     only: Annotated[list[str] | None, typer.Option("--only", help="Only this case; may be repeated.")] = None,
-    keep: Annotated[
-        bool, typer.Option("--keep-bags", help="Keep the records of cases that are done.")
-    ] = False,
+    keep: Annotated[bool, typer.Option("--keep-bags", help="Keep the records of finished cases.")] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Draw machines with concealed effects, seal the truth, diagnose from their records, open the seals and score."""
+    """Draw random machines with concealed effects, seal the truth, diagnose their records, open the seals and score the answers."""
     from rich.markdown import Markdown
     from rich.progress import (
         BarColumn,

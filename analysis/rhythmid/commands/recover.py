@@ -13,14 +13,14 @@ EXAMPLES = ("rhythmid recover bag", "rhythmid recover broken.mcap --out whole")
 
 
 def recover(
-    bag: Annotated[Path, typer.Argument(help="Bag directory, .mcap or .db3 file, broken off or damaged.")],
+    bag: Annotated[Path, typer.Argument(help="Bag directory, .mcap or .db3 file, truncated or damaged.")],
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="DIR", help="Bag to write: a new folder; BAG_recovered if not given."),
+        typer.Option("--out", metavar="DIR", help="Bag to write: a new folder; BAG_recovered by default."),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Write every whole message of a damaged recording to a new bag, and list what was lost. BAG is left as it is."""
+    """Write every intact message of a damaged recording to a new bag, and list what was lost. BAG is not changed."""
     from rhythmid.progress_bar import progress
     from rhythmid.record.bag import Bag
     from rhythmid.record.recover import recover as write_recovered

@@ -21,12 +21,12 @@ def simulate(
     experiment: Annotated[Path, typer.Option("--experiment", help="Experiment file.")],
     out: Annotated[Path, typer.Option("--out", help="Bag to write.")],
     all_topics: Annotated[
-        bool, typer.Option("--all-topics", help="Record the true output and command too.")
+        bool, typer.Option("--all-topics", help="Also record the true output and the command as it acts.")
     ] = False,
     elements: Elements = None,
     quiet: Quiet = False,
 ) -> None:
-    """Run an experiment without ROS: writes the bag that the graph would record."""
+    """Run an experiment without ROS, and write the bag that the ROS graph would record."""
     from rhythmid.offline_run import simulate as run
     from rhythmid.progress_bar import progress
 

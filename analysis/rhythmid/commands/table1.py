@@ -22,7 +22,7 @@ def table1(
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate the paper's nine experiments, identify each from its bag alone, and print its Table 1 beside ours."""
+    """Simulate the paper's nine experiments, identify each from its bag alone, and print the results beside its Table 1."""
     import tempfile
 
     from rhythmid.progress_bar import progress

@@ -24,36 +24,48 @@ EXAMPLES = (
 
 
 def watch(
-    model: Annotated[Path, typer.Argument(help="Model of the machine, as identified, with its delays.")],
+    model: Annotated[Path, typer.Argument(help="Identified model of the machine, delays included.")],
     bag: Annotated[
         Path | None, typer.Option("--bag", help="Watch a recording instead of the running machine.")
     ] = None,
     signals: SignalsFile = None,
     healthy: Annotated[
         float,
-        typer.Option("--healthy", metavar="SECONDS", help="Beginning that is taken for healthy operation."),
+        typer.Option(
+            "--healthy",
+            metavar="SECONDS",
+            help="Length of the first stretch, which is assumed to be healthy operation.",
+        ),
     ] = 60.0,
     false_alarms: Annotated[
         float,
-        typer.Option("--false-alarms", metavar="A DAY", help="False alarms allowed in healthy operation."),
+        typer.Option(
+            "--false-alarms",
+            metavar="NUMBER",
+            help="False alarms per day that are allowed in healthy operation.",
+        ),
     ] = 1.0,
     calibration: Annotated[
         Path | None,
-        typer.Option("--calibration", help="What --save-calibration wrote; nothing is learnt anew."),
+        typer.Option(
+            "--calibration",
+            help="File that --save-calibration wrote; the healthy stretch is then not needed.",
+        ),
     ] = None,
     save_calibration: Annotated[
-        Path | None, typer.Option("--save-calibration", help="Write what was learnt of the healthy machine.")
+        Path | None,
+        typer.Option("--save-calibration", help="Write what was learnt from the healthy stretch."),
     ] = None,
     diagnose: Annotated[
-        bool, typer.Option(help="Diagnose the last minute of a mismatch that lasts for a minute.")
+        bool, typer.Option(help="When a mismatch has lasted for a minute, diagnose that minute.")
     ] = True,
     elements: Elements = None,
     json: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
-    """Run a model beside its machine and say when, where and by how much the two differ.
+    """Run a model in parallel with its machine and say when, where and by how much the two differ.
 
-    Without --bag the running machine is watched over ROS 2 until Ctrl-C.
+    Without --bag it watches the running machine over ROS 2, until Ctrl-C.
     """
     require_new(json, save_calibration)
     if bag is None and quiet:

@@ -226,7 +226,7 @@ def _cause(one: Explanation) -> str:
     if one.name.replace("_", "").isalpha() and "_" in one.name:
         words = f"{one.name.replace('_', ' ')} {sizes}".strip()
     else:
-        words = f"{'a force' if one.slot == 'force' else 'something'} that goes with {one.name}"
+        words = f"{'a force' if one.slot == 'force' else 'something'} that depends on {one.name}"
     if one.also:
         words += f" (or, seen from outside the same, {' or '.join(a.replace('_', ' ') for a in one.also)})"
     return f"{words} explains {share}"

@@ -192,15 +192,15 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "share_of_rest",
-        "share of the squared error which anything explains, free maps included, that the effect removes",
+        "squared error that the effect removes, as a share of what the best prediction of all, free maps included, would remove",
         "its share of the remainder is too small to distinguish it from other effects",
         _share_of_rest,
         lambda _: REST,
     ),
     Rule(
         "share_of_mismatch",
-        "share of the nominal model's explainable squared error that the effect removes",
-        "its share of the mismatch is no more than an error of the other effects may leave",
+        "squared error that the effect removes, as a share of what the best prediction of all would remove from the nominal model's",
+        "its share of the mismatch is not larger than what errors of the other effects may leave",
         _share_of_mismatch,
         lambda _: MISMATCH,
     ),
@@ -221,23 +221,23 @@ RULES: tuple[Rule, ...] = (
     ),
     _shape_rule(
         "within_bounds",
-        "distance of the effect's parameters from the bounds of what its name means, as a share of the bound",
+        "distance of the effect's parameters from the bounds within which its name applies, as a share of the bound",
         "only a limit of its parameters is identifiable, where it is another effect",
     ),
     _shape_rule(
         "acts_within_records",
-        "whether the effect is curved where the motion has been (infinite), or only beyond (0)",
+        "whether the effect's law is nonlinear within the recorded motion (infinite), or only outside it (0)",
         "it would act only outside the range of the recorded motion",
     ),
     _shape_rule(
         "own_frequency",
-        "distance of the effect's frequency from a multiple of the forcing's, in resolved lines",
+        "distance of the effect's frequency from a multiple of the forcing's, in resolved spectral lines",
         "at a multiple of the forcing's frequency it is indistinguishable from a change in the forcing's path",
     ),
     _shape_rule(
         "moves_the_machine",
         "share of the effort that an actuator's effect leaves to move the machine",
-        "an actuator's effect that takes most of the effort away explains no motion",
+        "an actuator's effect that removes most of the effort cannot explain the motion",
     ),
 )
 

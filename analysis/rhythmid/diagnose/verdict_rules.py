@@ -21,8 +21,8 @@ class Outcome:
     stated : number of its effects, those with the largest shares first, that are probable enough together to be stated.
     delay_alone : whether of a longer delay and effects no effect is stated.
     left : share of the mismatch that it leaves and something else predicts.
-    goes_with : what that goes with.
-    remainder : rms of what it leaves and something else predicts by more than chance, over the size that is of practical matter.
+    goes_with : the quantity that this depends on.
+    remainder : rms of what it leaves and something else predicts by more than chance, over the smallest of practical importance.
     missed : rms error of the chosen hypothesis, as a share of what was measured.
     detectable : smallest effect that the records would show, the same.
     evidence : share of the evidence for hypotheses that hold all of its names.
@@ -74,10 +74,10 @@ def _is(kind: Kind) -> Callable[[Outcome], float]:
 VERDICT_RULES: tuple[VerdictRule, ...] = (
     VerdictRule(
         "unnamed_remainder",
-        "no effect is accepted: rms that a free function or further effects predict beyond chance, over the size of practical matter",
+        "no effect is accepted: rms that a free function or further effects predict beyond chance, divided by the smallest rms of practical importance",
         1.0,
         "unknown_physics",
-        "no effect of the catalogue explains the mismatch: it goes with {goes_with}",
+        "no effect of the catalogue explains the mismatch, which depends on {goes_with}",
         _alone(lambda found: found.remainder),
     ),
     VerdictRule(
@@ -118,7 +118,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "share of the mismatch that the effects leave and something else predicts",
         1.0 - MAINLY,
         "unknown_physics",
-        "the named effects leave {left:.0f} % of the mismatch, which goes with {goes_with}",
+        "the named effects leave {left:.0f} % of the mismatch, which depends on {goes_with}",
         lambda found: found.left,
     ),
     VerdictRule(
@@ -131,7 +131,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
     ),
     VerdictRule(
         "other_place",
-        "an effect in a place of the path where the catalogue has none is chosen (1)",
+        "an effect in a slot of the signal path where the catalogue has no such element is chosen (1)",
         0.0,
         "undecided",
         "the effect explains the records best in a slot for which the catalogue has no such element",
@@ -150,12 +150,12 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "share of the mismatch that the effects leave and something else predicts",
         1.0 - EXPLAINED,
         "unknown_physics",
-        "this effect is mainly what is missing, but {left:.0f} % of the mismatch goes with {goes_with}",
+        "this effect is mainly what is missing, but {left:.0f} % of the mismatch is left and depends on {goes_with}",
         lambda found: found.left,
     ),
     VerdictRule(
         "rivals",
-        "share of the evidence for hypotheses that lack one of the names; 1 where another name predicts as well in its place",
+        "share of the evidence for hypotheses that lack one of the names; 1 where the model with another name in its place predicts as well",
         1.0 - STATED,
         "undecided",
         "the evidence does not separate several explanations",
@@ -163,10 +163,10 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
     ),
     VerdictRule(
         "hardly_told_apart",
-        "all else (1)",
+        "none of the above (1)",
         0.0,
         "undecided",
-        "the records hardly tell this law from others, so it may stand for one that the catalogue lacks",
+        "the records hardly distinguish this law from others, so the true law may be one that the catalogue lacks",
         lambda _: 1.0,
     ),
 )

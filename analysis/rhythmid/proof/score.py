@@ -53,7 +53,7 @@ class Score:
 
     `outcome` exact: named what was concealed, and nothing but perhaps clutter that is really there; family: named, or declared
     indistinguishable from what was named, in a family of two or as the richer law; wrong: something else named. `dominant_first`: what explains most
-    was concealed. `heldout` is the held-out error over the noise floor, where motion was compared.
+    was concealed. `heldout` is the held-out error over the noise floor; None where the effort was scored or an effort was recorded.
     """
 
     case: str
@@ -229,7 +229,7 @@ def by_effort(answer: dict[str, Any]) -> bool:
 
 
 def _heldout(truth: dict[str, Any], answer: dict[str, Any]) -> float | None:
-    # where an effort was recorded, its own noise moves a free run
+    # the noise of a recorded effort moves the free run, so that its held-out error is not a figure of the model
     if by_effort(answer) or (truth.get("rig") or {}).get("recorded") == "effort":
         return None
     error = ((answer.get("fit") or {}).get("augmented") or {}).get("heldout_nrmse")

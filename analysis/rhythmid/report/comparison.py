@@ -99,10 +99,10 @@ def comparison_section(result: Mapping[str, Any], run: Run, unit: str, path: boo
 
 
 def _name(one: Mapping[str, Any]) -> str:
-    """An explanation's name: an element, or a force that goes with something."""
+    """An explanation's name: an element, or a force that depends on a quantity."""
     if "_" in one["name"] or one["slot"] is None:
         return pretty_name(one["name"])
-    return f"{'force' if one['slot'] == 'force' else 'effect'} that goes with {one['name']}"
+    return f"{'force' if one['slot'] == 'force' else 'effect'} that depends on {one['name']}"
 
 
 def _explanations(result: Mapping[str, Any]) -> Table:

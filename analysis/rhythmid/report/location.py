@@ -113,9 +113,9 @@ def _dependences(found: Findings) -> Drawing | None:
     shares = {one.quantity: 100.0 * max(one.explained, 0.0) for one in found.functions}
     bars = [Bar(quantity, share, f"{share:.0f}\u202f%") for quantity, share in shares.items()]
     if found.result["verdict"] == "consistent":
-        reading = "Nothing that is left goes with any of them."
+        reading = "What is left depends on none of them."
     elif max(shares.values()) > 100.0 * SHARE:
-        reading = "The long bars say what the missing force goes with."
+        reading = "The long bars show what the missing force depends on."
     else:
         reading = "No long bar: the fault is no force that depends on the present state alone, or too large to be mapped."
     return Drawing(
@@ -131,12 +131,12 @@ def _dependences(found: Findings) -> Drawing | None:
 
 
 def unknown_section(found: Findings) -> Section:
-    """What the named effects leave: its share of the mismatch, what it goes with, and the curve that it draws over that."""
+    """What the named effects leave: its share of the mismatch, what it depends on, and its curve over that quantity."""
     left = found.result["remainder"]
     verdict = found.result["verdict"]
     if left["significant"]:
         said = (
-            f"The final model leaves {percent(left['share'])} of the mismatch, by more than chance. What is left goes with "
+            f"The final model leaves {percent(left['share'])} of the mismatch, by more than chance. What is left depends on "
             f"{left['goes_with']}."
         )
         said += (
@@ -167,7 +167,7 @@ def unknown_section(found: Findings) -> Section:
 
 
 def _most_telling(functions: Sequence[FreeFunction], goes_with: str | None) -> list[FreeFunction]:
-    """The function that explains most, and the one that the remainder goes with where that is another."""
+    """The function that explains most, and the one that the remainder depends on where that is another."""
     drawn = [f for f in functions if len(f.force)]
     chosen = [f for f in drawn[:1] if f.explained > TELLING]
     return chosen + [f for f in drawn if f.quantity == goes_with and f not in chosen]

@@ -128,7 +128,7 @@ def _forces(
         rest = -found["constant"] / stiffness
         values = {"stiffness": _short(stiffness), "rest_length": _short(rest)}
         model = model.with_element(catalogue["linear_spring"], values)
-        reasons["linear_spring"] = "a force that goes with the position brings it back"
+        reasons["linear_spring"] = "a force proportional to the position brings it back"
         if model.units.position == "rad" and rows.span >= 2.0 * LEAST_SWING:
             reasons["linear_spring"] += (
                 "; it explains more than a pendulum's gravity, which is pendulum_gravity: {moment: …}"
@@ -146,7 +146,7 @@ def _forces(
             catalogue["pendulum_gravity"], {"moment": _short(moment), "reference": _short(hanging)}
         )
         reasons["pendulum_gravity"] = (
-            "a torque that goes with the sine of the angle explains more than a spring; reference: hanging"
+            "a torque proportional to the sine of the angle explains more than a spring; reference: hanging"
         )
     elif kind == "constant":
         model = model.with_element(catalogue["constant_force"], {"force": _short(-found["constant"])})

@@ -221,11 +221,10 @@ def _by_data(one: _Known, output: Recorded, measured: Quantity, velocity: Choice
             )
     if poses(one.one):
         told = follows(one.one, output)
-        reason = f"a target of the {measured}, which goes with it ({told.correlation:.2f} correlation)"
+        reason = f"a target of the {measured}, which follows it ({told.correlation:.2f} correlation)"
         return replace(one, meaning=replace(one.meaning, quantity=measured, commanded=True, reason=reason))
-    reason = (
-        f"no motion is a copy of it, and it goes with the output (coherence {coherent(one.one, output):.2f})"
-    )
+    coherence = coherent(one.one, output)
+    reason = f"no motion is a copy of it, and it is coherent with the output (coherence {coherence:.2f})"
     return replace(one, meaning=replace(one.meaning, quantity="effort", reason=reason))
 
 

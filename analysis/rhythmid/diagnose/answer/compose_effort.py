@@ -48,7 +48,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     )
     remainder = _remainder(result)
     if not slots and decision.verdict == "unknown_physics":
-        slots, where = ["force"], f"{SENTENCES['force']}; it goes with {remainder.goes_with}"
+        slots, where = ["force"], f"{SENTENCES['force']}; it depends on {remainder.goes_with}"
     held = f"held out: {', '.join(dict.fromkeys(record.whole or record.name for record in case.holdout))}"
     return Diagnosis(
         verdict=decision.verdict,

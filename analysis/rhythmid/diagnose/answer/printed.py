@@ -97,7 +97,7 @@ def remainder_words(left: Remainder) -> str:
     """What the names leave, in words."""
     if not left.significant:
         return "nothing that any free function predicts better than chance"
-    return f"{_percent(left.share)} of the mismatch, which goes with {left.goes_with}"
+    return f"{_percent(left.share)} of the mismatch, which depends on {left.goes_with}"
 
 
 def scoring_words(scored: Scored) -> str:

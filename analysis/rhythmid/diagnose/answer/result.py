@@ -97,7 +97,7 @@ class Curve:
 @dataclass(frozen=True)
 class Remainder:
     """What the named effects leave and a free map predicts: its share of the mismatch, whether that is more than chance, the
-    quantity that it goes with best and, for a function of one quantity, its curve."""
+    quantity that it depends on most and, for a function of one quantity, its curve."""
 
     share: float
     significant: bool

@@ -61,7 +61,7 @@ def summary_of(
         said = "Nothing of practical size is missing: with its parameters refitted, the nominal model explains the records"
         left = decision.unexplained
         if left.significant:
-            return f"{said} but for a small remainder that goes with {left.goes_with}."
+            return f"{said} but for a small remainder that depends on {left.goes_with}."
         return f"{said} down to the noise."
     if decision.verdict == "missing_physics":
         said = f"The model lacks {names}."
@@ -81,7 +81,7 @@ def summary_of(
         left = decision.unexplained
         if left.significant and left.share > 0.0:
             said += (
-                f" {number(100.0 * left.share, 2)} % of the mismatch is left and goes with {left.goes_with}."
+                f" {number(100.0 * left.share, 2)} % of the mismatch is left and depends on {left.goes_with}."
             )
         return said
     if decision.verdict == "undecided":

@@ -25,11 +25,15 @@ def add(app: typer.Typer) -> None:
     def run(
         experiment: Annotated[Path, typer.Argument(help="Experiment file.")],
         out: Annotated[
-            Path | None, typer.Option("--out", help="Bag to write, instead of the one named in it.")
+            Path | None,
+            typer.Option("--out", help="Bag to write, instead of the one that the experiment names."),
         ] = None,
         node: Annotated[
             str | None,
-            typer.Option("--node", help="Run only this node, here and unattended (one container per node)."),
+            typer.Option(
+                "--node",
+                help="Run only this node, in this process and without supervision (for one container per node).",
+            ),
         ] = None,
         replace: Annotated[
             list[str] | None,
@@ -43,13 +47,14 @@ def add(app: typer.Typer) -> None:
         isolated: Annotated[
             bool,
             typer.Option(
-                "--isolated", help="Give the nodes a network of their own: nobody else reaches them."
+                "--isolated",
+                help="Run the nodes in a network namespace of their own, which no other process can reach.",
             ),
         ] = False,
         report: ReportFile = None,
         quiet: Quiet = False,
     ) -> None:
-        """Run the graph of an experiment: starts, watches and stops its nodes and leaves a bag."""
+        """Run the ROS graph of an experiment: start, supervise and stop its nodes, and write a bag."""
         if node is not None and report is not None:
             raise InputError("--node runs one node, and --report describes a whole run: give one of the two")
         if node is not None and replace:
