@@ -20,9 +20,9 @@ CYCLE = 0.02  # of a period of the motion, as a time
 PLAIN = 0.1  # of what has no unit
 FURTHER = 4.0  # times these, the lengths, speeds and times of a second guess
 GUESSES = (  # the same in words, for the reference page
-    f"N is {FORCE:g} of the typical force, N/m, N*s/m and their like {COEFFICIENT:g} of what would make that force, kg {MASS:g} of "
-    f"the mass, m, m/s and m/s^2 {MOTION:g} of the motion, s {CYCLE:g} of its period, Hz its frequency, 1 is {PLAIN:g}, 1/s "
-    f"{PLAIN:g} of the inverse duration; lengths, speeds and times once more {FURTHER:g} times that"
+    f"for N {FORCE:g} of the typical force; for N/m, N*s/m and similar units {COEFFICIENT:g} of the coefficient that gives that force; "
+    f"for kg {MASS:g} of the mass; for m, m/s and m/s^2 {MOTION:g} of the motion; for s {CYCLE:g} of its period; for Hz its frequency; "
+    f"for 1 {PLAIN:g}; for 1/s {PLAIN:g} of the inverse duration; for lengths, speeds and times a second guess {FURTHER:g} times as large"
 )
 SHAPES = (
     "m",

@@ -32,56 +32,56 @@ ACTS: Mapping[str, str] = {
     "transmission": "a force between mass and base of a gear that carries `load`: the other forces, without friction and damping",
     "modifier": "what changes the sum `leg` of all forces between mass and base, such as a loss of contact",
     "drive": "a force made on the robot, which depends on time alone; it goes through the actuator",
-    "transducer": "an actuator that feels the motion it makes",
+    "transducer": "an actuator on which the motion acts back",
     "feedback": "a controller, whose reference is the command",
-    "observation": "what controllers see of the motion, as the element says",
+    "observation": "the motion as controllers measure it",
 }
 PREAMBLE = """# The elements
 
 Written by `python -m rhythmid.elements.reference > docs/elements.md` from the element files; change those, not this
 page.
 
-A model is an inertia and a list of elements. x is the position, v its rate, e = x − x₀ the departure from the linear
+A model is an inertia and a list of elements. x is the position, v its rate, e = x − x₀ the deviation from the linear
 spring's rest length, u the command, f₀ the forcing made on the robot, f the actuator force, y the measurement, t the
 record's time. Forces act on the mass, positive along +x. Units are those of a translational machine; a rotational one
 reads N as N·m, m as rad, kg as kg·m².
 
 *Candidate* elements take part in the search for missing physics; the others are nominal, or exactly absorbed by
-nominal parameters. An element is absent when its *size* parameter has the value given. Parameters marked *fixed* are
-not estimated unless a model file says so. Names in brackets are other names of the same thing.
+nominal parameters. An element has no effect when its *size* parameter has the value given under *Absent at*. Parameters marked *fixed* are
+not estimated unless a model file says so. Names in brackets are synonyms.
 
 ## Which motion an effect sees
 
-Where the input displaces the base (`kind: base_displacement`), x and v of the room are not those of the leg. Each element says
-which it sees. With any other input they are the same; with `kind: base_acceleration` all positions are relative to the base.
+Where the input displaces the base (`kind: base_displacement`), x and v relative to the room differ from those relative to the base. Each element says
+which of them it uses. With any other input they are the same; with `kind: base_acceleration` all positions are relative to the base.
 
 {acts}
 
 Friction and dampers marked *against base or room* act between mass and base, unless a model file says
-`against: room`, as in `coulomb_friction: {{force: 1.0, against: room}}`. Where the base moves a search tries both.
+`against: room`, as in `coulomb_friction: {{force: 1.0, against: room}}`. Where the base moves, the search tries both.
 
 ## Writing an element
 
 An element is one file that ends with `ELEMENT = Element(…)`; it lies in a folder given with `--elements`. Copy the file of a
-similar one. What to fill in, besides names, equation, parameters and reference:
+similar one. Its fields, besides names, equation, parameters and reference:
 
-- `kernel`, a plain function in Python and `math`. What it is given, in this order, is said by slot and `acts` in the table
-  below; then follow the parameters, what it `borrows` from other elements (their parameters, the mass, the step), and its
-  states. It returns its value, and with states their rates after it: `return force, rate`.
-- `history` and `dead_time`: signals of those that the kernel is given which it wants as they were earlier, too, and the parameter
-  that says by how much. They are its last arguments.
+- `kernel`: a plain function in Python and `math`. Its first arguments depend on slot and `acts`, see the table
+  below. Then follow the parameters, what it `borrows` from other elements (their parameters, the mass, the step), and its
+  states. It returns its value, followed by the rates of its states: `return force, rate`.
+- `history` and `dead_time`: those of its arguments of which the kernel also needs an earlier value, and the parameter
+  that says how much earlier. The earlier values are its last arguments.
 - `switches`: where the force changes form, for the phase portraits of reports: `("v", "")` at zero velocity, `("x", "kink")` at
-  the position that the parameter `kink` says.
-- `acts`: which motion a force sees, and where it is added; left out it is `leg`.
-- `size`: the parameter that says how much of the effect there is, and `absent` (0 unless said) the value at which the model
-  behaves as without it. The score test moves this parameter alone.
+  the position given by the parameter `kink`.
+- `acts`: which motion a force sees, and where it is added; `leg` by default.
+- `size`: the parameter that scales the effect, and `absent` (0 by default) its value at which the effect is zero.
+  The score test varies this parameter alone.
 - `starts`: first guesses from the records' scales, a function such as
-  `lambda s: [{{"force": 0.02 * s.force, "transition": 0.1 * s.velocity}}]`. Right within a factor of ten is enough for a size,
-  which the score test scales; frequencies and lengths need several guesses, as far apart as the minima lie. An empty list says that
-  this motion does not show the effect. Without `starts` the guesses come from the units: {guesses}. A parameter with a
-  default keeps it. What cannot be guessed in this way is not tried, and the answer says why.
-- `ranges`: bounds from the scales, beyond which the effect is another by name; `confusable`, `special_case_of`, `needless_with`:
-  what it could be taken for.
+  `lambda s: [{{"force": 0.02 * s.force, "transition": 0.1 * s.velocity}}]`. A factor of ten is accurate enough for a size,
+  which the score test scales. Frequencies and lengths need several guesses, at the distance of the local minima. An empty list says that
+  this motion does not show the effect. Without `starts` the guesses follow from the units: {guesses}. A parameter with a
+  default keeps it. An element without a guess is not tried, and the answer says why.
+- `ranges`: bounds, from the scales, within which the name of the effect applies; `confusable`, `special_case_of`, `needless_with`:
+  effects with which it could be confused.
 
 | slot | `acts` | the kernel is given | x and v are |
 | --- | --- | --- | --- |

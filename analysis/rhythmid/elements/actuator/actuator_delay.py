@@ -1,10 +1,10 @@
 """Actuator delay: a dead time on the whole actuator force, f(t) = f_cmd(t - tau_a) with f_cmd = f0 + u.
 
-What a drive's bus and its current loop take, a valve and its hose. Unlike the input delay it delays the robot's own forcing,
-too, and a controller's force: it stands inside the loop, and takes from its damping.
+Examples: the bus and the current loop of a drive, or a valve and its hose. Unlike the input delay it also delays the robot's own
+forcing and a controller's force. It is inside the control loop, and reduces its damping.
 
-Without a controller, all that drives the machine comes later by tau_a, so the motion does: nothing recorded tells this from a
-measurement delay. Only their sum is identifiable then.
+Without a controller, all inputs of the machine are later by tau_a, and so is the motion: it is then observationally equivalent to a
+measurement delay, and only their sum is identifiable.
 """
 
 from rhythmid.elements.dead_time import dead_time

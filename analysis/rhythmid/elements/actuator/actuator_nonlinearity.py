@@ -22,7 +22,7 @@ ELEMENT = Element(
     also_known_as=("force compression", "magnetic saturation"),
     family="actuator nonlinearity",
     confusable={
-        "actuator_saturation": "smooth compression against a sharp limit: vary the amplitude around it",
+        "actuator_saturation": "smooth compression instead of a sharp limit: vary the amplitude around it",
         "actuator_deadband": "odd too, but strongest at small forces",
         "actuator_gain": "one amplitude only",
     },

@@ -30,7 +30,7 @@ ELEMENT = Element(
     also_known_as=("force limit", "current limit", "clipping"),
     family="actuator nonlinearity",
     confusable={
-        "actuator_nonlinearity": "smooth compression against a sharp limit: vary the amplitude around it",
+        "actuator_nonlinearity": "a sharp limit instead of smooth compression: vary the amplitude around it",
         "actuator_rate_limit": "limits the force, not its rate",
     },
     reference="A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, 1968",

@@ -25,7 +25,7 @@ ELEMENT = Element(
     candidate=False,
     also_known_as=("command latency", "dead time"),
     confusable={
-        "measurement_delay": "only through sidebands or a limit cycle of known phase",
+        "measurement_delay": "separable only through sidebands or a limit cycle of known phase",
         "command_lag": "rolls off as well; excite high frequencies",
     },
     reference="Paper, section 3.1",

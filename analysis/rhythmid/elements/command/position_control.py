@@ -37,7 +37,7 @@ ELEMENT = Element(
     family="control",
     confusable={
         "linear_spring": "the same where the reference rests",
-        "viscous_damper": "the same as the derivative gain: record the motor's effort to tell them apart",
+        "viscous_damper": "the same as the derivative gain: record the motor's effort to separate them",
     },
     reference="B. Siciliano, L. Sciavicco, L. Villani, G. Oriolo, Robotics, 2009, section 8.5",
 )

@@ -35,7 +35,7 @@ ELEMENT = Element(
     special_case_of=("end_stop_contact",),  # undamped, pushing only
     confusable={
         "end_stop_contact": "a stop is stiff, damped and beyond the usual motion",
-        "quadratic_stiffness": "kink against curve: vary the amplitude",
+        "quadratic_stiffness": "a kink instead of a smooth curve: vary the amplitude",
         "ground_contact_loss": "the leg's whole force vanishes, damping too, at the rest length",
     },
     switches=("x", "kink"),

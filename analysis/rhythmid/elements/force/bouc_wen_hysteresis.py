@@ -42,7 +42,7 @@ ELEMENT = Element(
     also_known_as=("smooth hysteresis", "Dahl friction", "presliding friction"),
     family="friction",
     confusable={
-        "elastoplastic_hysteresis": "differs in how round the loop's knee is: reversals of many sizes",
+        "elastoplastic_hysteresis": "differs in the curvature of the loop at its knee: reversals of many sizes",
         "coulomb_friction": "differ before sliding: small slow reversals",
         "viscoelastic_relaxation": "its loop does not depend on speed: repeat slower",
         "lugre_friction": "the same without bristle damping and Stribeck fall for s = 1",

@@ -29,7 +29,7 @@ ELEMENT = Element(
     also_known_as=("bias force",),
     confusable={
         "sensor_offset": "the same on a linear spring: record the effort at rest",
-        "asymmetric_coulomb_friction": "changes sign with nothing: let the machine rest",
+        "asymmetric_coulomb_friction": "never changes sign: record the machine at rest",
         "linear_spring": "a displacement of its rest length: move over a wide range",
     },
     reference="Elementary mechanics",

@@ -24,7 +24,7 @@ ELEMENT = Element(
         "linear_spring": "one amplitude only: the resonance moves with the square of the amplitude",
         "quadratic_stiffness": "the same tangent away from e = 0: large amplitudes, a bias force of both signs",
         "quintic_stiffness": "one amplitude only",
-        "pendulum_gravity": "a softening cubic is its leading term: swing wide",
+        "pendulum_gravity": "a softening cubic is its leading term: use large swings",
     },
     reference="I. Kovacic, M. J. Brennan (eds.), The Duffing Equation, Wiley, 2011",
 )

@@ -45,10 +45,10 @@ ELEMENT = Element(
     ),
     family="friction",
     confusable={
-        "bouc_wen_hysteresis": "differs in how round the loop's knee is: reversals of many sizes",
+        "bouc_wen_hysteresis": "differs in the curvature of the loop at its knee: reversals of many sizes",
         "coulomb_friction": "differ before sliding: small slow reversals",
         "viscoelastic_relaxation": "its loop does not depend on speed: repeat slower",
-        "lugre_friction": "has no fall of friction with speed",
+        "lugre_friction": "its friction does not fall with speed",
     },
     reference="Y.-K. Wen, Journal of the Engineering Mechanics Division ASCE 102(2), 1976, 249-263",
 )

@@ -38,7 +38,7 @@ ELEMENT = Element(
         "coulomb_friction": "same at constant load: vary the actuator force",
         "transmitted_load_friction": "the same where the external load follows the motor's force: hold, lift and lower a load",
         "viscous_damper": "one amplitude only",
-        "actuator_gain": "where f and v always have one sign",
+        "actuator_gain": "equivalent where f and v always have the same sign",
     },
     reference="M. Duclusaud et al., Extended friction models for the physics simulation of servo actuators, "
     "ICRA 2025, arXiv 2410.08650",

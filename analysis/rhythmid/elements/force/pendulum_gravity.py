@@ -46,7 +46,7 @@ ELEMENT = Element(
     family="stiffness",
     confusable={
         "linear_spring": "small swings: F ≈ −G (x − x_r)",
-        "cubic_stiffness": "a softening cubic is its next term: swing wide",
+        "cubic_stiffness": "a softening cubic is its next term: use large swings",
     },
     reference="Any text on mechanics, e.g. L. D. Landau, E. M. Lifshitz, Mechanics, section 5",
 )

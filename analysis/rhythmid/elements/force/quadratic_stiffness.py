@@ -23,7 +23,7 @@ ELEMENT = Element(
     confusable={
         "cubic_stiffness": "the same tangent away from e = 0: large amplitudes, a bias force of both signs",
         "sensor_nonlinearity": "leaves the motion alone: second harmonic without a change of resonance",
-        "bilinear_stiffness": "kink against curve: vary the amplitude",
+        "bilinear_stiffness": "a smooth curve instead of a kink: vary the amplitude",
     },
     reference="A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations, Wiley, 1979",
 )

@@ -26,7 +26,7 @@ ELEMENT = Element(
     also_known_as=("thermal softening", "wear", "ageing"),
     family="drift",
     confusable={
-        "stiffness_jump": "a ramp against a step",
+        "stiffness_jump": "a ramp instead of a step",
         "sensor_drift": "moves the resonance too: repeat the first experiment at the end",
         "actuator_fade": "moves the resonance, not the gain",
     },

@@ -34,6 +34,6 @@ ELEMENT = Element(
     hops=lambda s: {"time": 1.0 / min(s.frequency, s.forcing_frequency or s.frequency)},
     also_known_as=("crack", "sudden softening", "slipped clamp"),
     family="drift",
-    confusable={"stiffness_drift": "a step against a ramp"},
+    confusable={"stiffness_drift": "a step instead of a ramp"},
     reference="M. Basseville, I. V. Nikiforov, Detection of Abrupt Changes, Prentice Hall, 1993",
 )

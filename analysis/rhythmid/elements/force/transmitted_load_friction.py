@@ -50,7 +50,7 @@ ELEMENT = Element(
         "load_dependent_friction": "the same where the external load follows the motor's force: hold a load at rest, "
         "lift and lower it, drive it freely",
         "coulomb_friction": "the same at constant load: vary the load",
-        "actuator_gain": "where f and v always have one sign",
+        "actuator_gain": "equivalent where f and v always have the same sign",
     },
     reference="M. Duclusaud, G. Passault, V. Padois, O. Ly, Extended friction models for the physics simulation of servo "
     "actuators, ICRA 2025, arXiv 2410.08650, models M3 and M5",

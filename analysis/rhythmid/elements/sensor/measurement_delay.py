@@ -24,7 +24,7 @@ ELEMENT = Element(
     candidate=False,
     also_known_as=("sensor latency",),
     confusable={
-        "input_delay": "only through sidebands or a limit cycle of known phase",
+        "input_delay": "separable only through sidebands or a limit cycle of known phase",
         "sensor_lag": "rolls off as well; excite high frequencies",
     },
     reference="Paper, section 3.1",

@@ -25,6 +25,6 @@ ELEMENT = Element(
     starts=lambda s: [{"gain": 1.02}],
     also_known_as=("scale error", "sensitivity error"),
     family="calibration",
-    confusable={"actuator_gain": "both scale the response; a known mass and a known length tell"},
+    confusable={"actuator_gain": "both scale the response; separable with a known mass and a known length"},
     reference="J. Fraden, Handbook of Modern Sensors, 5th ed., 2016, chapter 3",
 )

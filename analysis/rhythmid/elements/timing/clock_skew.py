@@ -24,7 +24,7 @@ ELEMENT = Element(
     family="clock",
     same_as=("delay_drift",),
     confusable={
-        "delay_drift": "the same model: only knowledge of the clocks tells",
+        "delay_drift": "observationally equivalent: only knowledge of the clocks separates them",
         "input_delay_drift": "moves the limit cycle's phase as well",
     },
     reference="S. B. Moon, P. Skelly, D. Towsley, INFOCOM 1999, 227-234",

@@ -1,7 +1,7 @@
 """Delay drift, on the measurement's side: the measurement delay grows with time, tau_y + r t.
 
-Its counterpart for commands is `input_delay_drift`. A clock skew of epsilon = r / (1 - r) gives the same record: only
-knowledge of the clocks tells the two apart, and both are then reported together.
+Its counterpart for commands is `input_delay_drift`. A clock skew of epsilon = r / (1 - r) gives the same record: the two are
+observationally equivalent without knowledge of the clocks, and are reported together.
 """
 
 from rhythmid.elements.element import Element, Parameter
@@ -24,7 +24,7 @@ ELEMENT = Element(
     family="clock",
     same_as=("clock_skew",),
     confusable={
-        "clock_skew": "the same model: only knowledge of the clocks tells",
+        "clock_skew": "observationally equivalent: only knowledge of the clocks separates them",
         "input_delay_drift": "moves the limit cycle's phase as well",
     },
     reference="S. B. Moon, P. Skelly, D. Towsley, INFOCOM 1999, 227-234",
