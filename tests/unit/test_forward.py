@@ -23,8 +23,11 @@ ORDER = ("coulomb_friction", "cubic_stiffness", "quadratic_drag")  # in which th
 VALUES = ({"force": 1.0, "transition": 0.01}, {"coefficient": 10.0}, {"coefficient": 1.0})
 
 
-def found(monkeypatch: pytest.MonkeyPatch, *gains: float) -> tuple[str, ...]:
-    """The effects that a search grants, of which each lowers chi2 by its gain, once the ones before it are there."""
+def found(monkeypatch: pytest.MonkeyPatch, *gains: float, local: bool = False) -> tuple[str, ...]:
+    """The effects that a search grants, of which each lowers chi2 by its gain, once the ones before it are there.
+
+    All score along the whole records, or only in windows of them where `local`.
+    """
 
     def fitted(trial: Any, *_: Any, **__: Any) -> Any:
         run = SimpleNamespace(max_step=1e-3, compiled=SimpleNamespace(layout=SimpleNamespace(states=())))
@@ -37,6 +40,8 @@ def found(monkeypatch: pytest.MonkeyPatch, *gains: float) -> tuple[str, ...]:
     def one_round(fit: Any, added: tuple[str, ...], *_: Any) -> tuple[Round, Any]:
         place = len(added)
         scores = [Score(0, CATALOGUE[ORDER[place]], VALUES[place], 1e3, 1.0)] if place < len(gains) else []
+        if local:
+            return Round((), 1.0, added, tuple(scores)), fit
         return Round(tuple(scores), 0.0 if scores else 1.0, added), fit
 
     def run_trials(proposals: list[Proposal], *_: Any, **__: Any) -> tuple[list[Trial], list[Any]]:
@@ -66,6 +71,10 @@ def found(monkeypatch: pytest.MonkeyPatch, *gains: float) -> tuple[str, ...]:
 
 def test_effects_are_granted_one_after_the_other_up_to_three(monkeypatch):
     assert found(monkeypatch, 2e5, 5e4, 1e4) == ORDER
+
+
+def test_an_effect_that_shows_in_windows_only_is_refitted_and_granted(monkeypatch):
+    assert found(monkeypatch, 2e5, 5e4, local=True) == ORDER[:2]
 
 
 @pytest.mark.parametrize(("gain", "granted"), [(60.0, 1), (250.0, 2)])

@@ -179,7 +179,7 @@ def search(
     now = first
     gained = 0.0
     while (
-        now.p_value < LEVEL
+        now.chance < LEVEL
         and _could_pay(now, best, max(WORTH, SHARE * gained), current)
         and len(best.added) < most
     ):
@@ -292,9 +292,7 @@ def _could_pay(now: Round, best: Trial, margin: float, current: Fit) -> bool:
         return False
     power = sum(one.power(one.used) for one in series)  # the number of samples times the motion's mean square
     practical = PRACTICAL**2 * power / max(noise.variance, noise.long_run_variance)
-    return now.scores[0].statistic > max(
-        0.5 * (margin + math.log(max(best.samples, 2))), UNDERSTATED * practical
-    )
+    return now.strongest > max(0.5 * (margin + math.log(max(best.samples, 2))), UNDERSTATED * practical)
 
 
 def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial) -> list[Trial]:

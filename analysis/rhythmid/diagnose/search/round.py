@@ -54,6 +54,20 @@ class Round:
     added: tuple[str, ...] = ()
     local: tuple[Score, ...] = ()
 
+    @property
+    def chance(self) -> float:
+        """Probability of such a best score by chance, along the whole records or in windows (Bonferroni).
+
+        Either test alone is blind to something: what moves the machine out of proportion cancels along whole records and is taken
+        for the colour of the noise there, what is slow is hidden in windows.
+        """
+        return min(1.0, 2.0 * min(self.p_value, p_value(self.local)))
+
+    @property
+    def strongest(self) -> float:
+        """The highest statistic of all scores; 0 without any."""
+        return max((group[0].statistic for group in (self.scores, self.local) if group), default=0.0)
+
 
 def distinct(scores: Sequence[Score], count: int) -> list[tuple[Score, list[Score]]]:
     """The best score of each of the first `count` elements, with all scores of that element."""
