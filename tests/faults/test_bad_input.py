@@ -1,17 +1,15 @@
 """Bad input to every command, called as users call it: one line that says what is wrong, exit code 2, nothing written."""
 
-import errno
 import math
 import shutil
 from dataclasses import replace
-from importlib.metadata import entry_points
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import EXPERIMENT, needs_run
 
-from rhythmid.cli import COMMAND_GROUP
 from rhythmid.record.bag_writer import add_topic, new_bag
 from rhythmid.record.messages import Messages, string_message
 
@@ -230,13 +228,6 @@ def test_a_wrong_model_is_refused_with_one_line(reader, fault, topics, bag, refu
     assert line.startswith("wrong.yaml:") and WRONG_MODELS[fault][2] in line
 
 
-def needs_run():
-    """Skip where the packages of the graph, which bring the command `run`, are not installed."""
-    if "run" not in entry_points(group=COMMAND_GROUP).names:
-        pytest.skip("rhythmid_bringup is not installed")
-
-
-EXPERIMENT = "model: hopper.yaml\nexcitation: {type: chirp, amplitude: 0.3, sweep: 2.0}\n"
 WRONG_EXPERIMENTS = {
     "delays: {input: -0.1}": "experiment.yaml:3: delays.input: -0.1 s is outside [0, 10]; a delay is in seconds",
     "delays: {measurement: 40 ms}": "experiment.yaml:3: delays.measurement: a number is expected",
@@ -305,53 +296,6 @@ def test_a_missing_experiment_is_refused_with_one_line(starts):
     assert starts() == "experiment.yaml: cannot be read: No such file or directory"
 
 
-WRITERS = [
-    ("check", "bag", "--json"),
-    *(("identify", "bag", option) for option in ("--json", "--report", "--save-model", "--save")),
-    *(
-        ("diagnose", "bag", "--model", str(MODEL), option)
-        for option in ("--json", "--report", "--save-model")
-    ),
-    ("simulate", "hopper.yaml", "--experiment", "experiment.yaml", "--out"),
-    ("run", "experiment.yaml", "--out"),
-    ("table1", "--json"),
-    ("table1", "--out"),
-]
-TARGETS = {
-    "there": "there: exists already",
-    "folder": "folder: exists already",
-    "/proc/out": "cannot be written to",
-    "file/out": "file/out",
-    "a" * 250: "cannot be written: a name in it is longer than 246 bytes",
-    "none/" + "a" * 250: "cannot be written: a name in it is longer than 246 bytes",
-}
-
-
-@pytest.mark.parametrize("target", TARGETS, ids=lambda target: target[:12])
-@pytest.mark.parametrize("writer", WRITERS, ids=lambda words: f"{words[0]} {words[-1]}")
-def test_a_result_is_refused_before_any_work_where_it_cannot_be_written(
-    writer, target, tmp_path, refused, bag, topics
-):
-    if writer[0] == "run":
-        needs_run()
-    bag(topics)
-    shutil.copy(MODEL, tmp_path / "hopper.yaml")
-    (tmp_path / "experiment.yaml").write_text(EXPERIMENT)
-    (tmp_path / "there").write_text("precious")
-    (tmp_path / "file").touch()
-    (tmp_path / "folder").mkdir()
-    before = sorted(tmp_path.rglob("*"))
-    assert TARGETS[target] in refused(*writer, target)
-    assert sorted(tmp_path.rglob("*")) == before
-    assert (tmp_path / "there").read_text() == "precious"
-
-
-def test_two_results_are_not_written_over_one_another(refused, bag, topics):
-    bag(topics)
-    line = refused("identify", "bag", "--json", "out", "--report", "./out")
-    assert "is named for two results" in line
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -371,46 +315,6 @@ def test_two_results_are_not_written_over_one_another(refused, bag, topics):
 def test_bad_usage_is_refused_with_one_line(arguments, words, refused, bag, topics):
     bag(topics)
     assert words in refused(*arguments)
-
-
-LONG = "a" * 300  # characters; file systems take names of at most 255 bytes
-LONG_SOURCES = [
-    ("check", LONG),
-    ("identify", LONG),
-    ("diagnose", LONG, "--model", str(MODEL)),
-    ("diagnose", LONG, "--sim", LONG),
-    ("watch", str(MODEL), "--bag", LONG),
-    ("recover", LONG, "--out", "out"),
-    ("recover", LONG),
-    ("convert", LONG, "--out", "out"),
-    ("init", LONG),
-    ("batch", LONG),
-    ("export", LONG, "--to", "csv"),
-    ("design", LONG, "--duration", "9", "--band", "0", "7", "--max-effort", "1", "--noise-std", "1", "--output", "out"),
-    ("simulate", LONG, "--experiment", "experiment.yaml", "--out", "out"),
-    ("simulate", str(MODEL), "--experiment", LONG, "--out", "out"),
-    ("check", "bag", "--signals", LONG),
-    ("proof", "--out", LONG, "--cases", "1"),
-    ("run", LONG),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("arguments", LONG_SOURCES, ids=lambda words: " ".join(words).replace(LONG, "LONG"))
-def test_a_name_that_no_file_can_have_is_refused_with_one_line(arguments, refused, tmp_path):
-    if arguments[0] == "run":
-        needs_run()
-    (tmp_path / "experiment.yaml").write_text(EXPERIMENT)
-    line = refused(*arguments)
-    assert LONG in line and "File name too long" in line
-    assert sorted(tmp_path.iterdir()) == [tmp_path / "experiment.yaml"]
-
-
-def test_a_recording_that_may_not_be_read_is_refused_with_one_line(refused, tmp_path, monkeypatch):
-    def forbidden(path, **_):
-        raise PermissionError(errno.EACCES, "Permission denied", str(path))
-
-    monkeypatch.setattr(Path, "exists", forbidden)
-    assert refused("identify", "locked/run.mcap") == "locked/run.mcap: Permission denied"
 
 
 @pytest.mark.parametrize("reader", READERS)
