@@ -79,3 +79,18 @@ def test_a_period_that_alone_is_free_is_followed_too():
     fit = estimate(model.with_parameters(fixed), [recorded(0)], noise=NOISE, max_step=STEP)
     found = ticks_followed(search_of(fit, "command_hold"))
     assert abs(found.fit.model.value(PERIOD) - TRUE[PERIOD]) < 3.0 * found.fit.std[PERIOD] < 1e-5
+
+
+def test_a_delay_that_is_found_below_zero_has_an_interval_too():
+    # the command was logged later than it acted, by more than the interval reaches
+    early, model = 3e-3, held(**{INPUT_DELAY: -3e-3})
+    delay = replace(model.parameters[INPUT_DELAY], bounds=(-0.01, 1.0))
+    record = recorded(0)
+    assert record.command is not None
+    logged = zero_order_hold(record.time + TRUE[INPUT_DELAY] + early, np.asarray(record.command(record.time)))
+    late = replace(record, command=logged)
+    fit = estimate(model.with_parameters({INPUT_DELAY: delay}), [late], noise=NOISE, max_step=STEP)
+    found = ticks_followed(search_of(fit, "command_hold"))
+    assert found.fit.model.value(INPUT_DELAY) == pytest.approx(-early, abs=1e-4)
+    assert np.isfinite(found.fit.covariance).all()
+    assert 1e-5 < found.fit.std[INPUT_DELAY] < 10.0 * SAMPLE

@@ -63,10 +63,12 @@ def _covariance(
         step = max(step, END * fit.std[name] if np.isfinite(fit.std[name]) else 0.0)
         if step == 0.0:
             continue
-        ends = [model.with_values({name: max(model.value(name) + side * step, 0.0)}) for side in (1.0, -1.0)]
+        low, high = model.parameters[name].bounds  # a nuisance's delay may lie below zero
+        values = np.clip(model.value(name) + step * np.array([1.0, -1.0]), low, high).tolist()
+        ends = [model.with_values({name: value}) for value in values]
         outputs = fit.run.many([(end, fit.starts) for end in ends], pool)
         if outputs[0] is None or outputs[1] is None:
             raise InputError("the model diverges within the interval of a hold's period")
         change = white_residual(fit, [up - down for up, down in zip(*outputs)])
-        jacobian[:, place] = change / (ends[0].value(name) - ends[1].value(name))
+        jacobian[:, place] = change / (values[0] - values[1])
     return covariance_of(jacobian, [model.parameters[name].prior for name in fit.names])
