@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.constants import LONGEST_DELAY, SERIES
 from rhythmid.diagnose.free_map import FREE_MAPS, first_guess
 from rhythmid.diagnose.hypothesis import Kind
+from rhythmid.diagnose.refitted_map import values_of
 from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.round import Round
 from rhythmid.diagnose.search.score_tests import Score, Trajectories
@@ -182,14 +183,8 @@ def _one_law(chosen: Trial, known: Trajectories, sizes: Scales) -> Iterator[Prop
         name = {"actuator": "effort", "sensor": "signal"}.get(slot, quantity)
         if len(laws) < SERIES or name not in FREE_MAPS:
             continue
-        values: list[Array] = {
-            "position": [path.position for path in known.legs],
-            "velocity": [path.velocity for path in known.legs],
-            "effort": [path.effort for path in known.paths],
-            "signal": list(known.outputs),
-        }[name]
         base = _base(chosen, tuple(label for label in chosen.added if label not in laws))
-        yield propose(base.model, FREE_MAPS[name], [first_guess(np.concatenate(values))], base.added)
+        yield propose(base.model, FREE_MAPS[name], [first_guess(values_of(known, name))], base.added)
 
 
 def _free_places(element: Element, catalogue: Catalogue) -> Iterator[Slot]:

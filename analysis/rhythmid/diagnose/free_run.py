@@ -26,6 +26,7 @@ from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
 from rhythmid.diagnose.intervals import profiled
 from rhythmid.diagnose.location import Dependence, dependences
 from rhythmid.diagnose.model_uncertainty import covariance_between
+from rhythmid.diagnose.refitted_map import refitted_map
 from rhythmid.diagnose.scoring import Scoring
 from rhythmid.diagnose.search.forward import Search, search
 from rhythmid.diagnose.search.refit import reach_of, whole_fit
@@ -111,13 +112,22 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         contenders += contend(others, seen, rows, step, reach, case.tell)
     case.tell("locating what is left")
     after = dependences(run, rows, case.pool)
-    contest = _contest(contenders, _maps(after, contenders, rows), rows, found, run, sizes)
+    refitted = None
+    before = after
+    if trial.added:
+        nominal_run = trajectories(found.nominal)
+        before = dependences(nominal_run, rows, case.pool)
+        if not case.budget.spent:
+            nominal = next(one.trial for one in contenders if one.kind == "nominal")
+            refitted = refitted_map(nominal, before, nominal_run, seen, rows, step)
+    maps = _maps(after, refitted, contenders, rows)
+    contest = _contest(contenders, maps, rows, found, run, sizes)
     selection = select(contest)
     if selection.chosen.key != trial.added:
         trial = _trial_of(selection.chosen, contenders)
         run = trajectories(whole_fit(trial, seen, found.noise, step, pool=case.pool))
         after = dependences(run, rows, case.pool)
-        contest = replace(contest, maps=_maps(after, contenders, rows))
+        contest = replace(contest, maps=_maps(after, refitted, contenders, rows))
         selection = select(contest)
         trial = _trial_of(selection.chosen, contenders)
     found = _with_best(found, trial, case)
@@ -129,7 +139,6 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     unnamed = _unnamed(found, known, case)
     fit = with_robust_covariance(found.fit)
     found = replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed))
-    before = dependences(trajectories(found.nominal), rows, case.pool) if trial.added else after
     return FreeRunResult(
         scoring,
         tuple(seen),
@@ -213,13 +222,24 @@ def _contest(
     return Contest(tuple(hypotheses_of(contenders, rows, shape)), maps, len(names), rows.size, PRACTICAL)
 
 
-def _maps(found: Sequence[Dependence], contenders: Sequence[Contender], rows: Rows) -> dict[str, Prediction]:
-    """Predictions of the free maps, under the autocorrelation time of the contenders'."""
+def _maps(
+    found: Sequence[Dependence],
+    refitted: tuple[str, Contender] | None,
+    contenders: Sequence[Contender],
+    rows: Rows,
+) -> dict[str, Prediction]:
+    """Predictions of the free maps, the refitted one in the place of its like where it predicts better, under the autocorrelation
+    time of the contenders'."""
     time = remembered(contenders, rows)
-    return {
+    maps = {
         one.quantity: prediction(one.found, rows.blocks, time, measured_errors(one.found.error, rows))
         for one in found
     }
+    if refitted is not None:
+        quantity, one = refitted
+        made = prediction(one.found, rows.blocks, time, one.error)
+        maps[quantity] = max(maps[quantity], made, key=lambda each: each.score) if quantity in maps else made
+    return maps
 
 
 def _detectable(contenders: Sequence[Contender], chosen: Hypothesis, rows: Rows) -> float:

@@ -1,7 +1,7 @@
 """Locate a mismatch without naming it: which quantity does the missing force (or sensor error) depend on?
 
 The missing force is written as an unknown smooth function of one quantity (position, velocity, both, actuator force, time), as
-what a few first-order filters remember of the velocity or of the actuator's force, or as a vibration, and the sensor's error as a
+what a few filters of first order, and resonant ones, remember of the velocity or of the actuator's force, or as a vibration, and the sensor's error as a
 function of its output. Each is a sum of functions whose effects on the free run are simulated; to first order, that is another
 hypothesis: a free map beside the model. What it predicts of blocks that were left out tells where the mismatch lives, and
 whether the names leave something that another explanation would predict. It also draws what the catalogue has no name for.
@@ -27,7 +27,16 @@ from rhythmid.simulation.signal import first_order_hold
 Array = NDArray[np.float64]
 SPLINES, SPLINES_OF_TWO = 8, 5  # basis functions of one quantity, and of each of two
 TIME_CONSTANTS = (0.003, 0.01, 0.03, 0.1, 0.3)  # of filters that remember, in periods of the motion
+# of filters that resonate at the residual's strongest line: a light and a heavy one, between which those of real second modes lie
+DAMPING_RATIOS = (0.03, 0.2)
 RIDGE = 1e-4  # prior precision of a coefficient, relative to the information that all rows have of it
+# quantities of which the free function is a spline, with the name of the same map in the simulator
+SPLINED = {
+    "position": "position",
+    "velocity": "velocity",
+    "actuator force": "effort",
+    "measured position (sensor error)": "signal",
+}
 
 
 @dataclass(frozen=True)
@@ -88,6 +97,22 @@ def _remembered(values: Sequence[Array], times: Sequence[Array], frequency: floa
     return found
 
 
+def _resonant(values: Sequence[Array], times: Sequence[Array], line: float) -> list[list[Array]]:
+    """What filters that resonate at the frequency `line` [Hz] remember of signals, in phase with their force and a quarter turn
+    ahead: a part on a spring moves like one of them, whatever its damping ratio between theirs."""
+    found = []
+    for ratio in DAMPING_RATIOS:
+        pairs = []
+        for value, time in zip(values, times):
+            turn = 2.0 * math.pi * line * float(np.median(np.diff(time)))
+            radius, angle = math.exp(-ratio * turn), math.sqrt(1.0 - ratio**2) * turn
+            pole = [1.0, -2.0 * radius * math.cos(angle), radius**2]
+            level = value - value.mean()
+            pairs.append([lfilter([0.0, turn * radius], pole, level), lfilter([1.0, -radius], pole, level)])
+        found += [[np.asarray(pair[0]) for pair in pairs], [np.asarray(pair[1]) for pair in pairs]]
+    return found
+
+
 def _simulated(
     known: Trajectories, functions: list[list[Array]], pool: ThreadPoolExecutor | None
 ) -> tuple[tuple[Array, ...], ...]:
@@ -138,9 +163,12 @@ def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> It
     past = {"past velocity": [p.velocity for p in known.legs]}
     if moving:
         past["past actuator force"] = [p.effort for p in known.paths]
-    for name, values in past.items():
-        yield FreeMap(name, _simulated(known, _remembered(values, times, frequency), pool), none, nowhere)
     line = residual_line(fit)
+    for name, values in past.items():
+        functions = _remembered(values, times, frequency)
+        if line > 0.0:
+            functions += _resonant(values, times, line)
+        yield FreeMap(name, _simulated(known, functions, pool), none, nowhere)
     if line > 0.0:
         waves = [[wave(2.0 * np.pi * line * t) for t in times] for wave in (np.cos, np.sin)]
         yield FreeMap(f"a vibration at {line:.3g} Hz", _simulated(known, waves, pool), none, nowhere)
