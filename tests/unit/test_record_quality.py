@@ -56,6 +56,14 @@ def test_the_jitter_is_that_of_the_steps(seed, std):
     assert Timing.of(time).jitter_std == pytest.approx(np.sqrt(2.0) * std, rel=0.1)
 
 
+@given(seed=seeds, jitter=st.floats(0.0, 0.45))
+def test_jitter_is_no_gap_and_its_long_steps_count_as_jitter(seed, jitter):
+    time = np.sort(np.arange(500) + np.random.default_rng(seed).uniform(-jitter, jitter, 500)) * 1e-3
+    timing = Timing.of(time)
+    assert (timing.gaps, timing.lost, timing.longest_gap) == (0, 0, 0.0)
+    assert timing.jitter_std == pytest.approx(float(np.std(np.diff(time))), rel=0.02, abs=1e-9)
+
+
 @pytest.mark.parametrize("rate", [1000.0, 610.3515625, 1024.0, 3.0])
 def test_an_even_rate_is_found_to_the_last_digit(rate):
     assert nominal_period(np.diff(np.arange(5000) / rate)) == pytest.approx(1.0 / rate, rel=1e-12)

@@ -32,7 +32,7 @@ class Timing:
     start, end : first and last time [s].
     period : nominal time between samples [s]; 0 where there are fewer than two.
     jitter_std : standard deviation of the time between neighbours [s], gaps left out.
-    gaps, lost : number of gaps (> 1.5 periods) and of samples that are missing in them.
+    gaps, lost : number of gaps (see `gaps_between`) and of samples that are missing in them.
     longest_gap : [s]; 0 without gaps.
     duplicates : samples with the time of another.
     late : samples that were recorded after one with a later time.
@@ -68,15 +68,14 @@ class Timing:
         if len(step) == 0:
             return cls(len(time), start, end, duplicates=duplicates, late=late)
         period = nominal_period(step)
-        gap = step > GAP * period
-        regular = step[~gap]
-        missing = int(np.rint(step[gap] / period - 1.0).sum())
+        first, missing = _gaps(np.concatenate([[0.0], np.cumsum(step)]), period)
+        regular = np.delete(step, first)
         # late samples look like gaps, but nothing is missing then over the whole
-        missing = min(missing, max(0, round((end - start) / period) - len(step)))
+        lost = min(int(missing.sum()), max(0, round((end - start) / period) - len(step)))
         return cls(
             len(time), start, end, period,
             round(float(np.sqrt(np.mean((regular - period) ** 2))), 10) if len(regular) else 0.0,
-            int(gap.sum()), missing, float(step[gap].max()) if gap.any() else 0.0, duplicates, late,
+            len(first), lost, float(step[first].max(initial=0.0)), duplicates, late,
         )  # fmt: skip
 
 
@@ -88,14 +87,16 @@ def gaps_between(time: Times) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     which long steps are common, such as a command that is sent when it changes, has no gaps.
     """
     step = np.diff(time)
-    nothing = np.empty(0, dtype=np.int64)
-    if len(step) < 2:
-        return nothing, nothing
-    period = nominal_period(step)
-    wide = np.flatnonzero(step > GAP * period)
-    if len(wide) == 0 or len(wide) > OFTEN * len(step):
-        return nothing, nothing
-    lost = np.maximum(np.rint(step[wide] / period - 1.0).astype(np.int64), 1)
+    period = nominal_period(step) if len(step) > 1 else 0.0
+    if period == 0.0 or np.count_nonzero(step > GAP * period) > OFTEN * len(step):
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    return _gaps(time, period)
+
+
+def _gaps(time: Times, period: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Gaps in increasing times (n,) that are sampled once in a `period` [s], as `gaps_between` gives them."""
+    wide = np.flatnonzero(np.diff(time) > GAP * period)
+    lost = np.maximum(np.rint(np.diff(time)[wide] / period - 1.0).astype(np.int64), 1)
     late = time - period * np.arange(len(time))
     real = np.zeros(len(wide), dtype=bool)
     for index, (before, count) in enumerate(zip(wide, 2 * lost + NEIGHBOURS, strict=True)):
