@@ -163,13 +163,18 @@ def _fit(
 
 def noise_of(residuals: Sequence[Array], series: Sequence[Series], floor: float = 0.0) -> NoiseModel:
     """Noise model of residuals over the averages that were used; its colour is that of the series where they know it."""
+    return coloured(_stretches(residuals, series), series, floor)
+
+
+def _stretches(residuals: Sequence[Array], series: Sequence[Series]) -> list[Array]:
+    """Residuals of each run of averages that were used, as they are whitened: without what is ignored, and levelled."""
     stretches = []
     for residual, one in zip(residuals, series):
         if one.ignored is not None:
             columns = one.ignored[one.used]
             residual = residual - one.ignored @ np.linalg.lstsq(columns, residual[one.used], rcond=1e-12)[0]
         stretches += [one.levelled(residual[s], s) for s in runs(one.used)]
-    return coloured(stretches, series, floor)
+    return stretches
 
 
 def coloured(stretches: Sequence[Array], series: Sequence[Series], floor: float) -> NoiseModel:
@@ -204,11 +209,17 @@ def estimate(
         return minimise(model, run, chosen, noise, guess, iterations, pool)
     spread = max(float(np.std(one.averaged)) for one in series)
     scaled = NoiseModel(np.empty(0), spread * 1e-2)
-    end = descend(model, run, chosen, scaled, guess, iterations, pool)
+    # what a start far off misses is no noise, and is not larger where the noise is: the weights of that would hide it
+    alike = replace(run, series=tuple(replace(one, spread=None) for one in run.series))
+    end = descend(model, alike, chosen, scaled, guess, iterations, pool)
     if normalised_error(end.residuals, series) > LOST:
         # what is left is no noise: taken for colour, it would lead the parameters anywhere
-        rms = math.sqrt(end.chi2 / max(end.samples, 1)) * scaled.std
-        return minimise(end.model, run, chosen, NoiseModel(np.empty(0), rms), end.starts, iterations, pool)
+        left = np.concatenate(_stretches(end.residuals, run.series))
+        white = NoiseModel(np.empty(0), math.sqrt(float(np.mean(left**2))))
+        lost = minimise(end.model, run, chosen, white, end.starts, iterations, pool)
+        if lost.nrmse() > LOST:
+            return lost
+        return estimate(lost.model, series, chosen, lost.starts, None, pool, max_step, iterations, progress)
     while max_step is None:
         rms = math.sqrt(end.chi2 / max(end.samples, 1)) * scaled.std
         finer = accurate(run, end.model, end.starts, max(INTEGRATION * rms, 1e-7 * spread))
