@@ -156,6 +156,21 @@ def measurements_lost(rng: np.random.Generator, table: Table) -> Table:
     return table | {"y": y}
 
 
+def lost_apart(rng: np.random.Generator, table: Table) -> Table:
+    """Commands and positions that are missing (empty fields) one by one, each for itself, as two topics lose messages."""
+    found = {name: table[name].copy() for name in ("u", "y")}
+    for column in found.values():
+        column[1 + rng.choice(len(column) - 2, len(column) // 100, replace=False)] = np.nan
+    return table | found
+
+
+def together(rng: np.random.Generator, table: Table) -> Table:
+    """Stamps that are out, 1 % of the rows lost, a gap of 0.3 s, and rows that come twice or out of order, in one table."""
+    for fault in (stamps_out, FAULTS["gap"], few_lost, duplicated, reordered):
+        table = fault(rng, table)
+    return table
+
+
 def duplicated(rng: np.random.Generator, table: Table) -> Table:
     n = len(table["t"])
     return rows(table, np.sort(np.concatenate([np.arange(n), rng.choice(n, n // 100, replace=False)])))
@@ -200,6 +215,7 @@ FAULTS: dict[str, Fault] = {
     "gap": lambda rng, table: without(table, spans(rng, table, 1, 0.3)),
     "gaps": lambda rng, table: without(table, spans(rng, table, 5, 2.0)),
     "measurements_lost": measurements_lost,
+    "lost_apart": lost_apart,
     "duplicated": duplicated,
     "reordered": reordered,
     "jittered": lambda rng, table: table,  # made by the simulation
@@ -207,6 +223,7 @@ FAULTS: dict[str, Fault] = {
     "held_back": held_back,
     "stamp_jitter": stamps_out,
     "command_jitter": lambda rng, table: table,  # made by the simulation
+    "together": together,
 }
 
 
