@@ -1,5 +1,6 @@
 """The screening of candidates: first guesses with what goes with them, and the line that a residual holds."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -72,3 +73,12 @@ def test_a_guess_brings_what_the_models_own_parameters_had_stood_in_for():
 def test_what_repeats_less_than_once_in_a_record_is_no_periodic_disturbance(scales):
     narrowed = load_catalogue().within(scales)["periodic_disturbance"].parameter("frequency")
     assert narrowed.bounds == (1.0 / scales.duration, 0.5 / scales.period)
+
+
+def test_what_swings_less_than_once_in_a_record_is_no_second_mode(scales):
+    short = replace(scales, duration=0.5 / scales.natural_frequency)
+    narrowed = load_catalogue().within(short)["second_mode"].parameter("frequency")
+    assert narrowed.bounds == (1.0 / short.duration, 0.5 / short.period)
+    assert (
+        load_catalogue().within(scales)["second_mode"].parameter("frequency").bounds[0] < narrowed.bounds[0]
+    )

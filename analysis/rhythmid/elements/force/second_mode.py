@@ -70,10 +70,10 @@ ELEMENT = Element(
     size="mass",
     width="damping_ratio",
     starts=starts,
-    # slower than the motion it is a mass at rest, and its damper a viscous one; faster than the samples, an added mass;
-    # overdamped, something that relaxes
+    # slower than the motion it is a mass at rest, and its damper a viscous one; slower than a record, a force that its free
+    # start makes; faster than the samples, an added mass; overdamped, something that relaxes
     ranges=lambda s: {
-        "frequency": (0.3 * min(s.natural_frequency, s.frequency), 0.5 / s.period),
+        "frequency": (max(0.3 * min(s.natural_frequency, s.frequency), 1.0 / s.duration), 0.5 / s.period),
         "damping_ratio": (0.0, 1.0),
     },
     also_known_as=("attached mass", "tuned mass", "structural resonance", "flexible payload"),
