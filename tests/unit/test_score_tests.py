@@ -82,3 +82,8 @@ def test_what_swings_less_than_once_in_a_record_is_no_second_mode(scales):
     assert (
         load_catalogue().within(scales)["second_mode"].parameter("frequency").bounds[0] < narrowed.bounds[0]
     )
+
+
+def test_the_middle_of_a_sensors_curvature_lies_within_the_motion(scales):
+    narrowed = load_catalogue().within(scales)["sensor_nonlinearity"].parameter("reference")
+    assert narrowed.bounds == (scales.low, scales.high)

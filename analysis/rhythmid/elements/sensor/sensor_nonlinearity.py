@@ -22,6 +22,7 @@ ELEMENT = Element(
     kernel=kernel,
     size="coefficient",
     starts=lambda s: [{"coefficient": 0.01 / s.position, "reference": s.centre}],
+    ranges=lambda s: {"reference": (s.low, s.high)},  # elsewhere it is a gain and an offset within the motion
     also_known_as=("characteristic curve", "sensor curvature"),
     family="sensor nonlinearity",
     confusable={
