@@ -9,10 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from rhythmid.diagnose.case import SPENT, Budget
 from rhythmid.diagnose.constants import PRACTICAL_EFFORT
+from rhythmid.diagnose.effort.beyond_gain import beyond_gain, recorded_efforts
 from rhythmid.diagnose.effort.candidate import (
     INPUT_DELAY,
     Screened,
@@ -46,6 +48,7 @@ from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 from rhythmid.value import Prior
 
+Array = NDArray[np.float64]
 MOST_EFFECTS = 4  # effects that are looked for: a fifth was never real on recordings that were tried
 REFINED = 10  # additions that are fitted in earnest in each round: the right one was among the first five of a score test always
 GAP = 3  # rows between blocks: as far as the filter of effort mixes neighbours (its impulse lasts about 1 / cut-off, 2.5 rows)
@@ -111,7 +114,9 @@ def search_effort(
     _, jacobian = linearise(balance, model, names, 0.0)
     priors = priors_of(balance, model, names, jacobian[:, 1:])
     nominal = Fitted.of((), "nominal", fit_effort(balance, model, names, priors), priors)
-    search = _Search(balance, catalogue, Blocks.of(balance.record, GAP), nominal, [nominal], promising)
+    search = _Search(
+        balance, catalogue, Blocks.of(balance.record, GAP), nominal, [nominal], promising, recorded_efforts(records, model)
+    )  # fmt: skip
     reference = reference_of(balance, nominal, search.blocks)
     chosen = nominal
     budget = budget or Budget()
@@ -145,6 +150,7 @@ class _Search:
     nominal: Fitted
     found: list[Fitted]
     promising: float | None = None
+    recorded: Array | None = None  # efforts as they were recorded
     tried: set[str] = field(default_factory=set)
     ruled_out: list[Fitted] = field(default_factory=list)
 
@@ -283,7 +289,12 @@ class _Search:
         made = self._fit((*base.elements, label), model, priors, aligned, alignment)
         if start.element is None or start.element.slot != "actuator":
             return made
-        return replace(made, shape={"moves_the_machine": self._left(made, base, label)})
+        shape = {"moves_the_machine": self._left(made, base, label)}
+        if self.recorded is not None:
+            removed = base.fit.error**2 - made.fit.error**2
+            sizes = scales_of(balance, base.fit.model)
+            shape["more_than_gain"] = beyond_gain(made.fit.model, label, sizes, self.recorded, removed)
+        return replace(made, shape=shape)
 
     def _left(self, made: Fitted, base: Fitted, label: str) -> float:
         """Share of the effort that an actuator's effect leaves to move the machine."""
