@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from axes import CATALOGUE, axis_model
+from axes import CATALOGUE, axis, axis_model
 
 from rhythmid.diagnose.effort.beyond_gain import beyond_gain, recorded_efforts
 from rhythmid.diagnose.effort.scales import scales_of
@@ -15,6 +15,7 @@ from rhythmid.record.record import Channel, Record
 
 LAW = CATALOGUE["actuator_nonlinearity"]
 COEFFICIENT = 0.02  # of a cubic law, per square of the effort
+SWEPT = 4.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 1000, endpoint=False))
 
 
 def switched_axis(seed: int = 0) -> Record:
@@ -39,26 +40,23 @@ def balance() -> Balance:
     return Balance.of([switched_axis()], axis_model())
 
 
-def share(balance: Balance, efforts: np.ndarray, removed: float) -> float:
+def share(balance: Balance, recorded: np.ndarray, required: np.ndarray) -> float:
     model = axis_model().with_element(LAW, {"coefficient": COEFFICIENT})
-    return beyond_gain(model, "actuator_nonlinearity", scales_of(balance, model), efforts, removed)
+    return beyond_gain(model, "actuator_nonlinearity", scales_of(balance, model), recorded, required)
 
 
 def test_a_cubic_law_of_efforts_of_one_size_is_a_gain(balance):
-    assert share(balance, np.tile([4.0, -4.0, 0.0], 100), removed=0.1) < 1e-20
+    assert share(balance, np.tile([4.0, -4.0, 0.0], 100), SWEPT) < 1e-20
 
 
-def test_what_a_law_does_beyond_a_gain_counts_at_the_actuators_entrance(balance):
-    efforts = 4.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 1000, endpoint=False))
-    beyond = COEFFICIENT * 4.0**3 / 4.0 / math.sqrt(2.0)  # the third harmonic of the cube of a sine, rms
-    gain = 1.0 - 0.75 * COEFFICIENT * 4.0**2
-    assert share(balance, efforts, removed=0.1) == pytest.approx((beyond / gain) ** 2 / 0.1, rel=1e-6)
-    assert share(balance, efforts, removed=0.0) == math.inf
+def test_efforts_that_are_recorded_as_the_model_requires_them_show_a_law(balance):
+    assert share(balance, SWEPT, SWEPT) == pytest.approx(1.0)
+    assert share(balance, 0.5 * SWEPT, SWEPT) == pytest.approx(0.5**6)  # the cube of half, squared
 
 
 def test_a_fading_actuator_is_no_law_of_the_effort(balance):
     model = axis_model().with_element(CATALOGUE["actuator_fade"], {"rate": 0.01})
-    found = beyond_gain(model, "actuator_fade", scales_of(balance, model), np.tile([4.0, -4.0], 100), 0.1)
+    found = beyond_gain(model, "actuator_fade", scales_of(balance, model), np.tile([4.0, -4.0], 100), SWEPT)
     assert found == math.inf
 
 
@@ -74,3 +72,28 @@ def test_no_law_of_the_actuator_explains_a_switched_effort():
     assert "friction" in found.chosen.elements[0]
     laws = {"actuator_nonlinearity", "actuator_deadband", "actuator_saturation"}
     assert not laws & {label for one in found.hypotheses for label in one.elements}
+
+
+def test_a_dead_band_of_the_actuator_is_still_found():
+    names = ("actuator_deadband", "viscous_damper")
+    only = CATALOGUE.without(*(name for name in CATALOGUE if name not in names))
+    record = with_dead_band(axis(friction=0.0, length=10.0), 0.5)
+    found = search_effort([record], axis_model(), only, most=1)
+    assert found.chosen.elements == ("actuator_deadband",)
+    assert found.chosen.shape["more_than_gain"] > 0.8
+
+
+def with_dead_band(record: Record, width: float) -> Record:
+    """The record of the same motion, had its actuator a dead band [N]: its effort had to be larger by that."""
+    assert record.input is not None
+    effort = record.input.value + width * np.sign(record.input.value)
+    return replace(record, input=replace(record.input, value=effort))
+
+
+def test_a_law_that_is_left_when_other_effects_are_taken_off_is_looked_at_again():
+    found = search_effort([switched_axis()], axis_model(), CATALOGUE, most=3)
+    for one in found.hypotheses:
+        terms = [term for label in one.elements if (term := one.fit.model.term(label)) is not None]
+        if any(term.element.slot == "actuator" for term in terms):
+            assert "moves_the_machine" in one.shape
+    assert found.ruled_out

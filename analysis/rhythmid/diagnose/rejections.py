@@ -242,9 +242,9 @@ RULES: tuple[Rule, ...] = (
     ),
     _shape_rule(
         "more_than_gain",
-        "mean square of what an actuator's law does to the recorded effort beyond a gain, as a share of the squared error that it "
-        "removes",
-        "on the recorded levels of effort it is a gain, which inertia and forces contain already",
+        "mean square of what an actuator's law does to the recorded effort beyond a gain, as a share of what it does to the effort that "
+        "the model requires",
+        "on the recorded effort it is mainly a gain, which inertia and forces contain already",
     ),
 )
 

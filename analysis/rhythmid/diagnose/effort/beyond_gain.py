@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.diagnose.static_law import law_of
+from rhythmid.diagnose.static_law import curved, law_of
 from rhythmid.elements.element import Scales
 from rhythmid.identify.inverse_dynamics.motion import effort_channel
 from rhythmid.model import Model
@@ -33,21 +33,20 @@ def recorded_efforts(records: Sequence[Record], model: Model) -> Array | None:
     return np.concatenate(found) if found else None
 
 
-def beyond_gain(model: Model, label: str, sizes: Scales, efforts: Array, removed: float) -> float:
-    """Mean square of what a law of the actuator does to these efforts (n,) beyond a gain and a constant, as a share of the mean
-    squared error that it has `removed`; infinite for what is no static law of the effort, or where nothing was removed."""
+def beyond_gain(model: Model, label: str, sizes: Scales, recorded: Array, required: Array) -> float:
+    """Mean square of what a law of the actuator does to the `recorded` efforts (n,) beyond a gain and a constant, as a share of what
+    it does to those (m,) that the model requires; infinite for what is no static law of the effort, or straight there."""
     term = model.term(label)
-    if term is None or removed <= 0.0:
+    if term is None:
         return math.inf
     values = {name: value.value for name, value in term.values.items()}
     if law_of(term.element, values, model, sizes) is None:
         return math.inf
-    still = np.zeros(len(efforts))
-    effect = effect_along(term.element, values, model, Path(still, still, still, efforts, still, efforts))
-    columns = np.column_stack([efforts, np.ones(len(efforts))])
-    straight = np.linalg.lstsq(columns, effect, rcond=None)[0]
-    gain = 1.0 + float(
-        straight[0]
-    )  # an error of the effort that leaves is so many times that of the one that enters
-    left = effect - columns @ straight
-    return float(np.mean(left**2)) / (gain**2 * removed) if gain != 0.0 else math.inf
+
+    def beyond(efforts: Array) -> float:
+        still = np.zeros(len(efforts))
+        path = Path(still, still, still, efforts, still, efforts)
+        return float(np.mean(curved(effect_along(term.element, values, model, path), efforts) ** 2))
+
+    whole = beyond(required)
+    return beyond(recorded) / whole if whole > 0.0 else math.inf

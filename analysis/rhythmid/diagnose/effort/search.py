@@ -242,7 +242,13 @@ class _Search:
             for name, prior in fitted.priors.items()
             if name != label and not name.startswith(f"{label}.")
         }
-        return self._fit(rest, model, priors, self._aligned(rest), fitted.fit.alignment)
+        made = self._fit(rest, model, priors, self._aligned(rest), fitted.fit.alignment)
+        shape: dict[str, float] = {}
+        for one in rest:  # beside fewer effects it may do what it did not before
+            term = made.fit.model.term(one)
+            if term is not None and term.element.slot == "actuator":
+                shape = _worst(shape, self._shape(made, self.without(made, one), one))
+        return replace(made, shape=shape)
 
     def reduce(self, fitted: Fitted) -> None:
         """Fit a hypothesis of several effects without each of them, and with each law that one of them contains in its place: beside
@@ -256,7 +262,7 @@ class _Search:
 
     def _keep(self, fitted: Fitted) -> None:
         if not self._known(fitted):
-            self.found.append(fitted)
+            (self.found if keeps_shape(fitted.shape) else self.ruled_out).append(fitted)
 
     def _simplify(self, base: Fitted, element: Element) -> None:
         """Fit the base with each law that the element contains."""
@@ -288,13 +294,17 @@ class _Search:
             return None
         made = self._fit((*base.elements, label), model, priors, aligned, alignment)
         if start.element is None or start.element.slot != "actuator":
-            return made
+            return replace(made, shape=base.shape)
+        return replace(made, shape=_worst(base.shape, self._shape(made, base, label)))
+
+    def _shape(self, made: Fitted, base: Fitted, label: str) -> dict[str, float]:
+        """Statistics of an actuator's effect, by the rule that looks at them; `base` is the hypothesis without it."""
         shape = {"moves_the_machine": self._left(made, base, label)}
         if self.recorded is not None:
-            removed = base.fit.error**2 - made.fit.error**2
-            sizes = scales_of(balance, base.fit.model)
-            shape["more_than_gain"] = beyond_gain(made.fit.model, label, sizes, self.recorded, removed)
-        return replace(made, shape=shape)
+            model, sizes = made.fit.model, scales_of(self.balance, base.fit.model)
+            required = np.concatenate(self.balance.required(model))
+            shape["more_than_gain"] = beyond_gain(model, label, sizes, self.recorded, required)
+        return shape
 
     def _left(self, made: Fitted, base: Fitted, label: str) -> float:
         """Share of the effort that an actuator's effect leaves to move the machine."""
@@ -335,6 +345,11 @@ class _Search:
 
     def _known(self, fitted: Fitted) -> bool:
         return any(set(one.elements) == set(fitted.elements) for one in self.found)
+
+
+def _worst(*shapes: Mapping[str, float]) -> dict[str, float]:
+    """The least of each statistic."""
+    return {name: min(one[name] for one in shapes if name in one) for name in set().union(*shapes)}
 
 
 def _kind_of(elements: Sequence[str], model: Model) -> Kind:
