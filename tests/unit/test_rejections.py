@@ -49,6 +49,10 @@ def test_nothing_speaks_against_an_effect_that_explains_all():
             "moves_the_machine",
             replace(GOOD, hypothesis=replace(GOOD.hypothesis, shape={"moves_the_machine": 0.4})),
         ),
+        (
+            "more_than_gain",
+            replace(GOOD, hypothesis=replace(GOOD.hypothesis, shape={"more_than_gain": 0.1})),
+        ),
         ("beats_simpler", replace(GOOD, simpler=supposed("plain", predicted(0.01), free=3))),
     ],
 )

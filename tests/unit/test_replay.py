@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -55,6 +56,7 @@ def test_the_evidence_keeps_predictions_to_seven_digits():
             other.free,
         )
     assert read.practical == PRACTICAL and set(read.maps) == {"time"}
+    assert read.follows == math.inf and contest_of(ledger(replace(made, follows=0.3), 0.1)).follows == 0.3
 
 
 def answered(made, verdict: str, *missing: dict) -> dict:

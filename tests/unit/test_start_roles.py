@@ -97,6 +97,21 @@ def test_a_servo_of_which_only_the_command_is_known_gets_a_controller(tmp_path, 
     assert begun.nominal.model.units.force == "rad/s^2"
 
 
+def test_a_servo_whose_inertia_follows_within_a_sample_gets_gains_that_can_be_simulated(tmp_path):
+    lag, every = 0.25, 20  # s, milliseconds between samples
+    x = np.zeros(len(REFERENCE))
+    for k, wanted in enumerate(REFERENCE[:-1]):
+        x[k + 1] = x[k] + foreign.STEP * (wanted - x[k]) / lag
+    table = np.column_stack([TIME, REFERENCE, x])[::every]
+    path = tmp_path / "servo.csv"
+    np.savetxt(path, table, delimiter=",", header="time [s],reference [rad],position [rad]", comments="")
+    model = start([path]).nominal.model
+    proportional = model.value("position_control.proportional")
+    derivative = model.value("position_control.derivative")
+    assert derivative / proportional == pytest.approx(lag, rel=0.1)
+    assert derivative <= 1.01 / (every * foreign.STEP)
+
+
 def test_reference_and_effort_give_the_controllers_gains(tmp_path):
     x, v, torque = servo(REFERENCE)
     topics = {

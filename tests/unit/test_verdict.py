@@ -22,7 +22,7 @@ from contests import (
 
 from rhythmid.diagnose.answer.result import FitQuality, MissingEffect
 from rhythmid.diagnose.answer.wording import summary_of
-from rhythmid.diagnose.constants import APART
+from rhythmid.diagnose.constants import APART, FOLLOWS
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.rejections import RULES
 from rhythmid.diagnose.verdict_rules import VERDICT_RULES
@@ -114,6 +114,20 @@ def test_an_actuators_effect_that_takes_most_of_the_effort_away_is_no_name(left,
     assert verdict(contest(NOMINAL, replace(friction(), shape={"moves_the_machine": left})))[1] == expected
 
 
+@pytest.mark.parametrize(("share", "expected"), [(0.0, ()), (0.45, ()), (0.55, ("friction",))])
+def test_an_actuators_law_that_is_mainly_a_gain_on_what_was_recorded_is_no_name(share, expected):
+    assert verdict(contest(NOMINAL, replace(friction(), shape={"more_than_gain": share})))[1] == expected
+
+
+@pytest.mark.parametrize(
+    ("error", "expected"), [(0.29, "missing_physics"), (0.31, "undecided"), (None, "missing_physics")]
+)
+def test_no_name_is_stated_where_the_model_does_not_follow_the_held_out_motion_with_it(error, expected):
+    named = replace(friction(), heldout_nrmse=error)
+    assert verdict(replace(contest(NOMINAL, named), follows=FOLLOWS)) == (expected, ("friction",))
+    assert verdict(contest(NOMINAL, named))[0] == "missing_physics"  # an effort, whose noise may be as large
+
+
 def test_what_the_search_has_ruled_out_is_told_and_changes_nothing_else():
     made = contest(NOMINAL, friction(0.2), maps={"velocity": predicted(0.1)})
     taken = supposed("gain", predicted(1e-6), shape={"moves_the_machine": 0.1})
@@ -154,7 +168,7 @@ def test_a_richer_law_takes_the_place_of_one_that_it_contains_where_it_is_far_be
 def test_every_rule_of_the_table_is_one_whose_effect_on_the_verdict_is_tested():
     tested = {
         "predicts_better", "predicts_ahead", "share_of_rest", "share_of_mismatch", "practical_size", "within_bounds",
-        "acts_within_records", "own_frequency", "moves_the_machine", "beats_simpler",
+        "acts_within_records", "own_frequency", "moves_the_machine", "more_than_gain", "beats_simpler",
     }  # fmt: skip
     assert {rule.name for rule in RULES} == tested
 
@@ -176,6 +190,7 @@ def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
         "mostly_left": contest(NOMINAL, friction(0.6), maps={"velocity": predicted(1e-4)}),
         "one_law": contest(NOMINAL, law),
         "other_place": contest(NOMINAL, moved),
+        "astray": replace(contest(NOMINAL, friction()), follows=0.05),
         "stated": contest(NOMINAL, friction()),
         "partly_left": contest(NOMINAL, friction(0.3), maps={"velocity": predicted(1e-4)}),
         "rivals": contest(NOMINAL, *pair),

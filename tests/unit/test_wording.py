@@ -40,6 +40,13 @@ def test_the_summary_says_why_and_does_not_repeat_the_verdict():
     assert said.startswith("The evidence does not separate several explanations. They are ")
 
 
+def test_where_something_else_leaves_it_undecided_rivals_are_told_beside_the_reason():
+    pair = [supposed(name, predicted(0.1, 700.0, seed=i)) for i, name in enumerate("ab")]
+    decision = decided(replace(contest(NOMINAL, *pair), follows=0.05))[1]
+    said = summary_of(decision, [], FitQuality(0.1, 0.1), FitQuality(0.1, 0.1), "motion")
+    assert said.endswith("with these effects either. These records do not separate a and b.")
+
+
 @pytest.mark.parametrize(
     ("elements", "said"),
     [

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.alternatives import alternatives
 from rhythmid.diagnose.baseline import Calibration
 from rhythmid.diagnose.case import SPENT, Case
-from rhythmid.diagnose.constants import PRACTICAL
+from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
 from rhythmid.diagnose.contenders import (
     Contender,
     Rows,
@@ -227,7 +227,8 @@ def _contest(
     def shape(trial: Trial) -> dict[str, float]:
         return shape_of(trial.model, trial.added, run, sizes)
 
-    return Contest(tuple(hypotheses_of(contenders, rows, shape)), maps, len(names), rows.size, PRACTICAL)
+    hypotheses = tuple(hypotheses_of(contenders, rows, shape))
+    return Contest(hypotheses, maps, len(names), rows.size, PRACTICAL, follows=FOLLOWS)
 
 
 def _maps(

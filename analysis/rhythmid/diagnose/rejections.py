@@ -136,6 +136,7 @@ SHAPES: Mapping[str, float] = {
     "acts_within_records": EDGE,
     "own_frequency": OWN_LINE,
     "moves_the_machine": MOVES,
+    "more_than_gain": MAINLY,
 }
 
 
@@ -238,6 +239,12 @@ RULES: tuple[Rule, ...] = (
         "moves_the_machine",
         "share of the effort that an actuator's effect leaves to move the machine",
         "an actuator's effect that removes most of the effort cannot explain the motion",
+    ),
+    _shape_rule(
+        "more_than_gain",
+        "mean square of what an actuator's law does to the recorded effort beyond a gain, as a share of what it does to the effort that "
+        "the model requires",
+        "on the recorded effort it is mainly a gain, which inertia and forces contain already",
     ),
 )
 

@@ -36,6 +36,7 @@ def ledger(contest: Contest, detectable: float) -> dict[str, Any]:
         "candidates": contest.candidates,
         "size": contest.size,
         "practical": contest.practical,
+        "follows": contest.follows if math.isfinite(contest.follows) else None,
         "detectable": detectable,
     }
 
@@ -77,6 +78,7 @@ def contest_of(data: dict[str, Any]) -> Contest:
         data["size"],
         data["practical"],
         hypotheses[competing:],
+        data.get("follows") or math.inf,
     )
 
 

@@ -5,6 +5,7 @@ effects are, so that kin (friction laws, stiffness laws, lags) compete before th
 where no row of the table of rejections speaks against the best of them.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -35,6 +36,8 @@ class Contest:
     practical : share of it below which an effect is of no practical matter.
     ruled_out : hypotheses that the search has set aside because of their shape. They are rejected like others, and what they
         predict is no measure for anything.
+    follows : error on held-out data, as a share of `size`, up to which a model follows the machine; infinite for an effort, whose noise
+        may be as large.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -43,6 +46,7 @@ class Contest:
     size: float
     practical: float
     ruled_out: tuple[Hypothesis, ...] = ()
+    follows: float = math.inf
 
     @property
     def nominal(self) -> Hypothesis:

@@ -184,6 +184,7 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
         left.goes_with,
         math.sqrt(explainable) / max(contest.practical * contest.size, 1e-300) if left.significant else 0.0,
         math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300),
+        (chosen.heldout_nrmse or 0.0) / contest.follows,
         detectable,
         joint_probability([names[label] for label in labels], contest, chosen, weights),
         bool(groups),

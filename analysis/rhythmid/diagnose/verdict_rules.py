@@ -24,6 +24,7 @@ class Outcome:
     goes_with : the quantity that this depends on.
     remainder : rms of what it leaves and something else predicts by more than chance, over the smallest of practical importance.
     missed : rms error of the chosen hypothesis, as a share of what was measured.
+    astray : its error on held-out data, over that up to which a model follows the machine.
     detectable : smallest effect that the records would show, the same.
     evidence : share of the evidence for hypotheses that hold all of its names.
     alike : whether other names predict as well in the place of one of them.
@@ -36,6 +37,7 @@ class Outcome:
     goes_with: str | None
     remainder: float
     missed: float
+    astray: float
     detectable: float
     evidence: float
     alike: bool
@@ -136,6 +138,14 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "undecided",
         "the effect explains the records best in a slot for which the catalogue has no such element",
         _is("location"),
+    ),
+    VerdictRule(
+        "astray",
+        "error of the chosen hypothesis on the held-out motion, divided by that up to which a model follows the machine",
+        1.0,
+        "undecided",
+        "the model does not follow the held-out motion with these effects either",
+        lambda found: found.astray,
     ),
     VerdictRule(
         "stated",

@@ -245,12 +245,12 @@ def _servo_law(records: Sequence[Record], of: str) -> Law:
         law = rows.fit(names, rows.delay(names))
     except InputError:
         return fallback
-    inertial = law.coefficients["acceleration"]
+    lag = law.coefficients["velocity"]
+    # an inertia that follows within a sample is not seen, and would only make the model stiff
+    inertial = max(law.coefficients["acceleration"], lag * max(rows.period))
     if inertial <= 0.0:
         return fallback
-    return Law(
-        {"gain": 1.0 / inertial, "velocity": law.coefficients["velocity"] / inertial}, law.left, law.delay
-    )
+    return Law({"gain": 1.0 / inertial, "velocity": lag / inertial}, law.left, law.delay)
 
 
 def _alone(records: Sequence[Record], units: Units, catalogue: Catalogue, why: str) -> Nominal:

@@ -9,9 +9,14 @@ from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.verdict import Decision
+from rhythmid.diagnose.verdict_rules import VERDICT_RULES
 from rhythmid.elements.places import SENTENCES
 from rhythmid.model import Model
 from rhythmid.report.quantity import in_words, number, rounded
+
+RIVALS = next(
+    rule.reason for rule in VERDICT_RULES if rule.name == "rivals"
+)  # names that are several explanations
 
 
 def location_of(
@@ -42,6 +47,11 @@ def location_of(
     return Location(best, where, tuple(evidence))
 
 
+def _alike(decision: Decision) -> str:
+    groups = "; nor ".join(listed(group) for group in decision.equivalent)
+    return f"These records do not separate {groups}."
+
+
 def summary_of(
     decision: Decision,
     missing: Sequence[MissingEffect],
@@ -66,8 +76,7 @@ def summary_of(
     if decision.verdict == "missing_physics":
         said = f"The model lacks {names}."
         if decision.equivalent:
-            groups = "; nor ".join(listed(group) for group in decision.equivalent)
-            said += f" These records do not separate {groups}."
+            said += f" {_alike(decision)}"
         before, after = plain.heldout_nrmse, augmented.heldout_nrmse
         if before is not None and after is not None:
             beside = listed(decision.beside)
@@ -86,10 +95,11 @@ def summary_of(
         return said
     if decision.verdict == "undecided":
         said = f"{decision.reason[:1].upper()}{decision.reason[1:]}."
-        if decision.equivalent:
+        if decision.equivalent and decision.reason == RIVALS:
             groups = "; and ".join(listed(group, "or") for group in decision.equivalent)
             return f"{said} They are {groups}."
-        return said + (f" Best so far: {names}." if names else "")
+        said += f" Best so far: {names}." if names else ""
+        return said + (f" {_alike(decision)}" if decision.equivalent else "")
     return f"Something is missing that the catalogue does not know: {decision.reason}." + (
         f" The nearest known {'effect does' if len(missing) == 1 else 'effects do'} not explain it: {names}."
         if names

@@ -9,10 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from rhythmid.diagnose.case import SPENT, Budget
 from rhythmid.diagnose.constants import PRACTICAL_EFFORT
+from rhythmid.diagnose.effort.beyond_gain import beyond_gain, recorded_efforts
 from rhythmid.diagnose.effort.candidate import (
     INPUT_DELAY,
     Screened,
@@ -46,6 +48,7 @@ from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 from rhythmid.value import Prior
 
+Array = NDArray[np.float64]
 MOST_EFFECTS = 4  # effects that are looked for: a fifth was never real on recordings that were tried
 REFINED = 10  # additions that are fitted in earnest in each round: the right one was among the first five of a score test always
 GAP = 3  # rows between blocks: as far as the filter of effort mixes neighbours (its impulse lasts about 1 / cut-off, 2.5 rows)
@@ -111,7 +114,9 @@ def search_effort(
     _, jacobian = linearise(balance, model, names, 0.0)
     priors = priors_of(balance, model, names, jacobian[:, 1:])
     nominal = Fitted.of((), "nominal", fit_effort(balance, model, names, priors), priors)
-    search = _Search(balance, catalogue, Blocks.of(balance.record, GAP), nominal, [nominal], promising)
+    search = _Search(
+        balance, catalogue, Blocks.of(balance.record, GAP), nominal, [nominal], promising, recorded_efforts(records, model)
+    )  # fmt: skip
     reference = reference_of(balance, nominal, search.blocks)
     chosen = nominal
     budget = budget or Budget()
@@ -145,6 +150,7 @@ class _Search:
     nominal: Fitted
     found: list[Fitted]
     promising: float | None = None
+    recorded: Array | None = None  # efforts as they were recorded
     tried: set[str] = field(default_factory=set)
     ruled_out: list[Fitted] = field(default_factory=list)
 
@@ -236,7 +242,13 @@ class _Search:
             for name, prior in fitted.priors.items()
             if name != label and not name.startswith(f"{label}.")
         }
-        return self._fit(rest, model, priors, self._aligned(rest), fitted.fit.alignment)
+        made = self._fit(rest, model, priors, self._aligned(rest), fitted.fit.alignment)
+        shape: dict[str, float] = {}
+        for one in rest:  # beside fewer effects it may do what it did not before
+            term = made.fit.model.term(one)
+            if term is not None and term.element.slot == "actuator":
+                shape = _worst(shape, self._shape(made, self.without(made, one), one))
+        return replace(made, shape=shape)
 
     def reduce(self, fitted: Fitted) -> None:
         """Fit a hypothesis of several effects without each of them, and with each law that one of them contains in its place: beside
@@ -250,7 +262,7 @@ class _Search:
 
     def _keep(self, fitted: Fitted) -> None:
         if not self._known(fitted):
-            self.found.append(fitted)
+            (self.found if keeps_shape(fitted.shape) else self.ruled_out).append(fitted)
 
     def _simplify(self, base: Fitted, element: Element) -> None:
         """Fit the base with each law that the element contains."""
@@ -282,8 +294,17 @@ class _Search:
             return None
         made = self._fit((*base.elements, label), model, priors, aligned, alignment)
         if start.element is None or start.element.slot != "actuator":
-            return made
-        return replace(made, shape={"moves_the_machine": self._left(made, base, label)})
+            return replace(made, shape=base.shape)
+        return replace(made, shape=_worst(base.shape, self._shape(made, base, label)))
+
+    def _shape(self, made: Fitted, base: Fitted, label: str) -> dict[str, float]:
+        """Statistics of an actuator's effect, by the rule that looks at them; `base` is the hypothesis without it."""
+        shape = {"moves_the_machine": self._left(made, base, label)}
+        if self.recorded is not None:
+            model, sizes = made.fit.model, scales_of(self.balance, base.fit.model)
+            required = np.concatenate(self.balance.required(model))
+            shape["more_than_gain"] = beyond_gain(model, label, sizes, self.recorded, required)
+        return shape
 
     def _left(self, made: Fitted, base: Fitted, label: str) -> float:
         """Share of the effort that an actuator's effect leaves to move the machine."""
@@ -324,6 +345,11 @@ class _Search:
 
     def _known(self, fitted: Fitted) -> bool:
         return any(set(one.elements) == set(fitted.elements) for one in self.found)
+
+
+def _worst(*shapes: Mapping[str, float]) -> dict[str, float]:
+    """The least of each statistic."""
+    return {name: min(one[name] for one in shapes if name in one) for name in set().union(*shapes)}
 
 
 def _kind_of(elements: Sequence[str], model: Model) -> Kind:
