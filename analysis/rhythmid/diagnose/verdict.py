@@ -44,6 +44,7 @@ class Decision:
     Parameters
     ----------
     verdict, reason : the verdict, and in words why.
+    rule : name of the verdict rule that applied.
     named : labels of the effects that the answer stands by or, where it does not, that come nearest; by share.
     shares : share of the mismatch that each of them explains, by label.
     probability : of each of them, by label.
@@ -57,6 +58,7 @@ class Decision:
 
     verdict: Verdict
     reason: str
+    rule: str
     named: tuple[str, ...]
     shares: dict[str, float]
     probability: dict[str, float]
@@ -194,6 +196,7 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     return Decision(
         rule.verdict,
         rule.reason_of(found),
+        rule.name,
         named,
         shares,
         each,

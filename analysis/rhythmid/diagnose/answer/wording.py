@@ -9,14 +9,9 @@ from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.verdict import Decision
-from rhythmid.diagnose.verdict_rules import VERDICT_RULES
 from rhythmid.elements.places import SENTENCES
 from rhythmid.model import Model
 from rhythmid.report.quantity import in_words, number, rounded
-
-RIVALS = next(
-    rule.reason for rule in VERDICT_RULES if rule.name == "rivals"
-)  # names that are several explanations
 
 
 def location_of(
@@ -95,7 +90,7 @@ def summary_of(
         return said
     if decision.verdict == "undecided":
         said = f"{decision.reason[:1].upper()}{decision.reason[1:]}."
-        if decision.equivalent and decision.reason == RIVALS:
+        if decision.equivalent and decision.rule == "rivals":
             groups = "; and ".join(listed(group, "or") for group in decision.equivalent)
             return f"{said} They are {groups}."
         said += f" Best so far: {names}." if names else ""
