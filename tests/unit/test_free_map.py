@@ -1,5 +1,7 @@
 """Free maps: splines that the simulator runs, as any other element."""
 
+import math
+
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
@@ -73,3 +75,8 @@ def test_a_map_with_equal_coefficients_pushes_as_a_constant_force_does():
 
 def test_maps_are_no_candidates_of_the_search():
     assert not any(element.candidate for element in FREE_MAPS.values())
+
+
+@pytest.mark.parametrize("name", FREE_MAPS)
+def test_of_a_run_that_has_diverged_a_map_makes_no_number(name):
+    assert math.isnan(drawn(name, math.nan))

@@ -88,3 +88,15 @@ command:
         assert delay.value is not None and delay.std is not None
         scores.append((delay.value - 0.01) / delay.std)
     assert np.sqrt(np.mean(np.square(scores))) < 2.0, scores
+
+
+def test_a_parameter_whose_variance_is_too_large_to_be_squared_is_widened_as_any_other() -> None:
+    rng = np.random.default_rng(2)
+    sensitivity, residual = rng.normal(size=(ROWS, 1)), np.repeat(rng.normal(size=ROWS // 100), 100)
+    records = (slice(0, ROWS),)
+    factors = []
+    for scale in (1.0, 1e80):
+        columns = sensitivity / scale
+        inverse = np.array([[1.0 / float(np.sum(sensitivity**2)) * scale * scale]])
+        factors.append(float(widening(columns, residual, records, inverse, np.sqrt(np.diag(inverse)))[0]))
+    assert factors[1] == pytest.approx(factors[0])

@@ -87,3 +87,15 @@ def test_what_swings_less_than_once_in_a_record_is_no_second_mode(scales):
 def test_the_middle_of_a_sensors_curvature_lies_within_the_motion(scales):
     narrowed = load_catalogue().within(scales)["sensor_nonlinearity"].parameter("reference")
     assert narrowed.bounds == (scales.low, scales.high)
+
+
+def test_a_force_that_cannot_be_squared_is_no_candidate():
+    model = rh.Model.from_text(
+        "inertia: {mass: {value: 1.0, unit: kg, fixed: true}}\nforce:\n"
+        "  - linear_spring: {stiffness: {value: 300, unit: N/m}, rest_length: {value: 0.0, unit: m, fixed: true}}\n"
+    )
+    run = {"excitation": {"type": "chirp", "amplitude": 1.0, "sweep": 5.0, "band": [0.5, 4.0]}}
+    fit = estimate(model, prepare([rh.simulate(model, run).record]))
+    cubic = load_catalogue()["cubic_stiffness"]
+    found = changes_of(trajectories(fit), [(cubic, {"coefficient": size}) for size in (1e250, 1.0)])
+    assert [one.values["coefficient"] for one in found] == [1.0]

@@ -21,6 +21,8 @@ LEAST_RANGE = 1e-9  # range of a map whose quantity never changes, as a share of
 
 def _force(x, v, t, f, low, high, share, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9):
     z = (1.0 - share) * x + share * v
+    if z != z:  # of a run that has diverged
+        return z
     s = min(max((z - low) / (high - low) * 7.0, 0.0), 7.0 - 1e-12)
     i = int(s)
     u = s - i
@@ -32,6 +34,8 @@ def _force(x, v, t, f, low, high, share, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9)
 
 
 def _signal(z, t, low, high, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9):
+    if z != z:
+        return z
     s = min(max((z - low) / (high - low) * 7.0, 0.0), 7.0 - 1e-12)
     i = int(s)
     u = s - i

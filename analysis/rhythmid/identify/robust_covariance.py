@@ -51,7 +51,10 @@ def widening(columns: Array, residual: Array, records: Sequence[slice], inverse:
     if not lost or len(moved) <= lost:
         return np.ones(lost)
     variance = np.sum(np.square(moved), axis=0) * len(moved) / (len(moved) - lost)
-    freedom = np.sum(share, axis=0) ** 2 / np.sum(np.square(share), axis=0)
+    part_of_most = np.array(share) / np.max(
+        share, axis=0
+    )  # a variance may be larger than what can be squared
+    freedom = np.sum(part_of_most, axis=0) ** 2 / np.sum(np.square(part_of_most), axis=0)
     ratio = variance / std**2
     return np.where(ratio * freedom > chi2.isf(CHANCE, freedom), np.sqrt(np.maximum(ratio, 1.0)), 1.0)
 

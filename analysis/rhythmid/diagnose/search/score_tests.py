@@ -23,7 +23,7 @@ from rhythmid.elements.element import Element, Scales
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model
 from rhythmid.identify.drive import controlled
-from rhythmid.identify.free_run import FreeRun, prepare_run, with_series
+from rhythmid.identify.free_run import DIVERGED, FreeRun, prepare_run, with_series
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.identify.record_scales import scales
@@ -205,7 +205,7 @@ def change_of_output(
         elif element.acts != "body":
             path = known.legs[index]
         force = effect_along(element, values, model, path)
-        if not np.isfinite(force).all():
+        if not float(np.abs(force).max()) < DIVERGED:  # NaN included
             return None
         if not np.any(force):
             changes.append(np.zeros(one.blocks))
