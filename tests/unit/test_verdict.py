@@ -1,7 +1,6 @@
 """The verdict that a user reads: every rule through it, once where it must act and once where it must not."""
 
 from dataclasses import replace
-from typing import get_args
 
 import pytest
 from contests import (
@@ -9,7 +8,6 @@ from contests import (
     NAMED,
     NOMINAL,
     NOTHING,
-    SEEN,
     SIZE,
     contest,
     decided,
@@ -23,9 +21,7 @@ from contests import (
 from rhythmid.diagnose.answer.result import FitQuality, MissingEffect
 from rhythmid.diagnose.answer.wording import summary_of
 from rhythmid.diagnose.constants import APART, FOLLOWS
-from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.rejections import RULES
-from rhythmid.diagnose.verdict_rules import VERDICT_RULES
 
 # what is missing
 
@@ -171,42 +167,6 @@ def test_every_rule_of_the_table_is_one_whose_effect_on_the_verdict_is_tested():
         "acts_within_records", "own_frequency", "moves_the_machine", "more_than_gain", "beats_simpler",
     }  # fmt: skip
     assert {rule.name for rule in RULES} == tested
-
-
-@pytest.mark.parametrize("rule", VERDICT_RULES, ids=lambda rule: rule.name)
-def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
-    late = supposed("input_delay.delay", predicted(0.01), "delay")
-    moved = supposed("lag_of_the_sensor", predicted(0.01), "location")
-    law = supposed("free_force_of_position", predicted(0.01), "free_map")
-    mass = supposed("inertia.mass", predicted(0.01), "freed_value")
-    pair = [supposed(name, predicted(0.1, 700.0, seed=i)) for i, name in enumerate("ab")]
-    near = supposed("stribeck", predicted(0.3, 1970.0))
-    cases = {
-        "unnamed_remainder": contest(NOMINAL, maps={"velocity": predicted(0.1)}),
-        "missed": contest(supposed("", predicted((0.5 * SIZE) ** 2))),
-        "nothing_missing": contest(NOMINAL),
-        "freed_value": contest(NOMINAL, mass),
-        "longer_delay": contest(NOMINAL, late),
-        "mostly_left": contest(NOMINAL, friction(0.6), maps={"velocity": predicted(1e-4)}),
-        "one_law": contest(NOMINAL, law),
-        "other_place": contest(NOMINAL, moved),
-        "astray": replace(contest(NOMINAL, friction()), follows=0.05),
-        "stated": contest(NOMINAL, friction()),
-        "partly_left": contest(NOMINAL, friction(0.3), maps={"velocity": predicted(1e-4)}),
-        "rivals": contest(NOMINAL, *pair),
-        "hardly_told_apart": contest(NOMINAL, friction(0.2, score=2000.0), near),
-    }
-    made = cases.get(rule.name, contest(NOMINAL))
-    _, decision = decided(made, 0.8 if rule.name == "blind" else SEEN)
-    assert decision.verdict == rule.verdict
-    beginning = rule.reason.partition("{")[0]
-    assert decision.reason.startswith(beginning) and bool(decision.reason) == bool(rule.reason)
-
-
-def test_every_verdict_has_a_row_and_names_of_rows_are_their_own():
-    names = [rule.name for rule in VERDICT_RULES]
-    assert len(set(names)) == len(names)
-    assert {rule.verdict for rule in VERDICT_RULES} == set(get_args(Verdict))
 
 
 # names that compete

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rhythmid.diagnose.constants import LONGEST_DELAY, SERIES
 from rhythmid.diagnose.free_map import FREE_MAPS, first_guess
 from rhythmid.diagnose.hypothesis import Kind
-from rhythmid.diagnose.refitted_map import values_of
+from rhythmid.diagnose.location import values_of
 from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.round import Round
 from rhythmid.diagnose.search.score_tests import Score, Trajectories
@@ -184,7 +184,8 @@ def _one_law(chosen: Trial, known: Trajectories, sizes: Scales) -> Iterator[Prop
         if len(laws) < SERIES or name not in FREE_MAPS:
             continue
         base = _base(chosen, tuple(label for label in chosen.added if label not in laws))
-        yield propose(base.model, FREE_MAPS[name], [first_guess(values_of(known, name))], base.added)
+        guess = first_guess(np.concatenate(values_of(known, name)))
+        yield propose(base.model, FREE_MAPS[name], [guess], base.added)
 
 
 def _free_places(element: Element, catalogue: Catalogue) -> Iterator[Slot]:

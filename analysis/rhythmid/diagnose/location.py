@@ -1,8 +1,8 @@
 """Locate a mismatch without naming it: which quantity does the missing force (or sensor error) depend on?
 
 The missing force is written as an unknown smooth function of one quantity (position, velocity, both, actuator force, time), as
-what a few filters of first order, and resonant ones, remember of the velocity or of the actuator's force, or as a vibration, and the sensor's error as a
-function of its output. Each is a sum of functions whose effects on the free run are simulated; to first order, that is another
+what a few filters, of first order and resonant, remember of the velocity or of the actuator's force, or as a vibration; the
+sensor's error as a function of its output. Each is a sum of functions whose effects on the free run are simulated; to first order, that is another
 hypothesis: a free map beside the model. What it predicts of blocks that were left out tells where the mismatch lives, and
 whether the names leave something that another explanation would predict. It also draws what the catalogue has no name for.
 """
@@ -138,18 +138,29 @@ def _simulated(
     return tuple(pool.map(one, functions)) if pool else tuple(one(function) for function in functions)
 
 
+def values_of(known: Trajectories, name: str) -> list[Array]:
+    """Values of the quantity that a spline depends on, of each series; `name` is that of the simulator's map, as in `SPLINED`."""
+    values: dict[str, list[Array]] = {
+        "position": [path.position for path in known.legs],
+        "velocity": [path.velocity for path in known.legs],
+        "effort": [path.effort for path in known.paths],
+        "signal": list(known.outputs),
+    }
+    return values[name]
+
+
 def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:
     """The free functions beside a fitted model, each made when it is asked for: over long records each is large."""
     fit = known.fit
     none, nowhere = np.empty(0), np.empty((0, 0))
     moving = any(np.ptp(p.effort) > 0 for p in known.paths)
     quantities: dict[str, list[Array]] = {
-        "position": [p.position for p in known.legs],
-        "velocity": [p.velocity for p in known.legs],
+        "position": values_of(known, "position"),
+        "velocity": values_of(known, "velocity"),
         "time": [p.time - p.time[0] for p in known.paths],
     }
     if moving:
-        quantities["actuator force"] = [p.effort for p in known.paths]
+        quantities["actuator force"] = values_of(known, "effort")
     for name, values in quantities.items():
         functions, grid, basis = _splines(values, SPLINES)
         if functions:
@@ -160,9 +171,9 @@ def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> It
         yield FreeMap("position and velocity", _simulated(known, products, pool), none, nowhere)
     times = [p.time for p in known.paths]
     frequency = _frequency(known)
-    past = {"past velocity": [p.velocity for p in known.legs]}
+    past = {"past velocity": quantities["velocity"]}
     if moving:
-        past["past actuator force"] = [p.effort for p in known.paths]
+        past["past actuator force"] = quantities["actuator force"]
     line = residual_line(fit)
     for name, values in past.items():
         functions = _remembered(values, times, frequency)
@@ -172,7 +183,7 @@ def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> It
     if line > 0.0:
         waves = [[wave(2.0 * np.pi * line * t) for t in times] for wave in (np.cos, np.sin)]
         yield FreeMap(f"a vibration at {line:.3g} Hz", _simulated(known, waves, pool), none, nowhere)
-    functions, grid, basis = _splines(list(known.outputs), SPLINES)
+    functions, grid, basis = _splines(values_of(known, "signal"), SPLINES)
     if functions:
         columns = tuple(tuple(s.of_block(f) for s, f in zip(fit.run.series, one)) for one in functions)
         yield FreeMap("measured position (sensor error)", columns, grid, basis)

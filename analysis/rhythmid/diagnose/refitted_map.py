@@ -9,29 +9,15 @@ leave; it is no name itself.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rhythmid.diagnose.contenders import Contender, Rows, contend
 from rhythmid.diagnose.free_map import FREE_MAPS, first_guess
-from rhythmid.diagnose.location import SPLINED, Dependence
+from rhythmid.diagnose.location import SPLINED, Dependence, values_of
 from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.score_tests import Trajectories
 from rhythmid.diagnose.search.trial import Trial, propose
 from rhythmid.identify.series import Series
 from rhythmid.simulation.compiled import compile_model
-
-Array = NDArray[np.float64]
-
-
-def values_of(known: Trajectories, name: str) -> Array:
-    """Values (n,) over all series of the quantity that a free map depends on, by the map's name."""
-    values: dict[str, list[Array]] = {
-        "position": [path.position for path in known.legs],
-        "velocity": [path.velocity for path in known.legs],
-        "effort": [path.effort for path in known.paths],
-        "signal": list(known.outputs),
-    }
-    return np.concatenate(values[name])
 
 
 def refitted_map(
@@ -53,7 +39,9 @@ def refitted_map(
     if best is None or best.explained <= 0.0:
         return None
     name = SPLINED[best.quantity]
-    proposal = propose(nominal.model, FREE_MAPS[name], [first_guess(values_of(known, name))], nominal.added)
+    proposal = propose(
+        nominal.model, FREE_MAPS[name], [first_guess(np.concatenate(values_of(known, name)))], nominal.added
+    )
     states = compile_model(nominal.model).layout.states
     trials, _ = run_trials([proposal], series, nominal.starts, states, rows.noise, step)
     made = contend([(trial, "free_map") for trial in trials], series, rows, step)
