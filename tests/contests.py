@@ -67,10 +67,12 @@ def contest(
     return Contest(hypotheses, maps or {}, 30, SIZE, practical)
 
 
-def decided(made: Contest, detectable: float = SEEN) -> tuple[Selection, Decision]:
-    """What is selected and decided, as an answer has it."""
+def decided(
+    made: Contest, detectable: float = SEEN, errors: Mapping[str, float] | None = None
+) -> tuple[Selection, Decision]:
+    """What is selected and decided, as an answer has it; `errors` are those of the effects' sizes, none by default."""
     chosen = select(made)
-    return chosen, decide(made, chosen, detectable)
+    return chosen, decide(made, chosen, detectable, errors or {})
 
 
 def verdict(made: Contest, detectable: float = SEEN) -> tuple[str, tuple[str, ...]]:

@@ -97,7 +97,7 @@ def kept(catalogue, tmp_path) -> tuple[Path, Campaign]:
     answer = {
         "verdict": "missing_physics", "indistinguishable": [], "block": 1, "seconds": 2.0, "processor_seconds": 3.0,
         "missing": [{"element": "quadratic_drag", "slot": "force", "probability": 0.9, "parameters": {}}],
-        "evidence": ledger(evidence, 0.001),
+        "evidence": ledger(evidence, 0.001, {}),
     }  # fmt: skip
     (folder / "answer.json").write_text(json.dumps(answer))
     return out, campaign

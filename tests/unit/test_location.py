@@ -5,11 +5,21 @@ from functools import cache
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.diagnose.contenders import Rows, linearised, rows_of
 from rhythmid.diagnose.evidence import cross_validate
-from rhythmid.diagnose.location import Dependence, beside, dependences, following, free_maps, reach_of
+from rhythmid.diagnose.location import (
+    Dependence,
+    beside,
+    dependences,
+    following,
+    free_maps,
+    reach_of,
+    stretched,
+)
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate
@@ -20,6 +30,7 @@ LACKING = {
     "cubic_stiffness": ("position", {"coefficient": 2e3}),
     "coulomb_friction": ("velocity", {"force": 0.05, "transition": 0.01}),
     "actuator_saturation": ("actuator force", {"limit": 1.7}),
+    "bouc_wen_hysteresis": ("past position", {"stiffness": 30.0, "yield_displacement": 3e-3}),
     "second_mode": ("past velocity", {"mass": 0.2, "frequency": 5.0, "damping_ratio": 0.15}),
     "": ("nothing", {}),
 }
@@ -57,7 +68,12 @@ def left(request) -> Left:
 
 
 def test_the_quantity_on_which_the_missing_force_depends_explains_most(left):
-    others = [one.explained for one in left.found if left.quantity not in one.quantity]
+    # springs that slip at once are dry friction
+    near = {"velocity": "past position"}.get(left.quantity, left.quantity)
+    others = [
+        one.explained for one in left.found if left.quantity not in one.quantity and one.quantity != near
+    ]
+    assert left.found[0].quantity == left.quantity
     assert left.of(left.quantity).explained > max(0.8, max(others) + 0.3)
     ranked = [one.explained for one in left.found]
     assert ranked == sorted(ranked, reverse=True)
@@ -67,6 +83,23 @@ def test_what_a_part_on_a_spring_does_depends_on_past_velocity():
     one = left_by("second_mode")
     assert one.of("past velocity").explained > 0.9
     assert one.of("velocity").explained < 0.3  # of the instant alone it does not
+
+
+def test_what_slips_after_a_while_depends_on_past_position():
+    one = left_by("bouc_wen_hysteresis")
+    assert one.found[0].quantity == "past position" and one.found[0].explained > 0.8
+    assert one.of("position").explained < 0.8 and one.of("velocity").explained < 0.8
+
+
+@given(
+    st.lists(st.floats(-10.0, 10.0), min_size=1, max_size=50).map(np.array),
+    st.floats(0.01, 5.0),
+)
+def test_a_spring_slips_at_its_limit_and_follows_the_signal_below_it(values, most):
+    stretch = stretched(values, most)
+    assert stretch[0] == 0.0 and (np.abs(stretch) <= most + 1e-12).all()
+    slips = np.abs(stretch) >= most - 1e-12
+    np.testing.assert_allclose(np.diff(stretch)[~slips[1:]], np.diff(values)[~slips[1:]], atol=1e-12)
 
 
 def test_a_free_map_predicts_rows_that_no_fit_has_seen_as_well_as_those_left_out_in_turn(left):

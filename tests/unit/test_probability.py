@@ -1,5 +1,6 @@
 """Probabilities of names: shares of the evidence, times the chance that the catalogue holds the truth at all."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -7,10 +8,12 @@ from contests import contest, decided, predicted, supposed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rhythmid.diagnose.constants import STATED
 from rhythmid.diagnose.probability import (
     adequacy,
     joint_probability,
     margin_over_others,
+    resolved,
     told_apart,
     weights_of,
 )
@@ -34,6 +37,20 @@ def test_names_that_explain_all_are_believed_and_such_that_explain_little_are_no
 def test_a_name_is_the_surer_the_worse_the_nearest_other_predicts(one, other):
     low, high = sorted((one, other))
     assert 0.0 <= told_apart(low) <= told_apart(high) <= 1.0
+
+
+@given(st.floats(0.0, 1e3), st.floats(0.0, 1e3))
+def test_a_name_is_the_surer_the_better_the_size_of_its_effect_is_determined(one, other):
+    low, high = sorted((one, other))
+    assert 0.0 <= resolved(high) <= resolved(low) <= 1.0
+
+
+def test_an_effect_is_stated_only_where_its_size_is_determined():
+    made = contest(NOMINAL, supposed("a", predicted(0.1)))
+    for error, stated in ((0.05, True), (0.6, False), (math.inf, False)):
+        _, decision = decided(made, errors={"a": error})
+        assert (decision.verdict == "missing_physics") == stated
+        assert (decision.probability["a"] >= STATED) == stated
 
 
 def test_the_margin_is_over_the_best_other_name_and_not_over_kin_of_the_chosen_one():

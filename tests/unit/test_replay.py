@@ -36,7 +36,7 @@ def test_the_decision_is_the_same_after_the_evidence_was_written_and_read(left, 
         maps={quantity: predicted(share) for quantity, share in maps.items()},
     )
     _, before = decided(made, detectable)
-    after = decision_of(json.loads(json.dumps(ledger(made, detectable), allow_nan=False)))
+    after = decision_of(json.loads(json.dumps(ledger(made, detectable, {}), allow_nan=False)))
     assert (after.verdict, after.reason, after.named) == (before.verdict, before.reason, before.named)
     assert after.equivalent == before.equivalent
     assert after.joint == pytest.approx(before.joint, abs=1e-4)
@@ -46,7 +46,7 @@ def test_the_decision_is_the_same_after_the_evidence_was_written_and_read(left, 
 
 def test_the_evidence_keeps_predictions_to_seven_digits():
     made = contest(NOMINAL, supposed("a", predicted(1.0 / 3.0, math.pi)), maps={"time": predicted(0.7)})
-    read = contest_of(json.loads(json.dumps(ledger(made, 0.1))))
+    read = contest_of(json.loads(json.dumps(ledger(made, 0.1, {}))))
     for one, other in zip(made.hypotheses, read.hypotheses):
         np.testing.assert_allclose(one.prediction.log_density, other.prediction.log_density, rtol=1e-7)
         assert (one.elements, one.names, one.kind, one.free) == (
@@ -56,13 +56,13 @@ def test_the_evidence_keeps_predictions_to_seven_digits():
             other.free,
         )
     assert read.practical == PRACTICAL and set(read.maps) == {"time"}
-    assert read.follows == math.inf and contest_of(ledger(replace(made, follows=0.3), 0.1)).follows == 0.3
+    assert read.follows == math.inf and contest_of(ledger(replace(made, follows=0.3), 0.1, {})).follows == 0.3
 
 
 def answered(made, verdict: str, *missing: dict) -> dict:
     """An answer as it was kept, whatever its verdict was then."""
     kept = {"verdict": verdict, "missing": list(missing), "joint_probability": 0.0, "indistinguishable": []}
-    return kept | {"evidence": ledger(made, 0.001), "seconds": 12.0}
+    return kept | {"evidence": ledger(made, 0.001, {}), "seconds": 12.0}
 
 
 def test_an_answer_gets_the_verdict_and_names_that_its_evidence_gives_now():

@@ -31,10 +31,12 @@ def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
         "stated": contest(NOMINAL, friction()),
         "partly_left": contest(NOMINAL, friction(0.3), maps={"velocity": predicted(1e-4)}),
         "rivals": contest(NOMINAL, *pair),
+        "size_open": contest(NOMINAL, friction()),
         "hardly_told_apart": contest(NOMINAL, friction(0.2, score=2000.0), near),
     }
     made = cases.get(rule.name, contest(NOMINAL))
-    _, decision = decided(made, 0.8 if rule.name == "blind" else SEEN)
+    errors = {"friction": 1.5} if rule.name == "size_open" else {}
+    _, decision = decided(made, 0.8 if rule.name == "blind" else SEEN, errors)
     assert decision.verdict == rule.verdict
     beginning = rule.reason.partition("{")[0]
     assert decision.reason.startswith(beginning) and bool(decision.reason) == bool(rule.reason)

@@ -65,6 +65,11 @@ STEEPNESS = 1.5
 # predicts worse: half at `ALIKE`, rising with its power `SHARPNESS` (fitted to the same cases)
 ALIKE = 5.0
 SHARPNESS = 0.5
+# chance that an effect is that law and not only one of its limits, which a law that the catalogue lacks has as well, as a function
+# of the standard deviation of its size, relative to the size: half at `VAGUE`, falling with its power `VAGUENESS`. Play that
+# never closes is a gain, and a spring whose kink is out of reach a constant force (fitted to the same cases and to real recordings)
+VAGUE = 0.4
+VAGUENESS = 3.0
 # that log density where the chance is `STATED`: a richer law is named in the place of one that it contains from there on
 APART = ALIKE * (STATED / (1.0 - STATED)) ** (1.0 / SHARPNESS)
 # effect that the records would not show, as a share of what was measured, from which they decide nothing: as large as what

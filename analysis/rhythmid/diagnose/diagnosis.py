@@ -150,7 +150,7 @@ class Answer(Result):
 
     def ledger(self) -> dict[str, Any]:
         """All that the decision depends on, as plain data; see `replay`."""
-        return ledger(self.result.contest, self.result.detectable)
+        return ledger(self.result.contest, self.result.detectable, self.result.size_errors)
 
 
 def diagnose(

@@ -42,6 +42,7 @@ from rhythmid.diagnose.search.score_tests import (
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.diagnose.selection import Contest, Selection, select
 from rhythmid.diagnose.shape import shape_of
+from rhythmid.diagnose.size_error import size_errors
 from rhythmid.diagnose.tick_interval import ticks_followed
 from rhythmid.diagnose.verdict import Decision, decide
 from rhythmid.elements.catalogue import Catalogue
@@ -64,7 +65,7 @@ class FreeRunResult:
     """Everything behind an answer that was scored in free run or in windows.
 
     `search` holds the chosen model as its `best`, with its fit; `before` and `after` are the free maps beside the nominal and
-    beside the chosen model; `unseen_nominal` and `unseen_augmented` their runs over separate held-out records.
+    beside the chosen model; `size_errors` are the relative standard deviations of the chosen effects' sizes, by label; `unseen_nominal` and `unseen_augmented` their runs over separate held-out records.
     """
 
     scoring: Scoring
@@ -80,6 +81,7 @@ class FreeRunResult:
     selection: Selection
     decision: Decision
     detectable: float
+    size_errors: Mapping[str, float]
 
 
 def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
@@ -132,13 +134,13 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         trial = _trial_of(selection.chosen, contenders)
     found = _with_best(found, trial, case)
     least = _detectable(contenders, selection.chosen, rows)
-    decision = decide(contest, selection, least)
     if trial.added and selection.chosen.kind == "effects":
         found = ticks_followed(profiled(finely_stepped(found, case.pool), case.pool), case.pool)
     between = covariance_between(found.fit.names, selection.chosen, contest.hypotheses)
     unnamed = _unnamed(found, known, case)
     fit = with_robust_covariance(found.fit)
     found = replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed))
+    errors = size_errors(found.fit.model, selection.chosen.elements, found.fit.std)
     return FreeRunResult(
         scoring,
         tuple(seen),
@@ -151,8 +153,9 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         _rerun(found.fit, unseen, found),
         contest,
         selection,
-        decision,
+        decide(contest, selection, least, errors),
         least,
+        errors,
     )
 
 

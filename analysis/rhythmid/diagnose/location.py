@@ -1,16 +1,18 @@
 """Locate a mismatch without naming it: which quantity does the missing force (or sensor error) depend on?
 
 The missing force is written as an unknown smooth function of one quantity (position, velocity, both, actuator force, time), as
-what a few filters, of first order and resonant, remember of the velocity or of the actuator's force, or as a vibration; the
-sensor's error as a function of its output. Each is a sum of functions whose effects on the free run are simulated; to first order, that is another
-hypothesis: a free map beside the model. What it predicts of blocks that were left out tells where the mismatch lives, and
-whether the names leave something that another explanation would predict. It also draws what the catalogue has no name for.
+what a few filters, of first order and resonant, remember of the velocity or of the actuator's force, as what springs that slip
+remember of the position, or as a vibration; the sensor's error as a function of its output. Each is a sum of functions whose effects
+on the free run are simulated; to first order, that is another hypothesis: a free map beside the model. What it predicts of blocks that
+were left out tells where the mismatch lives, and whether the names leave something that another explanation would predict. It also
+draws what the catalogue has no name for.
 """
 
 import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +31,9 @@ SPLINES, SPLINES_OF_TWO = 8, 5  # basis functions of one quantity, and of each o
 TIME_CONSTANTS = (0.003, 0.01, 0.03, 0.1, 0.3)  # of filters that remember, in periods of the motion
 # of filters that resonate at the residual's strongest line: a light and a heavy one, between which those of real second modes lie
 DAMPING_RATIOS = (0.03, 0.2)
+# displacements at which springs slip, in ranges of the position: those of other springs lie between (a sum of such springs is any
+# hysteresis of Prandtl and Ishlinskii: M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, 1996, chapter 2)
+SLIPS = (0.015, 0.05, 0.1, 0.2, 0.3)
 RIDGE = 1e-4  # prior precision of a coefficient, relative to the information that all rows have of it
 # quantities of which the free function is a spline, with the name of the same map in the simulator
 SPLINED = {
@@ -113,6 +118,19 @@ def _resonant(values: Sequence[Array], times: Sequence[Array], line: float) -> l
     return found
 
 
+def _slipped(values: Sequence[Array]) -> list[list[Array]]:
+    """What springs that slip remember of signals: one function for each displacement at which they slip. A sum of them is any hysteresis
+    that does not depend on speed and whose loops are alike wherever they begin."""
+    reach = max(float(np.ptp(value)) for value in values)
+    return [[stretched(value, share * reach) for value in values] for share in SLIPS]
+
+
+def stretched(values: Array, most: float) -> Array:
+    """How far a spring is stretched whose end follows a signal (n,) and which slips at `most` in either direction; at first it is not."""
+    held = accumulate(values.tolist(), lambda foot, value: min(max(foot, value - most), value + most))
+    return values - np.fromiter(held, dtype=np.float64, count=len(values))
+
+
 def _simulated(
     known: Trajectories, functions: list[list[Array]], pool: ThreadPoolExecutor | None
 ) -> tuple[tuple[Array, ...], ...]:
@@ -169,6 +187,7 @@ def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> It
     if all(both):
         products = [[a * b for a, b in zip(x, v)] for x in both[0] for v in both[1]]
         yield FreeMap("position and velocity", _simulated(known, products, pool), none, nowhere)
+    yield FreeMap("past position", _simulated(known, _slipped(quantities["position"]), pool), none, nowhere)
     times = [p.time for p in known.paths]
     frequency = _frequency(known)
     past = {"past velocity": quantities["velocity"]}

@@ -2,9 +2,10 @@
 
 Hypotheses with no more effects than the chosen one share the evidence, as pseudo-BMA weights. A name's probability is the
 share of those that hold it, times the chance that the catalogue holds the truth at all. That falls with how much is left that
-something else explains, beside the part of the mismatch that the name explains; and with how little worse the nearest other name
-predicts. For the laws of the catalogue are a sample of all laws: where the records hardly tell two of them apart, they would
-not tell the chosen one from one that the catalogue lacks.
+something else explains, beside the part of the mismatch that the name explains; with how little worse the nearest other name
+predicts; and with how little the records determine the effect's size. For the laws of the catalogue are a sample of all laws:
+where the records hardly tell two of them apart, they would not tell the chosen one from one that the catalogue lacks. And where an
+effect improves the prediction by much, whatever its size is, it does so in a limit that other laws have as well.
 """
 
 import math
@@ -12,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rhythmid.diagnose.constants import ADEQUATE, ALIKE, SHARPNESS, STEEPNESS
+from rhythmid.diagnose.constants import ADEQUATE, ALIKE, SHARPNESS, STEEPNESS, VAGUE, VAGUENESS
 from rhythmid.diagnose.evidence import probabilities
 from rhythmid.diagnose.hypothesis import Hypothesis
 from rhythmid.diagnose.rejections import keeps_shape
@@ -39,6 +40,12 @@ def told_apart(margin: float) -> float:
     """Chance that a name is not only the nearest to a law that the catalogue lacks, where the nearest other name predicts worse by
     this log density: a logistic function of its logarithm."""
     return float(1.0 / (1.0 + (ALIKE / max(margin, 1e-9)) ** SHARPNESS))
+
+
+def resolved(error: float) -> float:
+    """Chance that an effect is not only a limit of its law, where its size has this standard deviation relative to itself: a logistic
+    function of its logarithm."""
+    return float(1.0 / (1.0 + (error / VAGUE) ** VAGUENESS)) if error < math.inf else 0.0
 
 
 def margin_over_others(label: str, contest: Contest, selection: Selection) -> float:

@@ -4,6 +4,7 @@ A change of the rules, or of the constants, is tried on answers that were kept.
 """
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from rhythmid.diagnose.verdict import Decision, decide
 DIGITS = 8  # significant, of each number of the ledger
 
 
-def ledger(contest: Contest, detectable: float) -> dict[str, Any]:
+def ledger(contest: Contest, detectable: float, size_errors: Mapping[str, float]) -> dict[str, Any]:
     """All that a decision depends on, as plain JSON data."""
     return {
         "hypotheses": [
@@ -38,6 +39,9 @@ def ledger(contest: Contest, detectable: float) -> dict[str, Any]:
         "practical": contest.practical,
         "follows": contest.follows if math.isfinite(contest.follows) else None,
         "detectable": detectable,
+        "size_errors": {
+            label: error if math.isfinite(error) else None for label, error in size_errors.items()
+        },
     }
 
 
@@ -85,7 +89,8 @@ def contest_of(data: dict[str, Any]) -> Contest:
 def decision_of(data: dict[str, Any]) -> Decision:
     """The decision on a ledger by the rules as they are now."""
     contest = contest_of(data)
-    return decide(contest, select(contest), data["detectable"])
+    errors = {label: math.inf if one is None else one for label, one in data.get("size_errors", {}).items()}
+    return decide(contest, select(contest), data["detectable"], errors)
 
 
 def redecide(answer: dict[str, Any]) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """The verdict: consistent, missing physics, unknown physics or undecided."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from scipy.stats import t as student
@@ -13,6 +13,7 @@ from rhythmid.diagnose.probability import (
     adequacy,
     joint_probability,
     margin_over_others,
+    resolved,
     told_apart,
     weights_of,
 )
@@ -151,9 +152,17 @@ def _groups(contest: Contest, selection: Selection) -> tuple[tuple[str, ...], ..
     return tuple(groups)
 
 
-def decide(contest: Contest, selection: Selection, detectable: float) -> Decision:
-    """The decision on a selection; `detectable` is the smallest effect that these records would show, as a share of the motion
-    or of the effort."""
+def decide(
+    contest: Contest, selection: Selection, detectable: float, size_errors: Mapping[str, float]
+) -> Decision:
+    """The decision on a selection.
+
+    Parameters
+    ----------
+    contest, selection : all hypotheses, and the chosen one.
+    detectable : the smallest effect that these records would show, as a share of the motion or of the effort.
+    size_errors : of the chosen effects, by label, the relative standard deviations of their sizes, see `size_errors`.
+    """
     chosen = selection.chosen
     left = unexplained(contest, chosen)
     shares = shares_of(contest, chosen)
@@ -167,6 +176,7 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
     sure = {
         label: adequacy(_own_share(shares[label], left.expected))
         * told_apart(margin_over_others(label, contest, selection))
+        * resolved(size_errors.get(label, 0.0))
         for label in labels
     }
 
@@ -188,6 +198,7 @@ def decide(contest: Contest, selection: Selection, detectable: float) -> Decisio
         math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300),
         (chosen.heldout_nrmse or 0.0) / contest.follows,
         detectable,
+        max((size_errors.get(label, 0.0) for label in labels), default=0.0),
         joint_probability([names[label] for label in labels], contest, chosen, weights),
         bool(groups),
     )

@@ -7,7 +7,7 @@ as Markdown.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rhythmid.diagnose.constants import BLIND, EXPLAINED, MAINLY, STATED
+from rhythmid.diagnose.constants import BLIND, EXPLAINED, MAINLY, STATED, VAGUE
 from rhythmid.diagnose.hypothesis import Kind, Verdict
 
 
@@ -26,6 +26,7 @@ class Outcome:
     missed : rms error of the chosen hypothesis, as a share of what was measured.
     astray : its error on held-out data, over that up to which a model follows the machine.
     detectable : smallest effect that the records would show, the same.
+    vague : largest standard deviation of the size of one of its effects, relative to the size.
     evidence : share of the evidence for hypotheses that hold all of its names.
     alike : whether other names predict as well in the place of one of them.
     """
@@ -39,6 +40,7 @@ class Outcome:
     missed: float
     astray: float
     detectable: float
+    vague: float
     evidence: float
     alike: bool
 
@@ -170,6 +172,14 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "undecided",
         "the evidence does not separate several explanations",
         lambda found: 1.0 if found.alike else 1.0 - found.evidence,
+    ),
+    VerdictRule(
+        "size_open",
+        "largest standard deviation of an effect's size, relative to the size",
+        VAGUE,
+        "undecided",
+        "the records do not determine the size of an effect that improves the prediction, so it may stand for a law that the catalogue lacks",
+        lambda found: found.vague,
     ),
     VerdictRule(
         "hardly_told_apart",

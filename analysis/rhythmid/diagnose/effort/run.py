@@ -1,5 +1,6 @@
 """Diagnosis by the recorded effort: the search, its hypotheses on data that no fit has seen, and the decision."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +27,7 @@ from rhythmid.diagnose.evidence import (
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.model_uncertainty import covariance_between
 from rhythmid.diagnose.selection import Contest, Selection, select
+from rhythmid.diagnose.size_error import size_errors
 from rhythmid.diagnose.verdict import Decision, decide
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
@@ -40,7 +42,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class EffortResult:
-    """Everything behind an answer that was scored by effort; `errors` (rms) of prediction by the key of a hypothesis."""
+    """Everything behind an answer that was scored by effort; `size_errors` are the relative standard deviations of the chosen effects'
+    sizes, by label, and `errors` (rms) those of prediction, by the key of a hypothesis."""
 
     applicability: Applicability
     search: EffortSearch
@@ -49,6 +52,7 @@ class EffortResult:
     selection: Selection
     decision: Decision
     detectable: float
+    size_errors: Mapping[str, float]
     chosen: Fitted
     nominal: Fitted
     remainder: Remainder
@@ -152,15 +156,18 @@ def effort_run(
     selection = select(contest)
     chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)
     least = detectable(predicted[chosen.elements].error, time) / size
+    among = _among_models(chosen, case.catalogue, found.balance, contest, selection)
+    errors_of_sizes = size_errors(among.fit.model, chosen.elements, among.std())
     return EffortResult(
         applicability,
         found,
         rows.heldout,
         contest,
         selection,
-        decide(contest, selection, least),
+        decide(contest, selection, least, errors_of_sizes),
         least,
-        _among_models(chosen, case.catalogue, found.balance, contest, selection),
+        errors_of_sizes,
+        among,
         found.nominal,
         left if chosen is found.chosen else remainder_of(found.balance, chosen),
         errors,
