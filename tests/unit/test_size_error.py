@@ -33,6 +33,11 @@ def test_a_size_of_nothing_or_without_a_standard_deviation_is_not_determined(for
     assert size_errors(model, [label], {f"{label}.force": std}) == {label: math.inf}
 
 
+def test_a_stop_may_be_too_stiff_for_records_to_say_how_stiff():
+    model, label = with_effect("end_stop_contact", stiffness=1e4, damping_ratio=0.1, position=0.1, side=1.0)
+    assert size_errors(model, [label], {f"{label}.stiffness": 1e6}) == {}
+
+
 def test_what_is_no_effect_or_was_not_estimated_is_left_out():
     model, label = with_effect("coulomb_friction", force=2.0, transition=0.01)
     assert size_errors(model, [label, "inertia.mass", "input_delay.delay"], {}) == {}

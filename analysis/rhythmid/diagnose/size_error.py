@@ -14,14 +14,14 @@ def size_errors(model: Model, labels: Sequence[str], std: Mapping[str, float]) -
     model
         A fitted model.
     labels
-        Of its effects; what is no effect, or has no size that was estimated, is left out.
+        Of its effects; what is no effect, has no size that was estimated, or may be of any large size, is left out.
     std
         Standard deviations of the model's estimated parameters, by name.
     """
     found = {}
     for label in labels:
         term = model.term(label)
-        if term is None or f"{label}.{term.element.size}" not in std:
+        if term is None or term.element.rigid or f"{label}.{term.element.size}" not in std:
             continue
         value, absent = term.values[term.element.size].value, term.element.absent
         # where an infinite limit is no limit, its inverse is the size, and has the same relative error

@@ -136,7 +136,8 @@ class Element:
     `borrows` maps a kernel argument to (parameter of another element, value when the model has no such element;
     None makes that element a condition for using this one); `STEP` and `ELAPSED` are always there. `size` names the parameter that
     measures how much of the effect there is; with it at `absent` the model behaves as without the element, whatever its
-    other parameters. `starts` proposes first guesses of physical size from the record's scales, several where the shape
+    other parameters. A `rigid` effect keeps its name however large that is: a stop may be too stiff for records to say how stiff.
+    `starts` proposes first guesses of physical size from the record's scales, several where the shape
     matters. `special_case_of` names richer elements that contain this one, exactly or in a limit of their parameters;
     `confusable` maps another element's name to what tells the two apart. A `rotational` effect needs an angle for x, a
     `controlled` one a controller in the model, one of a `displaced_base` an input that moves the base.
@@ -177,6 +178,7 @@ class Element:
     confusable: Mapping[str, str] = field(default_factory=dict)
     size: str = ""
     absent: float = 0.0
+    rigid: bool = False
     candidate: bool = True  # takes part in the search for missing physics
     needless_with: tuple[str, ...] = ()
     same_as: tuple[str, ...] = ()  # elements that make one and the same model, with other parameters

@@ -56,6 +56,7 @@ ELEMENT = Element(
     kernel=kernel,
     acts="body",
     size="stiffness",
+    rigid=True,
     starts=starts,
     ranges=lambda s: {"position": (s.low, s.high)},
     also_known_as=("bump stop", "hard stop", "impact"),
