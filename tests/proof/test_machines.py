@@ -23,19 +23,14 @@ NAMED: dict[str, Callable[[], Twin]] = {
     "servo of which only command and motion are known": twins.servo,
     "free decay without any input": twins.decay,
 }
-# named before the effort was scored by inverse dynamics: the position, integrated from the speed, drifts along the gravity
-UNNAMED: dict[str, Callable[[], Twin]] = {
-    "joint driven by a current, velocity measured, with a heavy link": lambda: twins.joint(0.0, weight=0.5),
-}
-NOT_YET = pytest.mark.xfail(
-    strict=True, reason="gravity is not seen in the effort where only the speed is recorded"
-)
 NULLS: dict[str, Callable[[], Twin]] = {
     "joint": lambda: twins.joint(friction=0.0),
     "rig on a shaken base": lambda: twins.rig(cubic=0.0),
     "film at 30 Hz": lambda: twins.camera(""),
 }
 SLOW: dict[str, Callable[[], Twin]] = {
+    # not named: the position, integrated from the speed, drifts along the gravity
+    "joint, velocity, with a heavy link": lambda: twins.joint(0.0, weight=0.5),
     "axis in closed loop from its reference": lambda: twins.axis(known="reference"),
     "pendulum, free decay": lambda: twins.pendulum(driven=False),
     "rig, base displacement": twins.rig,
@@ -62,9 +57,9 @@ def examined(twin: Twin) -> Answer:
     return answer
 
 
-@pytest.mark.parametrize("name", [*NAMED, *(pytest.param(name, marks=NOT_YET) for name in UNNAMED)])
+@pytest.mark.parametrize("name", NAMED)
 def test_the_missing_effect_is_named_and_measured(name):
-    twin = (NAMED | UNNAMED)[name]()
+    twin = NAMED[name]()
     result = examined(twin).diagnosis
     assert result.verdict == "missing_physics"
     assert [effect.element for effect in result.missing] == [twin.lacks]
