@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 from refusals import EXPERIMENT, needs_run
 
+from rhythmid import load
+from rhythmid.errors import InputError
+
 MODEL = Path(str(files("rhythmid"))) / "models" / "paper_hopper.yaml"
 WRITERS = [
     ("check", "bag", "--json"),
@@ -94,3 +97,8 @@ def test_a_recording_that_may_not_be_read_is_refused_with_one_line(refused, tmp_
 
     monkeypatch.setattr(Path, "exists", forbidden)
     assert refused("identify", "locked/run.mcap") == "locked/run.mcap: Permission denied"
+
+
+def test_loading_from_a_name_that_no_file_can_have_raises_the_error_of_bad_input():
+    with pytest.raises(InputError, match="File name too long"):
+        load(LONG)

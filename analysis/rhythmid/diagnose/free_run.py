@@ -139,8 +139,8 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     between = covariance_between(found.fit.names, selection.chosen, contest.hypotheses)
     unnamed = _unnamed(found, known, case)
     fit = with_robust_covariance(found.fit)
+    errors = size_errors(fit.model, selection.chosen.elements, fit.std)
     found = replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed))
-    errors = size_errors(found.fit.model, selection.chosen.elements, found.fit.std)
     return FreeRunResult(
         scoring,
         tuple(seen),

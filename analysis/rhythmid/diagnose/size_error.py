@@ -16,7 +16,8 @@ def size_errors(model: Model, labels: Sequence[str], std: Mapping[str, float]) -
     labels
         Of its effects; what is no effect, has no size that was estimated, or may be of any large size, is left out.
     std
-        Standard deviations of the model's estimated parameters, by name.
+        Standard deviations of the model's estimated parameters, by name: those of this model as it is, without what other models
+        would add.
     """
     found = {}
     for label in labels:

@@ -83,7 +83,11 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
         if not given.from_tables:
             raise InputError(f"{source}: names topics of a bag; give the bag, and this file with --signals")
         return read_tables(given)
-    if not source.exists():
+    try:
+        there = source.exists()
+    except OSError as error:  # a path that no file can have
+        raise InputError(f"{source}: {error.strerror}") from None
+    if not there:
         raise InputError(f"{source}: no such file or directory")
     if signals is not None and table_suffix(source) in SUFFIXES:
         return read_tables(signals.of_table(source))

@@ -156,8 +156,8 @@ def effort_run(
     selection = select(contest)
     chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)
     least = detectable(predicted[chosen.elements].error, time) / size
-    among = _among_models(chosen, case.catalogue, found.balance, contest, selection)
-    errors_of_sizes = size_errors(among.fit.model, chosen.elements, among.std())
+    robust = replace(chosen, fit=with_robust_std(chosen.fit, found.balance.record))
+    errors_of_sizes = size_errors(chosen.fit.model, chosen.elements, robust.std())
     return EffortResult(
         applicability,
         found,
@@ -167,7 +167,7 @@ def effort_run(
         decide(contest, selection, least, errors_of_sizes),
         least,
         errors_of_sizes,
-        among,
+        _among_models(robust, case.catalogue, found.balance, contest, selection),
         found.nominal,
         left if chosen is found.chosen else remainder_of(found.balance, chosen),
         errors,
@@ -177,9 +177,9 @@ def effort_run(
 def _among_models(
     chosen: Fitted, catalogue: Catalogue, balance: Balance, contest: Contest, selection: Selection
 ) -> Fitted:
-    """The chosen fit with standard deviations that hold what the choice of the model adds, and small effects that it lacks."""
+    """The chosen fit, whose standard deviations are robust, with what the choice of the model and small effects that it lacks add to them."""
     between = covariance_between(chosen.fit.names, selection.chosen, contest.hypotheses)
-    fit = with_robust_std(chosen.fit, balance.record)
+    fit = chosen.fit
     std = fit.std.copy()  # of the alignment first, which belongs to no model
     std[1:] = np.hypot(std[1:], np.sqrt(np.diag(between)))
     return replace(chosen, fit=replace(fit, std=np.hypot(std, _unnamed(balance, chosen.fit, catalogue))))
