@@ -1,5 +1,7 @@
 """Samples that do not say where the machine was are found, and honest ones are kept."""
 
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -57,6 +59,14 @@ def test_rounded_values_are_all_kept_and_their_step_is_known(seed, step):
 def test_values_that_were_not_rounded_have_no_step():
     assert resolution(motion(np.random.default_rng(1), 1e-3)) == 0.0
     assert resolution(np.full(50, 0.3)) == 0.0
+
+
+def test_values_that_differ_by_the_representation_of_numbers_only_make_no_grid():
+    rest = np.repeat(1e-12 * np.arange(12), 2)
+    value = np.concatenate([rest, motion(np.random.default_rng(1), 1e-3)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert resolution(value) == 0.0
 
 
 def test_two_values_are_the_coarsest_rounding_and_lose_no_sample():

@@ -180,7 +180,9 @@ def resolution(value: NDArray[np.float64]) -> float:
     if len(common) < LEVELS:
         return 0.0
     step, on_grid = _grid(common, np.ptp(value))
-    away = (value - common[np.argmax(count[count > 1])]) / max(step, 1e-300)
+    if step == 0.0:
+        return 0.0
+    away = (value - common[np.argmax(count[count > 1])]) / step
     hit = np.abs(away - np.round(away)) < 0.05
     return step if on_grid.mean() > 0.99 and hit.mean() > ROUNDED else 0.0
 
