@@ -135,3 +135,17 @@ def test_a_result_that_cannot_be_put_in_its_place_leaves_nothing(tmp_path):
     with pytest.raises(InputError, match="cannot be written"):
         write_text(tmp_path / "taken", "found")
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+
+
+def test_a_campaign_that_is_ended_by_a_signal_leaves_no_worker(tmp_path):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rhythmid.cli", "proof", "--kind", "null", "--cases", "2", "--out", str(tmp_path / "out")],
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+    assert process.stderr is not None
+    assert any("sealed" in line for line in process.stderr)
+    assert len(children(process.pid)) > 1
+    process.terminate()
+    process.wait(PATIENCE)
+    process.stderr.close()
+    assert nobody_left(process.pid)

@@ -4,6 +4,7 @@ import json
 import multiprocessing
 import os
 import shutil
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -151,9 +152,17 @@ def read_score(path: Path) -> Score:
     return Score(**data)
 
 
-def _pin(cores: Sequence[int]) -> None:
+def _begin(cores: Sequence[int], parent: int) -> None:
+    """Keep to these processors, and end when the `parent` has: a signal that ends it does not reach its workers."""
     if cores and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, cores)
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
 
 
 def _shares(jobs: int) -> list[list[int]]:
@@ -178,8 +187,8 @@ class _Worker:
             self._pool = ProcessPoolExecutor(
                 1,
                 multiprocessing.get_context("spawn"),
-                _pin,
-                (self._cores,),
+                _begin,
+                (self._cores, os.getpid()),
                 max_tasks_per_child=3 * LIFETIME,
             )
         return self._pool.submit(step, *arguments)
