@@ -74,7 +74,8 @@ similar one. Its fields, besides names, equation, parameters and reference:
   the position given by the parameter `kink`.
 - `acts`: which motion a force sees, and where it is added; `leg` by default.
 - `size`: the parameter that scales the effect, and `absent` (0 by default) its value at which the effect is zero.
-  The score test varies this parameter alone.
+  The score test varies this parameter alone. With `rigid=True` the size may be too large for records to determine, as the stiffness of a stop;
+  of other effects a name is stated only where they determine it.
 - `starts`: first guesses from the records' scales, a function such as
   `lambda s: [{{"force": 0.02 * s.force, "transition": 0.1 * s.velocity}}]`. A factor of ten is accurate enough for a size,
   which the score test scales. Frequencies and lengths need several guesses, at the distance of the local minima. An empty list says that
