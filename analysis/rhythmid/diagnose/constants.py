@@ -67,7 +67,7 @@ ALIKE = 5.0
 SHARPNESS = 0.5
 # chance that an effect is that law and not only one of its limits, which a law that the catalogue lacks has as well, as a function
 # of the standard deviation of its size, relative to the size: half at `VAGUE`, falling with its power `VAGUENESS`. Play that
-# never closes is a gain, and a spring whose kink is out of reach a constant force (fitted to the same cases and to real recordings)
+# never closes is a gain, and a spring whose kink is out of reach a constant force (chosen by sealed cases and real recordings: docs/proof.md)
 VAGUE = 0.4
 VAGUENESS = 3.0
 # that log density where the chance is `STATED`: a richer law is named in the place of one that it contains from there on
