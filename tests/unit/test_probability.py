@@ -53,6 +53,13 @@ def test_an_effect_is_stated_only_where_its_size_is_determined():
         assert (decision.probability["a"] >= STATED) == stated
 
 
+def test_a_small_effect_whose_size_is_open_leaves_the_large_one_stated():
+    made = contest(NOMINAL, supposed("a", predicted(0.1)), supposed("a b", predicted(0.01)))
+    _, decision = decided(made, errors={"b": 1.0})
+    assert (decision.verdict, decision.named, decision.beside) == ("missing_physics", ("a",), ("b",))
+    assert decided(made)[1].named == ("a", "b")
+
+
 def test_the_margin_is_over_the_best_other_name_and_not_over_kin_of_the_chosen_one():
     chosen = supposed("a", predicted(0.1, 500.0), richer={"a": ("wide",)})
     wide, same = supposed("wide", predicted(0.1, 499.0)), supposed("b", predicted(0.1, 499.5))

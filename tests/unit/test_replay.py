@@ -44,6 +44,16 @@ def test_the_decision_is_the_same_after_the_evidence_was_written_and_read(left, 
     assert after.unexplained.share == pytest.approx(before.unexplained.share, abs=1e-4)
 
 
+@pytest.mark.parametrize("error", [0.01, 0.5, math.inf])
+def test_the_error_of_an_effects_size_is_kept_with_the_evidence(error):
+    made = contest(NOMINAL, supposed("a", predicted(0.1)))
+    _, before = decided(made, errors={"a": error})
+    after = decision_of(json.loads(json.dumps(ledger(made, 0.001, {"a": error}), allow_nan=False)))
+    assert (after.verdict, after.rule) == (before.verdict, before.rule)
+    assert after.probability["a"] == pytest.approx(before.probability["a"], abs=1e-6)
+    assert (after.verdict == "missing_physics") == (error < 0.1)
+
+
 def test_the_evidence_keeps_predictions_to_seven_digits():
     made = contest(NOMINAL, supposed("a", predicted(1.0 / 3.0, math.pi)), maps={"time": predicted(0.7)})
     read = contest_of(json.loads(json.dumps(ledger(made, 0.1, {}))))

@@ -65,7 +65,8 @@ class FreeRunResult:
     """Everything behind an answer that was scored in free run or in windows.
 
     `search` holds the chosen model as its `best`, with its fit; `before` and `after` are the free maps beside the nominal and
-    beside the chosen model; `size_errors` are the relative standard deviations of the chosen effects' sizes, by label; `unseen_nominal` and `unseen_augmented` their runs over separate held-out records.
+    beside the chosen model; `unseen_nominal` and `unseen_augmented` their runs over separate held-out records; `size_errors` the
+    relative standard deviations of the chosen effects' sizes, by label.
     """
 
     scoring: Scoring

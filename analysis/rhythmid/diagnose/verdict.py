@@ -198,7 +198,7 @@ def decide(
         math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300),
         (chosen.heldout_nrmse or 0.0) / contest.follows,
         detectable,
-        max((size_errors.get(label, 0.0) for label in labels), default=0.0),
+        size_errors.get(labels[0], 0.0) if labels else 0.0,
         joint_probability([names[label] for label in labels], contest, chosen, weights),
         bool(groups),
     )

@@ -26,7 +26,7 @@ class Outcome:
     missed : rms error of the chosen hypothesis, as a share of what was measured.
     astray : its error on held-out data, over that up to which a model follows the machine.
     detectable : smallest effect that the records would show, the same.
-    vague : largest standard deviation of the size of one of its effects, relative to the size.
+    vague : standard deviation of the size of its effect with the largest share, relative to the size.
     evidence : share of the evidence for hypotheses that hold all of its names.
     alike : whether other names predict as well in the place of one of them.
     """
@@ -175,10 +175,10 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
     ),
     VerdictRule(
         "size_open",
-        "largest standard deviation of an effect's size, relative to the size",
+        "standard deviation of the size of the effect with the largest share, relative to the size",
         VAGUE,
         "undecided",
-        "the records do not determine the size of an effect that improves the prediction, so it may stand for a law that the catalogue lacks",
+        "the records do not determine the size of the effect that explains most, so it may stand for a law that the catalogue lacks",
         lambda found: found.vague,
     ),
     VerdictRule(
