@@ -1,6 +1,6 @@
 """Location: free maps beside a fit tell which quantity a missing force goes with, and draw it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -11,15 +11,8 @@ from hypothesis import strategies as st
 from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.diagnose.contenders import Rows, linearised, rows_of
 from rhythmid.diagnose.evidence import cross_validate
-from rhythmid.diagnose.location import (
-    Dependence,
-    beside,
-    dependences,
-    following,
-    free_maps,
-    reach_of,
-    stretched,
-)
+from rhythmid.diagnose.free_functions import free_maps, stretched
+from rhythmid.diagnose.location import Dependence, beside, dependences, following, reach_of
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import estimate
@@ -107,6 +100,20 @@ def test_a_free_map_predicts_rows_that_no_fit_has_seen_as_well_as_those_left_out
     found = left.of(left.quantity).found.error
     for rows in (left.rows.heldout, ~left.rows.heldout):
         assert np.sum(found[rows] ** 2) < 0.3 * np.sum(plain[rows] ** 2)
+
+
+def test_a_free_map_predicts_separate_records_as_well_as_those_that_the_fit_saw(left):
+    seen, machine = (
+        left.known.fit.run.series,
+        hopper().with_element(CATALOGUE[left.name], LACKING[left.name][1]),
+    )
+    other = [replace(one, name=f"{one.name} again") for one in prepare(records(machine, SHORT), 4)]
+    rows = rows_of(seen, other, NOISE)
+    found = next(one for one in dependences(left.known, rows) if one.quantity == left.quantity).found
+    alone = linearised(left.known.fit, rows).residual
+    separate = np.zeros(len(alone), bool)
+    separate[len(left.rows.record) :] = True
+    assert separate.any() and np.sum(found.error[separate] ** 2) < 0.3 * np.sum(alone[separate] ** 2)
 
 
 def test_where_nothing_is_missing_nothing_is_explained():

@@ -15,6 +15,17 @@ force:
   - linear_spring: {stiffness: {value: 0.42, unit: N*m/rad}, rest_length: {value: 0.0, unit: rad, fixed: true}}
   - viscous_damper: {damping: {value: 0.0013, unit: N*m*s/rad}}
 """
+SPRING = """
+inertia: {mass: {value: 1.0, unit: kg}}
+force:
+  - linear_spring: {stiffness: {value: 60.0, unit: N/m}, rest_length: {value: 0.0, unit: m, fixed: true}}
+  - viscous_damper: {damping: {value: 0.6, unit: N*s/m}}
+"""
+SHAKEN = {
+    "duration": 30.0,
+    "excitation": {"type": "chirp", "amplitude": 0.5, "sweep": 10.0, "band": [0.3, 4.0]},
+    "noise": {"measurement_std": 1e-4},
+}
 SWUNG = {
     "duration": 20.0,
     "excitation": {"type": "chirp", "amplitude": 0.05, "sweep": 20.0, "band": [0.5, 2.0]},
@@ -38,3 +49,18 @@ def test_scores_are_those_of_changes_at_the_fit_that_the_noise_of_the_round_has_
     assert [one.statistic for one in found.scores] == pytest.approx(
         [one.statistic for one in again], rel=1e-6
     )
+
+
+def test_a_resonance_that_no_candidate_knows_is_not_the_noise_s_colour():
+    library = load_catalogue()
+    model = rh.Model.from_text(SPRING)
+    swinging = model.with_element(
+        library["second_mode"], {"mass": 0.2, "frequency": 1.0, "damping_ratio": 0.1}
+    )
+    made = rh.simulate(swinging, SHAKEN).record
+    fit = estimate(model, prepare([made]))
+    _, moved = one_round(fit, (), Catalogue({"cubic_stiffness": library["cubic_stiffness"]}), None)
+    assert fit.nrmse() > 0.05
+    # most of what is left follows from the past motion, and is no noise
+    assert moved.noise.variance < 0.3 * fit.noise.variance
+    assert moved.chi2 > 3.0 * moved.samples

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from machines import CATALOGUE, hopper
+from rhythmid.identify.descent import first_guess
+from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.multiple_shooting import windows
 from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series
 from rhythmid.simulation.signal import spline
@@ -45,3 +48,45 @@ def test_a_voltage_is_not_taken_for_the_force_of_the_motor_that_it_feeds():
     assert scales([driven], hopper()).effort > 50.0
     sizes = scales([driven], motor)
     assert sizes.effort == pytest.approx(sizes.force) and sizes.peak_effort == 0.0
+
+
+def test_where_only_the_speed_is_measured_places_are_those_that_the_model_counts_from():
+    time = 5e-3 * np.arange(2000)
+    turning = Series(
+        "turning",
+        time,
+        2.0 + np.sin(3.0 * time),
+        None,
+        None,
+        1,
+        np.ones(2000, bool),
+        5e-3,
+        measured="velocity",
+    )
+    parts = windows([turning], 2.0)
+    sizes = scales(parts, hopper())
+    covered = 2.0 * time + (1.0 - np.cos(3.0 * time)) / 3.0
+    assert [one.origin for one in parts] == pytest.approx(
+        np.interp([one.time[0] for one in parts], time, covered), abs=1e-3
+    )
+    assert (sizes.low, sizes.high) == pytest.approx((covered[0], covered[-1]), abs=0.05)
+
+
+def test_windows_of_a_speed_begin_where_the_record_has_come_to():
+    time = 5e-3 * np.arange(2000)
+    turning = Series(
+        "turning",
+        time,
+        2.0 + np.sin(3.0 * time),
+        None,
+        None,
+        1,
+        np.ones(2000, bool),
+        5e-3,
+        measured="velocity",
+    )
+    again = windows(windows([turning], 4.0), 2.0)
+    model = hopper()
+    begin = first_guess(model, prepare_run(model, again))
+    assert [start[0] for start in begin] == [one.origin for one in again]
+    assert len(again) == 5 and np.all(np.diff([one.origin for one in again]) > 2.0)

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.constants import LONGEST_DELAY, SERIES
+from rhythmid.diagnose.free_functions import values_of
 from rhythmid.diagnose.free_map import FREE_MAPS, first_guess
 from rhythmid.diagnose.hypothesis import Kind
-from rhythmid.diagnose.location import values_of
 from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.round import Round
 from rhythmid.diagnose.search.score_tests import Score, Trajectories

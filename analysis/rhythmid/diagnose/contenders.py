@@ -68,6 +68,11 @@ class Rows:
         return int(np.sum(self.blocks.fold[self.blocks.block] >= 0))
 
     @property
+    def held(self) -> tuple[tuple[slice, ...], ...]:
+        """Stretches of each separate series."""
+        return tuple(_long_enough(one, self.noise) for one in self.unseen)
+
+    @property
     def heldout(self) -> NDArray[np.bool_]:
         """Rows (n,) that no fit sees."""
         return self.blocks.fold[self.blocks.block] < 0

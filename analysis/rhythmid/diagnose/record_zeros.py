@@ -19,7 +19,8 @@ from rhythmid.diagnose.baseline import Calibration
 from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
 from rhythmid.diagnose.contenders import Rows, linearised, rows_of
 from rhythmid.diagnose.evidence import Linearised, predict, weight_for
-from rhythmid.diagnose.location import FreeMap, Reach, beside, following, reach_of
+from rhythmid.diagnose.free_functions import FreeMap
+from rhythmid.diagnose.location import Reach, beside, following, reach_of
 from rhythmid.diagnose.rejections import decisive
 from rhythmid.diagnose.search.forward import search
 from rhythmid.diagnose.search.score_tests import under

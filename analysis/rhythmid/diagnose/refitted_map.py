@@ -11,8 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from rhythmid.diagnose.contenders import Contender, Rows, contend
+from rhythmid.diagnose.free_functions import SPLINED, values_of
 from rhythmid.diagnose.free_map import FREE_MAPS, first_guess
-from rhythmid.diagnose.location import SPLINED, Dependence, values_of
+from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.score_tests import Trajectories
 from rhythmid.diagnose.search.trial import Trial, propose

@@ -37,11 +37,11 @@ def first_guess(model: Model, run: FreeRun) -> list[Array]:
         span = 0.05 / max(dominant_frequency(one), 1e-9)
         n = int(np.clip(round(span / one.period), 3, max(len(one.time) // 4, 3)))
         slope, level = np.polyfit(one.time[:n] - one.time[0], one.value[:n], 1)
-        begin = {"position": (level, slope), "velocity": (0.0, level), "acceleration": (0.0, 0.0)}[
+        begin = {"position": (level, slope), "velocity": (one.origin, level), "acceleration": (0.0, 0.0)}[
             one.measured
         ]
         if one.kind == "base_displacement" and one.command is not None and one.measured != "position":
-            begin = float(one.command(one.centres[0])) + begin[0], begin[1]
+            begin = float(one.command(one.centres[0])), begin[1]  # at rest on the base
         found.append(start_of(model, run, index, float(begin[0]), float(begin[1])))
     return found
 

@@ -13,7 +13,14 @@ from scipy.interpolate import PPoly
 
 from rhythmid.identify.descent import first_guess
 from rhythmid.identify.free_run import prepare_run
-from rhythmid.identify.series import Array, Series, dominant_frequency, longest_of_each, record_of
+from rhythmid.identify.series import (
+    Array,
+    Series,
+    displacement,
+    dominant_frequency,
+    longest_of_each,
+    record_of,
+)
 from rhythmid.model import Model
 from rhythmid.simulation.signal import first_order_hold
 
@@ -49,6 +56,9 @@ def split(series: Series, length: float) -> list[Series]:
     """Cut a series into windows of about `length` [s], each of which gets a start of its own."""
     size = max(8 * series.block, round(length / series.period / series.block) * series.block)
     parts: list[Series] = []
+    covered = (
+        displacement(series) if series.measured == "velocity" else np.full(len(series.time), series.origin)
+    )
     for first in range(0, len(series.time) - 4 * series.block, size):
         window = slice(first, min(first + size, len(series.time)))
         time = series.time[window]
@@ -60,6 +70,7 @@ def split(series: Series, length: float) -> list[Series]:
                 used=series.used[blocks], spread=None if series.spread is None else series.spread[blocks],
                 ignored=None if series.ignored is None else series.ignored[blocks],
                 command=_around(series.command, time[0], time[-1]), forcing=_around(series.forcing, time[0], time[-1]),
+                origin=float(covered[first]),
             )
         )  # fmt: skip
     return parts

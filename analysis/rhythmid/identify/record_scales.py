@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from rhythmid.elements.element import Scales
-from rhythmid.identify.series import Series, dominant_frequency
+from rhythmid.identify.series import Series, displacement, dominant_frequency
 from rhythmid.model import Model
 from rhythmid.simulation.signal import FOR_EVER
 
@@ -22,6 +22,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     biggest = max(series, key=lambda s: float(np.std(s.averaged)))
     frequency = dominant_frequency(biggest)
     motions = [_motion(one) for one in series]
+    places = [_place(one, x) for one, (x, _) in zip(series, motions)]
     position = max(max(float(np.std(x)) for x, _ in motions), 1e-12)
     velocity = max(float(np.std(v)) for _, v in motions)
     inertial = model.mass.value * (2 * np.pi * frequency) ** 2
@@ -53,9 +54,9 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         position=position,
         velocity=max(velocity, 1e-12),
         effort=effort or stiffness * position,
-        centre=float(np.mean(np.concatenate([x for x, _ in motions]))),
-        low=min(float(x.min()) for x, _ in motions),
-        high=max(float(x.max()) for x, _ in motions),
+        centre=float(np.mean(np.concatenate(places))),
+        low=min(float(x.min()) for x in places),
+        high=max(float(x.max()) for x in places),
         mass=model.mass.value,
         stiffness=float(stiffness),
         frequency=frequency,
@@ -68,6 +69,12 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         displaced_base=any(one.kind == "base_displacement" for one in series),
         idle=not driven,
     )
+
+
+def _place(series: Series, motion: Array) -> Array:
+    """Position (blocks,) as the model counts it: that of `motion`, or where only the speed is measured from where the model begins."""
+    fixed = series.kind == "base_displacement" or series.measured != "velocity"
+    return motion if fixed else series.average(displacement(series))
 
 
 def _motion(series: Series) -> tuple[Array, Array]:

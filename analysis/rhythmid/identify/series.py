@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import PPoly
 
 from rhythmid.errors import InputError
@@ -45,7 +46,8 @@ class Series:
     `resolution` is the step of the grid that the samples were rounded to, 0 where they lie on none. `colour` is the noise model,
     where that is known up to its size, as that of what jitter of commands excites.
     `zero` is what was taken off the samples because the output's zero is not that of the first record, as far as that is known; None
-    where it is; see `record_zero`.
+    where it is; see `record_zero`. `origin` is where the motion begins that the model integrates, which nothing measures: of a stretch of a
+    record of a speed, the displacement since the record began; see `displacement`.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Series:
     resolution: float = 0.0
     colour: NoiseModel | None = None
     zero: float | None = None
+    origin: float = 0.0
 
     @property
     def blocks(self) -> int:
@@ -308,6 +311,11 @@ def _whole_blocks(series: Series, block: int) -> Mask:
     for near in range(1 - REACH, REACH + 1):
         broken[np.clip(apart + near, 0, n - 1)] = True
     return ~broken
+
+
+def displacement(series: Series) -> Array:
+    """Position (n,) at the samples of a series whose speed is measured, its beginning taken for `origin`."""
+    return series.origin + cumulative_trapezoid(series.value, series.time, initial=0.0)
 
 
 def hold_out_tail(series: Sequence[Series], share: float = 0.2) -> tuple[list[Series], list[Series]]:

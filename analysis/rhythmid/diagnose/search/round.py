@@ -6,7 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rhythmid.diagnose.free_functions import filtered
 from rhythmid.diagnose.search.score_tests import (
     Change,
     Score,
@@ -28,6 +30,7 @@ from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, coloured, minimise
 from rhythmid.identify.series import Series
 
+Array = NDArray[np.float64]
 MISFIT = 0.1  # error, as a share of the motion, and
 # power of the residual over what its own past leaves of it, beyond both of which it is no noise
 PREDICTED = 25.0
@@ -79,23 +82,26 @@ def distinct(scores: Sequence[Score], count: int) -> list[tuple[Score, list[Scor
     return [(group[0], group) for group in list(found.values())[:count]]
 
 
-def noise_without(fit: Fit, changes: Sequence[Change], most: int = 60) -> NoiseModel:
-    """Noise model of the residual less what the catalogue's best guesses together explain of it.
+def noise_without(
+    fit: Fit, changes: Sequence[Change], filters: Sequence[tuple[Array, ...]] = (), most: int = 60
+) -> NoiseModel:
+    """Noise model of the residual less what the catalogue's best guesses and linear filters together explain of it.
 
     The residual of a model that lacks something is not noise: a regular motion that is missed can be predicted from its
     own past, so it would pass for colour and be whitened away. Where nothing is missing the guesses take out no more
-    than their number of degrees of freedom, which is given back.
+    than their number of degrees of freedom, which is given back. `filters` are changes of each series' block averages by a linear
+    part that the catalogue may lack.
     """
     samples = sum(int(one.used.sum()) for one in fit.run.series)
     ranked = score(fit, changes)[: min(most, samples // 50)]
     residuals = [r.copy() for r in fit.residuals]
     share = 1.0
-    if ranked:
-        by_key = {change.key: change for change in changes}
-        picked = [by_key[one.key] for one in ranked]
+    by_key = {change.key: change for change in changes}
+    picked = [*(by_key[one.key].outputs for one in ranked), *filters]
+    if picked:
         used = [one.used for one in fit.run.series]
         design, target = reduced(
-            (np.column_stack([c.outputs[i][u] for c in picked]), residuals[i][u]) for i, u in enumerate(used)
+            (np.column_stack([c[i][u] for c in picked]), residuals[i][u]) for i, u in enumerate(used)
         )
         norms = np.linalg.norm(design, axis=0)
         norms[norms == 0.0] = 1.0
@@ -103,7 +109,7 @@ def noise_without(fit: Fit, changes: Sequence[Change], most: int = 60) -> NoiseM
         solution = solution / norms
         share = samples / max(samples - int(rank), 1)
         for i, r in enumerate(residuals):
-            r += np.column_stack([c.outputs[i] for c in picked]) @ solution
+            r += np.column_stack([c[i] for c in picked]) @ solution
     stretches = [
         one.levelled(r[s], s) * math.sqrt(share)
         for r, one in zip(residuals, fit.run.series)
@@ -119,7 +125,7 @@ def one_round(
 
     What is missing, such as a slow drift, would otherwise pass for the colour of the noise, in later rounds as in the first.
     """
-    noise = noise_without(fit, _changes(fit, catalogue, pool))
+    noise = noise_without(fit, _changes(fit, catalogue, pool), _filters(fit, pool))
     if fit.nrmse() > MISFIT and noise.variance > PREDICTED * noise.std**2:
         # motion that is missed, not noise: do not whiten it away
         noise = NoiseModel(np.empty(0), noise.variance**0.5)
@@ -132,6 +138,11 @@ def _changes(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) ->
     """Changes that the whole catalogue makes at a fit: they are told from what its parameters do only where these are linearised."""
     known = trajectories(fit)
     return changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
+
+
+def _filters(fit: Fit, pool: ThreadPoolExecutor | None) -> list[tuple[Array, ...]]:
+    """Changes that linear filters of the past velocity and of the past actuator force make at a fit."""
+    return [column for one in filtered(trajectories(fit), pool) for column in one.columns]
 
 
 def not_tried(nominal: Fit, catalogue: Catalogue, first: Round) -> list[tuple[tuple[str, ...], str]]:
@@ -156,7 +167,7 @@ def scored_in_windows(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor |
     try:
         run = prepare_run(fit.model, cut, fit.run.max_step)
         local = minimise(fit.model, run, fit.names, _within(fit.noise, cut), None, 10, pool)
-        noise = _within(noise_without(local, _changes(local, catalogue, pool)), cut)
+        noise = _within(noise_without(local, _changes(local, catalogue, pool), _filters(local, pool)), cut)
         local = under(local, noise, pool)
         return score(local, _changes(local, catalogue, pool))
     except InputError:

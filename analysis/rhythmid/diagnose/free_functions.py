@@ -1,0 +1,197 @@
+"""Free functions beside a fitted model, for a force or a sensor's error that no law is known of.
+
+A missing force is a smooth function of one quantity (position, velocity, both, actuator force, time), or what a few filters, of first
+order and resonant, remember of the velocity or of the actuator's force, or what springs that slip remember of the position, or a vibration; the
+sensor's error is a function of its output. Each is a sum of functions whose effects on the free run are simulated.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import accumulate
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.signal import lfilter
+
+from rhythmid.diagnose.search.score_tests import Trajectories, residual_line
+from rhythmid.simulation.signal import first_order_hold
+
+Array = NDArray[np.float64]
+SPLINES, SPLINES_OF_TWO = 8, 5  # basis functions of one quantity, and of each of two
+TIME_CONSTANTS = (0.003, 0.01, 0.03, 0.1, 0.3)  # of filters that remember, in periods of the motion
+# of filters that resonate at the residual's strongest line: a light and a heavy one, between which those of real second modes lie
+DAMPING_RATIOS = (0.03, 0.2)
+# displacements at which springs slip, in ranges of the position: those of other springs lie between (a sum of such springs is any
+# hysteresis of Prandtl and Ishlinskii: M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, 1996, chapter 2)
+SLIPS = (0.015, 0.05, 0.1, 0.2, 0.3)
+# quantities of which the free function is a spline, with the name of the same map in the simulator
+SPLINED = {
+    "position": "position",
+    "velocity": "velocity",
+    "actuator force": "effort",
+    "measured position (sensor error)": "signal",
+}
+
+
+@dataclass(frozen=True)
+class FreeMap:
+    """A free function: `columns[i][s]` is the change of series s's block averages for a unit of its i-th coefficient.
+
+    `grid` and `basis` (i, g) draw a function of one quantity; both are empty for others.
+    """
+
+    quantity: str
+    columns: tuple[tuple[Array, ...], ...]
+    grid: Array
+    basis: Array
+
+
+def _splines(values: Sequence[Array], count: int) -> tuple[list[list[Array]], Array, Array]:
+    """Cubic B-splines over the middle 99.8 % of the values: functions of each series, a grid, the functions on it."""
+    joined = np.concatenate(values)
+    low, high = np.quantile(joined, [0.001, 0.999])
+    if high <= low:
+        return [], np.empty(0), np.empty((0, 0))
+    degree = 3
+    inner = np.linspace(low, high, count - degree + 1)
+    knots = np.concatenate([[low] * degree, inner, [high] * degree])
+    splines = [BSpline.basis_element(knots[i : i + degree + 2], extrapolate=False) for i in range(count)]
+    top = high - 1e-12 * (high - low)
+    functions = [[np.nan_to_num(spline(np.clip(v, low, top))) for v in values] for spline in splines]
+    grid = np.linspace(low, top, 60)
+    return functions, grid, np.array([np.nan_to_num(spline(grid)) for spline in splines])
+
+
+def _remembered(values: Sequence[Array], times: Sequence[Array], frequency: float) -> list[list[Array]]:
+    """What first-order filters remember of signals: one function for each time constant."""
+    found = []
+    for share in TIME_CONSTANTS:
+        function = []
+        for value, time in zip(values, times):
+            keep = math.exp(-float(np.median(np.diff(time))) * frequency / share)
+            begin = [keep * value[0]]
+            function.append(np.asarray(lfilter([1.0 - keep], [1.0, -keep], value, zi=begin)[0]))
+        found.append(function)
+    return found
+
+
+def _resonant(values: Sequence[Array], times: Sequence[Array], line: float) -> list[list[Array]]:
+    """What filters that resonate at the frequency `line` [Hz] remember of signals, in phase with their force and a quarter turn
+    ahead: a part on a spring moves like one of them, whatever its damping ratio between theirs."""
+    found = []
+    for ratio in DAMPING_RATIOS:
+        pairs = []
+        for value, time in zip(values, times):
+            turn = 2.0 * math.pi * line * float(np.median(np.diff(time)))
+            radius, angle = math.exp(-ratio * turn), math.sqrt(1.0 - ratio**2) * turn
+            pole = [1.0, -2.0 * radius * math.cos(angle), radius**2]
+            level = value - value.mean()
+            pairs.append([lfilter([0.0, turn * radius], pole, level), lfilter([1.0, -radius], pole, level)])
+        found += [[np.asarray(pair[0]) for pair in pairs], [np.asarray(pair[1]) for pair in pairs]]
+    return found
+
+
+def _slipped(values: Sequence[Array]) -> list[list[Array]]:
+    """What springs that slip remember of signals: one function for each displacement at which they slip. A sum of them is any hysteresis
+    that does not depend on speed and whose loops are alike wherever they begin."""
+    reach = max(float(np.ptp(value)) for value in values)
+    return [[stretched(value, share * reach) for value in values] for share in SLIPS]
+
+
+def stretched(values: Array, most: float) -> Array:
+    """How far a spring is stretched whose end follows a signal (n,) and which slips at `most` in either direction; at first it is not."""
+    held = accumulate(values.tolist(), lambda foot, value: min(max(foot, value - most), value + most))
+    return values - np.fromiter(held, dtype=np.float64, count=len(values))
+
+
+def _simulated(
+    known: Trajectories, functions: list[list[Array]], pool: ThreadPoolExecutor | None
+) -> tuple[tuple[Array, ...], ...]:
+    """Outputs' changes when each function acts as a force; its size is chosen small and scaled back."""
+    run, fit = known.disturbed, known.fit
+    scale = (
+        1e-3 * fit.model.mass.value * max(float(np.std(np.gradient(p.velocity, p.time))) for p in known.paths)
+    )
+
+    def one(function: list[Array]) -> tuple[Array, ...]:
+        size = max(float(np.abs(values).max()) for values in function) or 1.0
+        changes = []
+        for index, (series, path) in enumerate(zip(run.series, known.paths)):
+            push = first_order_hold(path.time, scale / size * function[index])
+            rows = run.rows(fit.model, index, fit.starts[index], push)
+            if rows is None:
+                changes.append(np.zeros(series.blocks))
+            else:
+                change = series.of_block(rows[:, run.states] - known.outputs[index])
+                changes.append(change * size / scale)
+        return tuple(changes)
+
+    return tuple(pool.map(one, functions)) if pool else tuple(one(function) for function in functions)
+
+
+def values_of(known: Trajectories, name: str) -> list[Array]:
+    """Values of the quantity that a spline depends on, of each series; `name` is that of the simulator's map, as in `SPLINED`."""
+    values: dict[str, list[Array]] = {
+        "position": [path.position for path in known.legs],
+        "velocity": [path.velocity for path in known.legs],
+        "effort": [path.effort for path in known.paths],
+        "signal": list(known.outputs),
+    }
+    return values[name]
+
+
+def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:
+    """The free functions beside a fitted model, each made when it is asked for: over long records each is large."""
+    fit = known.fit
+    none, nowhere = np.empty(0), np.empty((0, 0))
+    moving = any(np.ptp(p.effort) > 0 for p in known.paths)
+    quantities: dict[str, list[Array]] = {
+        "position": values_of(known, "position"),
+        "velocity": values_of(known, "velocity"),
+        "time": [p.time - p.time[0] for p in known.paths],
+    }
+    if moving:
+        quantities["actuator force"] = values_of(known, "effort")
+    for name, values in quantities.items():
+        functions, grid, basis = _splines(values, SPLINES)
+        if functions:
+            yield FreeMap(name, _simulated(known, functions, pool), grid, basis)
+    both = [_splines(quantities[name], SPLINES_OF_TWO)[0] for name in ("position", "velocity")]
+    if all(both):
+        products = [[a * b for a, b in zip(x, v)] for x in both[0] for v in both[1]]
+        yield FreeMap("position and velocity", _simulated(known, products, pool), none, nowhere)
+    yield FreeMap("past position", _simulated(known, _slipped(quantities["position"]), pool), none, nowhere)
+    yield from filtered(known, pool)
+    line = residual_line(fit)
+    if line > 0.0:
+        times = [p.time for p in known.paths]
+        waves = [[wave(2.0 * np.pi * line * t) for t in times] for wave in (np.cos, np.sin)]
+        yield FreeMap(f"a vibration at {line:.3g} Hz", _simulated(known, waves, pool), none, nowhere)
+    functions, grid, basis = _splines(values_of(known, "signal"), SPLINES)
+    if functions:
+        columns = tuple(tuple(s.of_block(f) for s, f in zip(fit.run.series, one)) for one in functions)
+        yield FreeMap("measured position (sensor error)", columns, grid, basis)
+
+
+def filtered(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:
+    """Forces that linear filters make of the past velocity and of the past actuator force: a linear part that the model lacks."""
+    times, frequency = [p.time for p in known.paths], _frequency(known)
+    past = {"past velocity": values_of(known, "velocity")}
+    if any(np.ptp(p.effort) > 0 for p in known.paths):
+        past["past actuator force"] = values_of(known, "effort")
+    line = residual_line(known.fit)
+    for name, values in past.items():
+        functions = _remembered(values, times, frequency)
+        if line > 0.0:
+            functions += _resonant(values, times, line)
+        yield FreeMap(name, _simulated(known, functions, pool), np.empty(0), np.empty((0, 0)))
+
+
+def _frequency(known: Trajectories) -> float:
+    """Typical frequency of the motion [Hz]: rms of the velocity over that of the position."""
+    velocity = max(float(np.std(p.velocity)) for p in known.paths)
+    position = max(float(np.std(p.position)) for p in known.paths)
+    return velocity / max(2.0 * math.pi * position, 1e-300)
