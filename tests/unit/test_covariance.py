@@ -40,3 +40,20 @@ def test_a_parameter_is_on_the_edge_when_its_distance_is_nothing_beside_its_unce
 def test_without_a_finite_bound_there_is_no_edge():
     stance = replace(hopper().parameters[STANCE], bounds=(-np.inf, np.inf), value=1e-9)
     assert on_the_edge(hopper().with_parameters({STANCE: stance}), [STANCE], np.eye(1)) == {}
+
+
+def test_what_cannot_be_told_apart_leaves_the_precision_of_a_parameter_that_can():
+    # a spring that a pendulum's gravity has replaced: stiffness, rest length, damping, moment and angle at rest. The first two do the same
+    # but for rounding, in which the moment takes part
+    rows = np.array(
+        [
+            [-1.0, -0.999999993, -0.028486618, 0.153789044, -0.993643291],
+            [0.0, 1.14247e-4, 0.016475255, -0.987087372, -0.001026969],
+            [0.0, 0.0, -0.999458393, 8.45446e-4, 0.020954075],
+            [0.0, 0.0, 0.0, 0.04479659, -0.011640629],
+            [0.0, 0.0, 0.0, 0.0, 0.109988078],
+        ]
+    )
+    std = np.sqrt(np.diag(covariance_of(rows, [None] * 5)))
+    assert (std[:2] > 1e10).all()
+    assert std[2:] == pytest.approx([1.0, 1.0, 9.0], rel=0.05)

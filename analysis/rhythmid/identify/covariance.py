@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-PART = 1e-5  # of an undetermined direction's largest component, below which a parameter takes no part in it
+# share of a parameter's effect that others cannot make, up to which it is rounding of the differences that sensitivities are taken from
+OWN = 1e-5
 EDGE = 1e-3  # standard deviations from its bound, nearer than which a parameter is taken to be there
 
 
@@ -21,17 +22,28 @@ def covariance_of(jacobian: Array, priors: Sequence) -> Array:
     norms = np.linalg.norm(jacobian, axis=0)
     norms[norms == 0.0] = 1e-150
     scaled = jacobian / norms
-    information = scaled.T @ scaled
-    for i, prior in enumerate(priors):
-        if prior is not None:
-            information[i, i] += 1.0 / (prior.std * norms[i]) ** 2
+    precise = np.array([0.0 if one is None else 1.0 / (one.std * n) for one, n in zip(priors, norms)])
+    rows = np.vstack([scaled, np.diag(precise)])
+    information = rows.T @ rows
     eigenvalues, vectors = np.linalg.eigh(information)
     known = eigenvalues > 1e-11 * max(eigenvalues[-1], 1e-300)
     inverse = np.where(known, 1.0 / np.maximum(eigenvalues, 1e-300), 1e24)
-    # rounding gives every parameter a trace of an undetermined direction; only those that take part are undetermined
-    vectors = np.where(~known & (np.abs(vectors) < PART * np.abs(vectors).max(axis=0)), 0.0, vectors)
+    # rounding gives every parameter a trace of an undetermined direction; only those whose effect the others can make are undetermined
+    if not known.all():
+        vectors = np.where(~known & (_own_part(rows) > OWN)[:, None], 0.0, vectors)
     with np.errstate(over="ignore"):
         return (vectors * inverse) @ vectors.T / np.outer(norms, norms)
+
+
+def _own_part(rows: Array) -> Array:
+    """Share (p,) of each column of rows (n, p), of unit norm, that the other columns cannot make."""
+    triangle = np.linalg.qr(rows, mode="r")
+    found = []
+    for i in range(rows.shape[1]):
+        one, others = triangle[:, i], np.delete(triangle, i, axis=1)
+        made = others @ np.linalg.lstsq(others, one, rcond=1e-12)[0] if others.size else 0.0
+        found.append(float(np.linalg.norm(one - made)))
+    return np.array(found)
 
 
 def on_the_edge(model: Model, names: Sequence[str], covariance: Array) -> dict[str, float]:
