@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+import rhythmid as rh
 from machines import CATALOGUE, SHORT, hopper, record, records
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import split, windows
@@ -205,3 +206,20 @@ force:
     mass, stiffness = fit.model.value("inertia.mass"), fit.model.value("linear_spring.stiffness")
     assert stiffness / mass == pytest.approx(12.0**2, rel=0.01)
     assert fit.std["inertia.mass"] > mass  # only ratios are determined
+
+
+def test_an_angle_at_rest_that_the_start_of_a_speed_makes_up_for_stays_where_it_is():
+    swinging = Model.from_text(
+        "inertia: {mass: {value: 0.03, unit: kg*m^2}}\nforce: [{viscous_damper: {damping: {value: 0.05, unit: N*m*s/rad}}}]"
+    ).with_element(CATALOGUE["pendulum_gravity"], {"moment": 0.1, "reference": 0.2})
+    run = {
+        "duration": 15.0,
+        "excitation": {"type": "chirp", "amplitude": 0.05, "sweep": 15.0, "band": [0.2, 2.0]},
+    }
+    position = rh.simulate(swinging, run).record
+    speed = np.gradient(position.output.value, position.output.time)
+    record = replace(position, output=replace(position.output, value=speed), output_kind="velocity")
+    fit = estimate(swinging.with_values({"pendulum_gravity.moment": 0.05}), prepare([record]))
+    assert fit.model.value("pendulum_gravity.moment") == pytest.approx(0.1, rel=0.01)
+    assert fit.model.value("pendulum_gravity.reference") == pytest.approx(0.2, abs=0.05)
+    assert fit.std["pendulum_gravity.reference"] > 1e6

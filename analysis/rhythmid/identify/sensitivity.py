@@ -14,7 +14,9 @@ from rhythmid.identify.record_zero import zero_place
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
-DEAD = 3e-4  # share of a sensitivity, below which what the projection leaves of it is taken for rounding
+# share of a sensitivity, below which what the projection leaves of it is taken for error of the differences: these move the motion by a
+# ten-thousandth, and an angle at rest that the start of a pendulum makes up for leaves up to 1.2e-3 of its effect
+DEAD = 3e-3
 
 
 @dataclass(frozen=True)
@@ -197,11 +199,9 @@ class Problem:
             joined = np.vstack([white, known])
             basis = span(joined[:, 1 + p :])
             projected = joined[:, : 1 + p] - basis @ (basis.T @ joined[:, : 1 + p])
-            if (
-                self.ignored[index] is not None
-            ):  # what is left of a parameter that acts as the ignored is rounding
-                whole = np.linalg.norm(self._white(index, change[:, :p]), axis=0)
-                projected[:, 1:][:, np.linalg.norm(projected[:, 1:], axis=0) < DEAD * whole] = 0.0
+            # what is left of a parameter that acts as the initial state does, or as what is ignored, is rounding
+            whole = np.linalg.norm(self._white(index, change[:, :p]), axis=0)
+            projected[:, 1:][:, np.linalg.norm(projected[:, 1:], axis=0) < DEAD * whole] = 0.0
             rows.append(projected[: len(white), 0])
             columns.append(projected[: len(white), 1:])
             bases.append(basis[: len(white)])
