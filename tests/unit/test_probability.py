@@ -8,13 +8,11 @@ from contests import contest, decided, predicted, supposed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhythmid.diagnose.constants import STATED
+from rhythmid.diagnose.constants import HOLDS, STATED
 from rhythmid.diagnose.probability import (
     adequacy,
     joint_probability,
-    margin_over_others,
     resolved,
-    told_apart,
     weights_of,
 )
 from rhythmid.diagnose.selection import select
@@ -30,13 +28,7 @@ def test_the_catalogue_is_the_more_adequate_the_more_the_names_explain(one, othe
 
 
 def test_names_that_explain_all_are_believed_and_such_that_explain_little_are_not():
-    assert adequacy(1.0) > 0.99 and adequacy(0.5) < 0.5 and adequacy(0.0) < 0.1
-
-
-@given(st.floats(-10.0, 1e5), st.floats(-10.0, 1e5))
-def test_a_name_is_the_surer_the_worse_the_nearest_other_predicts(one, other):
-    low, high = sorted((one, other))
-    assert 0.0 <= told_apart(low) <= told_apart(high) <= 1.0
+    assert adequacy(1.0) == pytest.approx(HOLDS) and adequacy(0.5) < 0.5 and adequacy(0.0) < 0.1
 
 
 @given(st.floats(0.0, 1e3), st.floats(0.0, 1e3))
@@ -58,18 +50,6 @@ def test_a_small_effect_whose_size_is_open_leaves_the_large_one_stated():
     _, decision = decided(made, errors={"b": 1.0})
     assert (decision.verdict, decision.named, decision.beside) == ("missing_physics", ("a",), ("b",))
     assert decided(made)[1].named == ("a", "b")
-
-
-def test_the_margin_is_over_the_best_other_name_and_not_over_kin_of_the_chosen_one():
-    chosen = supposed("a", predicted(0.1, 500.0), richer={"a": ("wide",)})
-    wide, same = supposed("wide", predicted(0.1, 499.0)), supposed("b", predicted(0.1, 499.5))
-    other, pair = supposed("c", predicted(0.5, 100.0)), supposed("c d", predicted(0.3, 300.0))
-    plain = supposed("e", predicted(0.4, 400.0), richer={"e": ("a",)})
-    made = contest(NOMINAL, chosen, wide, same, other, pair, plain)
-    found = select(made)
-    assert found.chosen is chosen and margin_over_others("a", made, found) == pytest.approx(400.0)
-    alone = contest(NOMINAL, chosen)
-    assert margin_over_others("a", alone, select(alone)) == pytest.approx(500.0 - NOMINAL.prediction.score)
 
 
 @settings(max_examples=30, deadline=None)

@@ -17,7 +17,6 @@ def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
     law = supposed("free_force_of_position", predicted(0.01), "free_map")
     mass = supposed("inertia.mass", predicted(0.01), "freed_value")
     pair = [supposed(name, predicted(0.1, 700.0, seed=i)) for i, name in enumerate("ab")]
-    near = supposed("stribeck", predicted(0.3, 1970.0))
     cases = {
         "unnamed_remainder": contest(NOMINAL, maps={"velocity": predicted(0.1)}),
         "missed": contest(supposed("", predicted((0.5 * SIZE) ** 2))),
@@ -32,7 +31,7 @@ def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
         "partly_left": contest(NOMINAL, friction(0.3), maps={"velocity": predicted(1e-4)}),
         "rivals": contest(NOMINAL, *pair),
         "size_open": contest(NOMINAL, friction()),
-        "hardly_told_apart": contest(NOMINAL, friction(0.2, score=2000.0), near),
+        "too_uncertain": contest(NOMINAL, friction(0.2), maps={"velocity": predicted(0.08)}),
     }
     made = cases.get(rule.name, contest(NOMINAL))
     errors = {"friction": 1.5} if rule.name == "size_open" else {}

@@ -12,9 +12,7 @@ from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, Verdict
 from rhythmid.diagnose.probability import (
     adequacy,
     joint_probability,
-    margin_over_others,
     resolved,
-    told_apart,
     weights_of,
 )
 from rhythmid.diagnose.rejections import decisive, keeps_shape
@@ -174,9 +172,7 @@ def decide(
     if chosen.kind == "delay" and len(labels) > 1:  # a delay beside effects is told with the delays
         labels = tuple(label for label in labels if label != INPUT_DELAY)
     sure = {
-        label: adequacy(_own_share(shares[label], left.expected))
-        * told_apart(margin_over_others(label, contest, selection))
-        * resolved(size_errors.get(label, 0.0))
+        label: adequacy(_own_share(shares[label], left.expected)) * resolved(size_errors.get(label, 0.0))
         for label in labels
     }
 

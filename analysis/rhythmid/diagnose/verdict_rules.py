@@ -182,11 +182,11 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         lambda found: found.vague,
     ),
     VerdictRule(
-        "hardly_told_apart",
+        "too_uncertain",
         "none of the above (1)",
         0.0,
         "undecided",
-        "the records hardly distinguish this law from others, so the true law may be one that the catalogue lacks",
+        "what may be left of the mismatch is too large for the names to be stated, so the true law may be one that the catalogue lacks",
         lambda _: 1.0,
     ),
 )
