@@ -48,6 +48,26 @@ def test_channels_that_share_their_times_are_treated_alike():
     assert found["input"].time is found["output"].time and "output and input" in notes[0]
 
 
+@given(seed=seeds)
+@settings(max_examples=20, deadline=None)
+def test_neither_slow_writing_nor_a_busy_while_hides_that_samples_came_in_bursts(seed):
+    time = came(TAKEN, seed)
+    within = np.arange(len(TAKEN)) - np.searchsorted(time, time - 1e-4)  # number of a sample in its burst
+    time = time + 0.15 * PERIOD * within  # a serial line takes its time for each
+    busy = (TAKEN > 8.0) & (TAKEN < 8.5)
+    time[busy] = np.maximum(time[busy], 8.5)
+    time = np.maximum.accumulate(time) + 1e-6 * np.arange(len(time))
+    found, notes = evened(one(time, motion(TAKEN)))
+    assert len(notes) == 1 and np.abs(found["output"].time - TAKEN).max() < PERIOD
+
+
+@pytest.mark.parametrize("place", [400, 1500, 2000, 3100])
+def test_where_one_sample_is_lost_times_are_kept(place):
+    time, value = np.delete(came(TAKEN, place), place), np.delete(motion(TAKEN), place)
+    channels = one(time, value)
+    assert evened(channels) == (channels, ())
+
+
 @pytest.mark.parametrize("case", ["even", "stamped in bursts", "noise alone", "samples lost", "few"])
 def test_all_others_keep_their_times(case):
     time = came(TAKEN, 2)

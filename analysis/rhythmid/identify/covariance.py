@@ -37,7 +37,7 @@ def covariance_of(jacobian: Array, priors: Sequence) -> Array:
 
 def _own_part(rows: Array) -> Array:
     """Share (p,) of each column of rows (n, p), of unit norm, that the other columns cannot make."""
-    triangle = np.linalg.qr(rows, mode="r")
+    triangle = np.linalg.qr(rows).R
     found = []
     for i in range(rows.shape[1]):
         one, others = triangle[:, i], np.delete(triangle, i, axis=1)

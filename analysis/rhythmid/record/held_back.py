@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from rhythmid.record.record import Channel
-from rhythmid.record.timing import nominal_period
+from rhythmid.record.timing import BURSTS, nominal_period
 
 Array = NDArray[np.float64]
 # of the error of a straight line through both neighbours, at which samples are the smoother for even times: noise alone makes it 0.87
 SMOOTHER = 0.5
-TOGETHER = 0.1  # of the period, below which the usual step is that of samples which were written one right after another
 MINIMA = 64  # parts of a recording of whose samples only the soonest can touch the line
-PARTS = 8  # of a recording, in which the lateness is compared: a lost sample shifts all that follow
-STEADY = 0.5  # of the lateness' standard deviation, by which its medians over these parts may differ
-LEAST = 200  # samples, so that each part has enough of them for a median
+PARTS = 8  # of a recording, whose soonest samples are compared: a lost sample shifts all that follow, a busy network only delays some
+STEADY = 0.5  # of a period, by which these may be late: one lost sample makes it 0.8, bursts of 4 to 6 samples alone up to 0.4
+LEAST = 200  # samples, so that each part has several bursts
 
 
 def evened(channels: Mapping[str, Channel]) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -54,15 +53,15 @@ def _taken(time: Array, values: list[Array]) -> Array | None:
     if len(time) < LEAST:
         return None
     step = np.diff(time)
-    if float(np.median(step)) >= TOGETHER * nominal_period(step):
+    if float(np.median(step)) >= BURSTS * nominal_period(step):
         return None
     if not any(_smoother(time, value) for value in values):
         return None
     number = np.arange(len(time), dtype=float)
     first, period = _line_below(number, time)
     late = time - (first + period * number)
-    medians = [float(np.median(part)) for part in np.array_split(late, PARTS)]
-    if period <= 0.0 or np.ptp(medians) > STEADY * float(np.std(late)):
+    soonest = [float(part.min()) for part in np.array_split(late, PARTS)]
+    if period <= 0.0 or max(soonest) > STEADY * period:
         return None
     return first + period * number
 
