@@ -10,7 +10,7 @@ from rhythmid.diagnose.admission import admitted
 from rhythmid.diagnose.diagnosis import Answer, diagnose
 from rhythmid.identify.inverse_dynamics.balance import QUARTER, Balance
 from rhythmid.identify.inverse_dynamics.estimate import fit_effort
-from rhythmid.identify.inverse_dynamics.motion import across, short_gaps
+from rhythmid.identify.inverse_dynamics.motion import across, short_gaps, stretches
 from rhythmid.record.record import Channel, Record
 
 BURST, BURSTS = 5, 10  # rows, and how often as many are lost: 1 % of the record
@@ -117,3 +117,25 @@ def test_only_gaps_up_to_the_longest_with_samples_beside_them_are_short():
     missing[2:4] = missing[30:33] = missing[60:80] = True
     assert np.flatnonzero(short_gaps(missing, 10)).tolist() == [30, 31, 32]
     assert not short_gaps(missing, 0).any()
+
+
+@pytest.mark.parametrize("at_the_end", [True, False])
+def test_a_gap_at_an_end_of_what_the_channels_share_is_left_out(at_the_end):
+    record = axis()
+    assert record.input is not None
+    count = len(record.output)
+    lost = np.r_[count - 8 : count - 1] if at_the_end else np.r_[1:8]
+    kept = np.delete(np.arange(count), lost)
+    shorter = slice(0, count - 3) if at_the_end else slice(3, count)
+    cut = replace(
+        record,
+        output=replace(record.output, time=record.output.time[shorter], value=record.output.value[shorter]),
+        input=replace(record.input, time=record.input.time[kept], value=record.input.value[kept]),
+    )
+    (found,) = stretches([cut], axis_model(), longest=1.0)
+    ends = (
+        (record.output.time[0], record.output.time[count - 9])
+        if at_the_end
+        else (record.output.time[8], record.output.time[-1])
+    )
+    assert (found.time[0], found.time[-1]) == pytest.approx(ends, abs=1.0 / RATE) and found.bridged == ()

@@ -131,10 +131,14 @@ def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> 
             drive = grid.input if grid.forcing is None else grid.input + grid.forcing
         bridged = short_gaps(grid.missing, int(longest / grid.period)) | (grid.missing & grid.valid)
         output, drive = (across(signal, ~grid.missing, bridged) for signal in (grid.output, drive))
-        for part in runs(~grid.missing | bridged):
-            first, end = part.start, part.stop
+        for joined in runs(~grid.missing | bridged):
+            measured = joined.start + np.flatnonzero(~grid.missing[joined])
+            if not len(measured):
+                continue
+            first, end = int(measured[0]), int(measured[-1]) + 1  # beyond the last sample there is nothing to bridge to
             if end - first < SHORTEST:
                 continue
+            part = slice(first, end)
             spans = ((first + gap.start - 1, first + gap.stop) for gap in runs(bridged[part]))
             kind = record.input_kind if base else "force"
             found.append(
