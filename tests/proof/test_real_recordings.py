@@ -225,9 +225,6 @@ def test_friction_comes_first_in_a_frictionless_pendulum_and_its_inertia_is_foun
     assert pendulum_told.after < 0.5 * pendulum_told.before
 
 
-@pytest.mark.xfail(
-    strict=True, reason="0.78: other laws of friction predict nearly as well, and a name needs 0.8"
-)
 @present("pendulum")
 def test_a_frictionless_pendulum_is_told_that_it_lacks_friction(pendulum_told):
     assert pendulum_told.verdict == "missing_physics" and sum(pendulum_told.probabilities[:1]) >= 0.8

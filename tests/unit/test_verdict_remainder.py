@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from contests import NAMED, NOMINAL, NOTHING, SIZE, contest, decided, friction, predicted, supposed, verdict
 
@@ -55,6 +56,18 @@ def test_what_a_free_map_explains_by_chance_or_of_no_practical_size_is_nothing()
     assert verdict(contest(NOMINAL, maps={"velocity": chance})) == NOTHING
     tiny = supposed("", predicted(1e-8 + (0.001 * SIZE) ** 2, 0.0))
     assert verdict(contest(tiny, maps={"velocity": predicted(1e-8, 1e4)})) == NOTHING
+
+
+@pytest.mark.parametrize(("uneven", "expected"), [(0.0, "unknown_physics"), (0.9, "consistent")])
+def test_a_remainder_counts_where_it_is_of_practical_size_beyond_what_its_estimate_scatters(uneven, expected):
+    least = (0.003 * SIZE) ** 2
+    nominal, mapped = supposed("", predicted(2.0 * least, 0.0)), predicted(0.5 * least, 1e4)
+    blocks = np.arange(len(mapped.squared_error))
+    wave = np.where(blocks % 12 == 0, 1.0 + 11.0 * uneven, 1.0 - uneven)  # a few blocks tell it, or all alike
+    gained = nominal.prediction.squared_error.mean() - mapped.squared_error.mean()
+    mapped = replace(mapped, squared_error=nominal.prediction.squared_error - gained * wave)
+    _, decision = decided(contest(nominal, maps={"velocity": mapped}))
+    assert decision.verdict == expected and decision.unexplained.significant
 
 
 def test_more_rivals_and_fewer_blocks_ask_for_more_of_what_is_left():

@@ -198,6 +198,13 @@ def difference(first: Prediction, second: Prediction) -> tuple[float, float]:
     return _summed(first.log_density - second.log_density)
 
 
+def removed(first: Prediction, second: Prediction) -> tuple[float, float]:
+    """By how much smaller the first's mean squared error is than the second's, and the standard error of that."""
+    total, error = _summed(second.squared_error - first.squared_error)
+    samples = max(float(second.samples.sum()), 1.0)
+    return total / samples, error / samples
+
+
 def weight_for(first: Prediction, second: Prediction) -> float:
     """Logarithm of the odds that the data bring for the first against the second, no block more than `BLOCK_ODDS`.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from scipy.stats import t as student
 
 from rhythmid.diagnose.constants import EQUIVALENT, FALSE_ALARM, STATED
-from rhythmid.diagnose.evidence import chance_better, difference, gain_ahead
+from rhythmid.diagnose.evidence import chance_better, difference, gain_ahead, removed
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, Verdict
 from rhythmid.diagnose.probability import (
     adequacy,
@@ -27,13 +27,14 @@ class Unexplained:
 
     `share` is that of the explainable mismatch; `goes_with` the quantity of the free map that predicts it best; `significant`
     whether that is more than chance. `expected` is the largest share of all, significant or not, each times the chance that
-    it is real.
+    it is real. `least` is the mean square that it removes at least, `EQUIVALENT` standard errors below the estimate.
     """
 
     share: float
     significant: bool
     goes_with: str | None
     expected: float = 0.0
+    least: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -78,22 +79,22 @@ def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
         for one in contest.hypotheses
         if len(one.elements) > len(chosen.elements) and one.kind == "effects"
     ]
-    found: list[tuple[float, str]] = []
+    found: list[tuple[float, str, float]] = []
     expected = 0.0
     for words, one, count in rivals:
         gain, error = difference(one, chosen.prediction)
-        removed = chosen.prediction.mean_square - one.mean_square
-        expected = max(expected, removed * chance_better(one, chosen.prediction, decisive(count)))
+        less, uncertain = removed(one, chosen.prediction)
+        expected = max(expected, less * chance_better(one, chosen.prediction, decisive(count)))
         ahead = gain_ahead(one, chosen.prediction) >= -EQUIVALENT
-        if removed > 0.0 and ahead and 0.0 < significance(one, count) * error < gain:
-            found.append((removed, words))
+        if less > 0.0 and ahead and 0.0 < significance(one, count) * error < gain:
+            found.append((less, words, less - EQUIVALENT * uncertain))
     if whole <= 0.0:
         return Unexplained(0.0, False, None)
     expected = float(min(expected / whole, 1.0))
     if not found:
         return Unexplained(0.0, False, None, expected)
-    removed, words = max(found)
-    return Unexplained(float(min(removed / whole, 1.0)), True, words, expected)
+    less, words, least = max(found)
+    return Unexplained(float(min(less / whole, 1.0)), True, words, expected, max(least, 0.0))
 
 
 def significance(prediction: Prediction, candidates: int) -> float:
@@ -121,10 +122,10 @@ def shares_of(contest: Contest, chosen: Hypothesis) -> dict[str, float]:
         rest = set(chosen.elements) - {label}
         # the best of the fitted models without it
         without = min(square for key, square in squares.items() if set(key) <= rest)
-        removed = [without - after]
+        taken = [without - after]
         if rest and (label,) in squares:
-            removed.append(nominal - squares[label,])
-        share = sum(removed) / len(removed) / whole if whole > 0.0 else 0.0
+            taken.append(nominal - squares[label,])
+        share = sum(taken) / len(taken) / whole if whole > 0.0 else 0.0
         found[label] = float(min(max(share, 0.0), 1.0))
     return found
 
@@ -183,14 +184,13 @@ def decide(
     each = {label: probability([label]) for label in labels}
     stated = _stated(labels, probability)
     groups = _groups(contest, selection)
-    explainable = left.share * (contest.nominal.prediction.mean_square - contest.floor)
     found = Outcome(
         chosen.kind if chosen.elements else "nominal",
         len(stated),
         chosen.kind == "delay" and (not stated or stated == (INPUT_DELAY,)),
         left.share,
         left.goes_with,
-        math.sqrt(explainable) / max(contest.practical * contest.size, 1e-300) if left.significant else 0.0,
+        math.sqrt(left.least) / max(contest.practical * contest.size, 1e-300),
         math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300),
         (chosen.heldout_nrmse or 0.0) / contest.follows,
         detectable,

@@ -22,7 +22,7 @@ class Outcome:
     delay_alone : whether of a longer delay and effects no effect is stated.
     left : share of the mismatch that it leaves and something else predicts.
     goes_with : the quantity that this depends on.
-    remainder : rms of what it leaves and something else predicts by more than chance, over the smallest of practical importance.
+    remainder : rms of what it leaves and something else predicts by more than chance, at least, over the smallest of practical importance.
     missed : rms error of the chosen hypothesis, as a share of what was measured.
     astray : its error on held-out data, over that up to which a model follows the machine.
     detectable : smallest effect that the records would show, the same.
@@ -78,7 +78,8 @@ def _is(kind: Kind) -> Callable[[Outcome], float]:
 VERDICT_RULES: tuple[VerdictRule, ...] = (
     VerdictRule(
         "unnamed_remainder",
-        "no effect is accepted: rms that a free function or further effects predict beyond chance, divided by the smallest rms of practical importance",
+        "no effect is accepted: rms that a free function or further effects predict beyond chance, two standard errors below its estimate, divided by "
+        "the smallest rms of practical importance",
         1.0,
         "unknown_physics",
         "no effect of the catalogue explains the mismatch, which depends on {goes_with}",

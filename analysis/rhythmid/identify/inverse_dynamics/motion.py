@@ -135,7 +135,10 @@ def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> 
             measured = joined.start + np.flatnonzero(~grid.missing[joined])
             if not len(measured):
                 continue
-            first, end = int(measured[0]), int(measured[-1]) + 1  # beyond the last sample there is nothing to bridge to
+            first, end = (
+                int(measured[0]),
+                int(measured[-1]) + 1,
+            )  # beyond the last sample there is nothing to bridge to
             if end - first < SHORTEST:
                 continue
             part = slice(first, end)
