@@ -50,20 +50,15 @@ def test_a_voltage_is_not_taken_for_the_force_of_the_motor_that_it_feeds():
     assert sizes.effort == pytest.approx(sizes.force) and sizes.peak_effort == 0.0
 
 
+def turning_speed() -> Series:
+    """The speed of a machine that turns on and on, for 10 s."""
+    time, used = 5e-3 * np.arange(2000), np.ones(2000, bool)
+    return Series("turning", time, 2.0 + np.sin(3.0 * time), None, None, 1, used, 5e-3, measured="velocity")
+
+
 def test_where_only_the_speed_is_measured_places_are_those_that_the_model_counts_from():
-    time = 5e-3 * np.arange(2000)
-    turning = Series(
-        "turning",
-        time,
-        2.0 + np.sin(3.0 * time),
-        None,
-        None,
-        1,
-        np.ones(2000, bool),
-        5e-3,
-        measured="velocity",
-    )
-    parts = windows([turning], 2.0)
+    turning = turning_speed()
+    time, parts = turning.time, windows([turning], 2.0)
     sizes = scales(parts, hopper())
     covered = 2.0 * time + (1.0 - np.cos(3.0 * time)) / 3.0
     assert [one.origin for one in parts] == pytest.approx(
@@ -73,19 +68,7 @@ def test_where_only_the_speed_is_measured_places_are_those_that_the_model_counts
 
 
 def test_windows_of_a_speed_begin_where_the_record_has_come_to():
-    time = 5e-3 * np.arange(2000)
-    turning = Series(
-        "turning",
-        time,
-        2.0 + np.sin(3.0 * time),
-        None,
-        None,
-        1,
-        np.ones(2000, bool),
-        5e-3,
-        measured="velocity",
-    )
-    again = windows(windows([turning], 4.0), 2.0)
+    again = windows(windows([turning_speed()], 4.0), 2.0)
     model = hopper()
     begin = first_guess(model, prepare_run(model, again))
     assert [start[0] for start in begin] == [one.origin for one in again]
