@@ -1,4 +1,4 @@
-"""Backward elimination tries chosen effects against being left out, and against others, as long as they may be named at all."""
+"""Backward elimination tries chosen effects against being left out, and against others in their place."""
 
 import numpy as np
 import pytest
@@ -16,33 +16,62 @@ TIME = 5e-3 * np.arange(2000)
 SERIES = Series("made", TIME, np.sin(2 * np.pi * TIME), None, None, 1, np.ones(2000, bool), 5e-3)
 
 
-@pytest.mark.parametrize(
-    ("most", "others"), [(3, {"backlash", "quadratic_drag"}), (2, set())], ids=["may be named", "too many"]
-)
-def test_effects_are_exchanged_only_where_they_may_be_named(
-    monkeypatch: pytest.MonkeyPatch, most: int, others: set[str]
-):
-    tried: list[tuple[str, ...]] = []
+def trial(chi2: float, spring: float, **added: dict[str, float]) -> Trial:
+    """The hopper with this stiffness and with elements of these values, as a fit ended."""
+    model = hopper().with_values({"linear_spring.stiffness": spring})
+    for name, values in added.items():
+        model = model.with_element(CATALOGUE[name], values)
+    return Trial(tuple(added), model, (), chi2, 2000, len(model.free), True, QUIET)
+
+
+def test_effects_are_exchanged_for_those_that_scored_well_or_fit_well_alone(monkeypatch: pytest.MonkeyPatch):
+    tried = []
 
     def run_trials(proposals, *_, **__):
-        tried.extend(p.added for p in proposals)
+        tried.extend(proposals)
         return [], []
 
     monkeypatch.setattr(module, "run_trials", run_trials)
     monkeypatch.setattr(module, "under_noise", lambda trials, *_: list(trials))
-    model = hopper().with_element(CATALOGUE["coulomb_friction"], {"force": 1.0})
-    model = model.with_element(CATALOGUE["cubic_stiffness"], {"coefficient": 10.0})
-    best = Trial(
-        ("coulomb_friction", "cubic_stiffness"), model, (), 100.0, 2000, len(model.free), True, QUIET
-    )
+    best = trial(100.0, 200.0, coulomb_friction={"force": 1.0}, cubic_stiffness={"coefficient": 10.0})
+    alone = [
+        trial(300.0, 150.0, quadratic_stiffness={"coefficient": 3.0}),
+        trial(400.0, 160.0, cubic_stiffness={"coefficient": 20.0}),
+        trial(900.0, 200.0, quintic_stiffness={"coefficient": 3.0}),  # others fit better
+    ]
     scored = {
         name: {p.name: 0.1 for p in CATALOGUE[name].parameters} for name in ("quadratic_drag", "backlash")
     }
     first = Round(tuple(Score(0, CATALOGUE[name], guess, 50.0, 1.0) for name, guess in scored.items()), 0.0)
-    kept, _ = module.eliminate(
-        best, [SERIES], CATALOGUE, {(): best}, QUIET, 1e-3, [first], 10.0, most, lambda _: None
-    )
+    trials = {one.added: one for one in (best, *alone)}
+    kept, _ = module.eliminate(best, [SERIES], CATALOGUE, trials, QUIET, 1e-3, [first], 10.0, lambda _: None)
     assert kept is best
-    assert {("coulomb_friction",), ("cubic_stiffness",)} <= set(tried)
-    swapped = {name for added in tried if len(added) == 2 for name in added} - set(best.added)
-    assert swapped == others
+    assert {("coulomb_friction",), ("cubic_stiffness",)} <= {one.added for one in tried}
+    swapped = {name for one in tried if len(one.added) == 2 for name in one.added} - set(best.added)
+    assert swapped == {"backlash", "quadratic_drag", "quadratic_stiffness"}
+    # what fits well alone begins where it did, with the values that the model had beside it
+    (gone,) = (one for one in tried if one.added == ("coulomb_friction", "quadratic_stiffness"))
+    assert gone.guesses[0]["quadratic_stiffness.coefficient"] == 3.0
+    assert gone.guesses[0]["linear_spring.stiffness"] == 150.0
+
+
+def test_what_an_exchange_makes_idle_is_left_out(monkeypatch: pytest.MonkeyPatch):
+    ends = {
+        ("coulomb_friction", "quadratic_drag"): trial(
+            50.0, 200.0, coulomb_friction={"force": 1.0}, quadratic_drag={"coefficient": 0.1}
+        ),
+        ("quadratic_drag",): trial(51.0, 200.0, quadratic_drag={"coefficient": 0.1}),
+    }
+
+    def run_trials(proposals, *_, **__):
+        return [ends[key] for p in proposals if (key := tuple(sorted(p.added))) in ends], []
+
+    monkeypatch.setattr(module, "run_trials", run_trials)
+    monkeypatch.setattr(module, "under_noise", lambda trials, *_: list(trials))
+    best = trial(100.0, 200.0, coulomb_friction={"force": 1.0}, cubic_stiffness={"coefficient": 10.0})
+    guess = {p.name: 0.1 for p in CATALOGUE["quadratic_drag"].parameters}
+    first = Round((Score(0, CATALOGUE["quadratic_drag"], guess, 50.0, 1.0),), 0.0)
+    kept, _ = module.eliminate(
+        best, [SERIES], CATALOGUE, {best.added: best}, QUIET, 1e-3, [first], 10.0, lambda _: None
+    )
+    assert kept.added == ("quadratic_drag",)

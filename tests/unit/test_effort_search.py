@@ -18,7 +18,7 @@ from rhythmid.diagnose.effort.search import EffortSearch, kin, search_effort
 from rhythmid.diagnose.evidence import predict
 from rhythmid.diagnose.rejections import RULES, SHAPES, Claim, Rejection, rejections_of
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import size_of
+from rhythmid.identify.inverse_dynamics.estimate import variation_of
 
 KEPT = ("coulomb_friction", "quadratic_drag", "cubic_stiffness")
 FEW = CATALOGUE.without(*(name for name in CATALOGUE if name not in (*KEPT, "viscous_damper")))
@@ -135,7 +135,7 @@ def test_a_law_that_the_catalogue_lacks_is_predicted_by_the_map():
     short = CATALOGUE.without(*(name for name, one in CATALOGUE.items() if one.family == "friction"))
     found = search_effort([axis()], axis_model(), short)
     best, unknown = np.sqrt(errors_of(found, found.chosen))
-    assert best > 2.0 * unknown and unknown < 0.03 * size_of(found.balance)
+    assert best > 2.0 * unknown and unknown < 0.03 * variation_of(found.balance)
 
 
 def test_effort_of_a_record_that_no_fit_has_seen_is_predicted(friction):
@@ -148,7 +148,7 @@ def test_a_free_map_predicts_held_out_records_as_it_predicts_its_own(friction):
     found = friction
     seen = found.balance
     again = residual_with_map(seen, seen, found.nominal, found.reference)
-    np.testing.assert_allclose(again, found.reference.residual, atol=0.05 * size_of(seen))
+    np.testing.assert_allclose(again, found.reference.residual, atol=0.05 * variation_of(seen))
     unseen = HeldOut.of([axis(7)], axis_model(), seen)
     mapped = residual_with_map(unseen.balance, seen, found.nominal, found.reference)
     plain = unseen.residual(found.nominal)
@@ -187,7 +187,7 @@ def test_a_further_effect_has_to_be_better_than_what_it_is_put_to_by_the_measure
     )
     for claim in (first, second):
         assert claim.nominal.elements == () and claim.nominal.kind == "nominal"
-        assert claim.size == size_of(found.balance) and claim.practical == PRACTICAL_EFFORT
+        assert claim.size == variation_of(found.balance) and claim.practical == PRACTICAL_EFFORT
     assert (first.candidates, second.candidates) == (found.candidates, found.candidates - 1)
     assert first.without.elements == () and first.without.prediction.mean_square > 2.0 * first.floor > 0.0
 

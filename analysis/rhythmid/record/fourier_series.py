@@ -49,6 +49,14 @@ def fourier_series(time: Array, value: Array) -> FourierSeries:
     return FourierSeries(frequency, coefficients, float(np.std(rest)))
 
 
+def periodic(time: Array, value: Array) -> FourierSeries | None:
+    """The Fourier series of a signal (n,); None where it is constant or does not cover two periods."""
+    try:
+        return fourier_series(time, value)
+    except InputError:
+        return None
+
+
 def fundamental_frequency(time: Array, value: Array) -> float:
     """Frequency [Hz] of a periodic signal (n,) sampled at increasing times [s]: strongest line, refined to full
     precision by the drift of its phase; 0 where none is stronger than its trend."""

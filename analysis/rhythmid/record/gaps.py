@@ -10,18 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.errors import InputError
-from rhythmid.record.fourier_series import FourierSeries, fourier_series
+from rhythmid.record.ends import acts_always, within_samples_of
+from rhythmid.record.fourier_series import periodic
 from rhythmid.record.interpolation import cubic, interpolation_errors
 from rhythmid.record.record import Channel, Record
 from rhythmid.record.timing import gaps_between
+from rhythmid.record.tolerable import tolerable_error
 
 Array = NDArray[np.float64]
 PAST = 0.05  # s of a command that are known before the first measurement behind a gap: it may act so late
 LEAST_SAMPLES = 32  # measurements of a stretch, below which its initial state takes all that it tells
-EXACT = (
-    1e-4  # of the motion, below which an error of the command counts for nothing however small the noise is
-)
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ def cut_at_gaps(record: Record) -> Cut:
     A gap is short where a cubic through its neighbours, or the Fourier series of a command that repeats, tells the command so
     well that the error moves the machine by less than the noise of the measurement; how well it does is seen where no sample
     is missing. A held command that is the same before and after is not missing. The stretches bear the name of the record
-    with the time at which they begin.
+    with the time at which they begin. Measurements outside the samples of a force that acted then, too, are left out (`ends`).
     """
     notes: list[str] = []
     spans: list[tuple[float, float]] = []
@@ -52,6 +50,14 @@ def cut_at_gaps(record: Record) -> Cut:
         channel: Channel | None = getattr(record, role)
         if channel is None or len(channel) < 8 or (role == "forcing" and record.forcing_law is not None):
             continue
+        if acts_always(record, role):
+            record, left_out = within_samples_of(record, role, LEAST_SAMPLES)
+            if left_out > 0.0:
+                first, last = channel.time[0], channel.time[-1]
+                notes.append(
+                    f"{record.name}: the {role} is recorded from {first:.6g} to {last:.6g} s only: {left_out:.3g} s of the output are left out"
+                )
+            channel = getattr(record, role)
         held = role == "input" and record.hold == "zero"
         filled, count, open_ = _bridged(channel, record.output, held)
         spans += open_
@@ -82,10 +88,10 @@ def _bridged(channel: Channel, output: Channel, held: bool) -> tuple[Channel, in
         first, lost = first[changed], lost[changed]
     if len(first) == 0:
         return channel, 0, []
-    tolerable = _tolerable(output)
+    tolerable = tolerable_error(output)
     spread = max(float(np.std(value)), 1e-300)
     errors = interpolation_errors(value, int(lost.max()))
-    law = None if held else _periodic(channel)
+    law = None if held else periodic(channel.time, channel.value)
     left = np.inf if law is None else law.left
     told = np.array([min(errors[n], left) / spread * n * channel.period < tolerable for n in lost])
     stamps, values = [time], [value]
@@ -102,28 +108,6 @@ def _bridged(channel: Channel, output: Channel, held: bool) -> tuple[Channel, in
     order = np.argsort(every, kind="stable")
     filled = replace(channel, time=every[order], value=np.concatenate(values)[order])
     return filled, int(lost[told].sum()), open_
-
-
-def _periodic(channel: Channel) -> FourierSeries | None:
-    """What a channel repeats; None where it is constant or does not cover two periods."""
-    try:
-        return fourier_series(channel.time, channel.value)
-    except InputError:
-        return None
-
-
-def _tolerable(output: Channel) -> float:
-    """Error of a command, as a share of its size times its duration [s], that moves the machine by less than the noise.
-
-    An impulse J changes the speed by J/m. A command of size U moves a mass at the speed w of its motion by about U/(m w²), so
-    that the share e of U during T moves it by the share e w T.
-    """
-    value, span = output.value - output.value.mean(), output.time[-1] - output.time[0]
-    size = float(np.std(value))
-    speed = float(np.sqrt(np.sum(np.diff(value) ** 2 / np.diff(output.time)) / span))
-    if speed == 0.0 or size == 0.0:
-        return 0.0
-    return max(interpolation_errors(value, 1)[1] / size, EXACT) * size / speed
 
 
 def _joined(spans: list[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -22,7 +22,7 @@ from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.run import EffortResult
 from rhythmid.elements.places import SENTENCES
-from rhythmid.identify.inverse_dynamics.estimate import size_of
+from rhythmid.identify.inverse_dynamics.estimate import variation_of
 
 NO_SENSOR = "The measurement is assumed to be the motion: effects in the sensor and in the measurement's time are not among the candidates."
 FIXED_SCALE = "The recorded effort is taken to be true in scale."
@@ -31,7 +31,7 @@ FIXED_SCALE = "The recorded effort is taken to be true in scale."
 def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Diagnosis:
     """The diagnosis."""
     decision, chosen, nominal = result.decision, result.chosen, result.nominal
-    size = size_of(result.search.balance)
+    size = variation_of(result.search.balance)
     missing = tuple(
         _missing(chosen, label, result) for label in decision.named if chosen.fit.model.term(label)
     )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import size_of
+from rhythmid.identify.inverse_dynamics.estimate import variation_of
 from rhythmid.model import Model
 from rhythmid.record.record import Record
 
@@ -33,4 +33,4 @@ class HeldOut:
 
     def error(self, fitted: Fitted) -> float:
         """Error (rms) of the predicted effort, as a share of the recorded one."""
-        return float(np.sqrt(np.mean(self.residual(fitted) ** 2))) / size_of(self.balance)
+        return float(np.sqrt(np.mean(self.residual(fitted) ** 2))) / variation_of(self.balance)

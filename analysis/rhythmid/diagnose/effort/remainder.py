@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import size_of
+from rhythmid.identify.inverse_dynamics.estimate import variation_of
 
 Array = NDArray[np.float64]
 BINS = 16  # of equal numbers of rows: enough for a curve, each with enough rows for a mean
@@ -61,7 +61,7 @@ def remainder_of(balance: Balance, fitted: Fitted) -> Remainder:
     }
     curves = [_curve(name, value, left) for name, value in quantities.items()]
     return Remainder(
-        float(np.sqrt(np.mean(left**2))) / size_of(balance), tuple(sorted(curves, key=lambda one: -one.share)),
+        float(np.sqrt(np.mean(left**2))) / variation_of(balance), tuple(sorted(curves, key=lambda one: -one.share)),
         balance.record, time, balance.measured, predicted,
     )  # fmt: skip
 

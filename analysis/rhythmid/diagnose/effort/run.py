@@ -33,7 +33,7 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import EffortFit, size_of
+from rhythmid.identify.inverse_dynamics.estimate import EffortFit, variation_of
 from rhythmid.identify.robust_covariance import root_weights, weighted, with_robust_std
 from rhythmid.identify.student import autocorrelation_time
 
@@ -122,7 +122,7 @@ def effort_run(
     )  # fmt: skip
     case.tell("weighing the hypotheses on data that no fit has seen")
     rows = _rows(case, found, unseen)
-    size = size_of(found.balance)
+    size = variation_of(found.balance)
     predicted = {one.elements: rows.predicted(found, one) for one in found.hypotheses}
     ruled_out = {one.elements: rows.predicted(found, one) for one in found.ruled_out}
     mapped = {

@@ -41,7 +41,7 @@ from rhythmid.identify.inverse_dynamics.estimate import (
     fit_effort,
     linearise,
     priors_of,
-    size_of,
+    variation_of,
 )
 from rhythmid.model import Model
 from rhythmid.progress import Tell
@@ -193,7 +193,7 @@ class _Search:
 
         def claim(index: int, without: Hypothesis, simpler: Hypothesis | None = None) -> Claim:
             return Claim(
-                claimed[index], without, self.nominal.claimed(start), free.mean_square, tried, size_of(self.balance),
+                claimed[index], without, self.nominal.claimed(start), free.mean_square, tried, variation_of(self.balance),
                 PRACTICAL_EFFORT, simpler,
             )  # fmt: skip
 

@@ -14,7 +14,8 @@ from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.simulation.compiled import compile_model
 
-RIVALS_TRIED = 2  # elements that scored best at first, tried again in the place of each of several effects
+# elements that scored best at first, and of those that fit best alone, so many are tried again in the place of each of several effects
+RIVALS_TRIED = 2
 
 
 def eliminate(
@@ -26,15 +27,13 @@ def eliminate(
     step: float,
     rounds: Sequence[Round],
     margin: float,
-    most: int,
     tell: Tell,
 ) -> tuple[Trial, dict[tuple[str, ...], Trial]]:
     """Backward elimination of the added elements; returns the survivor and the models that were tried on the way.
 
     First whether it can be left out, then whether another one does better in its place: a simpler member of its family,
-    or, where there are several effects, an element that scored well before the others were known. A model that says less
-    may be worse by the `margin` in the criterion. As many effects as are tried at once, `most`, get no names, whichever
-    they are, so of these none is exchanged.
+    or, where there are several effects, an element that scored well before the others were known or fits well alone. What is exchanged may
+    make others idle. A model that says less may be worse by the `margin` in the criterion.
     """
     tried: dict[tuple[str, ...], Trial] = {}
 
@@ -51,13 +50,13 @@ def eliminate(
         return found
 
     best = _without_idle(best, run, margin)
-    found = run(best, _swaps(best, series, catalogue, trials, rounds)) if len(best.added) < most else []
+    found = run(best, _swaps(best, series, catalogue, trials, rounds))
     earlier = [t for t in trials.values() if t.added and _stands_for(t, best)]
     plainer = [t for t in [*found, *under_noise(earlier, series, noise, step)] if _stands_for(t, best)]
     simpler = [t for t in plainer if t.bic() < best.bic() + margin]
     better = [t for t in found if t.bic() < best.bic()]
     if better:
-        best = min(better, key=lambda t: t.bic())
+        best = _without_idle(min(better, key=lambda t: t.bic()), run, margin)
     elif simpler:
         best = min(simpler, key=lambda t: (t.free, t.bic()))
     return best, tried
@@ -84,22 +83,45 @@ def _swaps(
 ) -> list[Proposal]:
     """Models with another element in the place of one of the effects."""
     swaps: list[Proposal] = []
+    scored = {score.element.name for score, _ in distinct(rounds[0].scores, RIVALS_TRIED)}
+    alone = _alone(trials)
     for label in best.added:
         element = best.element(label)
         family = {e.name for e in catalogue.values() if element.name in e.special_case_of and e.candidate}
         names = set(family)
         if len(best.added) > 1:
-            names |= {score.element.name for score, _ in distinct(rounds[0].scores, RIVALS_TRIED)}
+            names |= scored | set(alone)
         rest = _rest(best, label)
         slim = best.model.without(label)
         for name in sorted(names - {best.element(other).name for other in best.added}):
             starts = _starts_for(catalogue, name, series, slim, rounds, 8 if name in family else 1)
+            beside: list[dict[str, float]] = []
             if starts and name in family:  # a special case of the best is at its best close to it
                 starts.insert(0, starts[0] | _shared(best, label, catalogue[name]))
-            elif not starts or tuple(sorted((*rest, name))) in trials:
+            elif tuple(sorted((*rest, name))) in trials:
                 continue
-            swaps.append(propose(slim, catalogue[name], starts, rest))
+            elif name in alone:  # what it needs beside it the fit with it alone has found
+                starts, beside = [_values(alone[name], name), *starts], [_given(alone[name], slim)]
+            if starts:
+                swaps.append(propose(slim, catalogue[name], starts, rest, beside=beside))
     return swaps
+
+
+def _alone(trials: dict[tuple[str, ...], Trial]) -> dict[str, Trial]:
+    """The models with one effect that fit best, by its name."""
+    single = sorted((t for t in trials.values() if len(t.added) == 1), key=lambda t: t.bic())
+    named = [(t.element(t.added[0]).name, t) for t in single]
+    return {name: t for name, t in named[:RIVALS_TRIED] if name == t.added[0]}
+
+
+def _values(trial: Trial, label: str) -> dict[str, float]:
+    """Values of the parameters of the element under a label."""
+    return {p.name: trial.model.value(f"{label}.{p.name}") for p in trial.element(label).parameters}
+
+
+def _given(trial: Trial, model: Model) -> dict[str, float]:
+    """A trial's values of the parameters that another model has free, too."""
+    return {name: trial.model.value(name) for name in model.free if name in trial.model.parameters}
 
 
 def _shared(trial: Trial, label: str, element: Element) -> dict[str, float]:

@@ -243,7 +243,7 @@ def search(
         excluded.append((("backward elimination",), SPENT))
     elif best.added:
         margin = max(WORTH, SHARE * gained)
-        reduced, more = eliminate(best, series, catalogue, trials, noise, step, rounds, margin, most, tell)
+        reduced, more = eliminate(best, series, catalogue, trials, noise, step, rounds, margin, tell)
         trials |= more
         if reduced is not best:
             best = in_best_order(reduced, series, noise, step)

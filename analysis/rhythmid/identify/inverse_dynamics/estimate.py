@@ -79,6 +79,12 @@ def size_of(balance: Balance) -> float:
     return float(np.sqrt(np.mean(balance.measured**2))) or 1.0
 
 
+def variation_of(balance: Balance) -> float:
+    """What errors are a share of: the rms of the recorded effort about its mean, for a model explains no motion by the force that a machine
+    needs at rest; of a constant effort its size."""
+    return float(np.std(balance.measured)) or size_of(balance)
+
+
 def priors_of(balance: Balance, model: Model, names: Sequence[str], columns: Array) -> dict[str, Prior]:
     """What is known of parameters before the data; `columns` (n, p) are their effects for each unit.
 
