@@ -54,6 +54,7 @@ def test_outliers_are_left_out_and_told_once_a_record(given):
 
 def test_a_free_decay_needs_no_input_and_motion_that_hardly_decays_is_remarked_on():
     assert check_driven([swing(0.4)], FREE) is None
+    assert check_driven([swing(0.02)], FREE) is None  # little, but steadily
     said = check_driven([swing(0.0)], FREE)
     assert said is not None and "taken for a free motion" in said
     assert admitted([swing(0.0)], (), FREE).records[0].name == "swing"

@@ -122,6 +122,16 @@ def test_what_is_not_clipped_is_not_called_so(seed):
         assert clipped(value) == 0
 
 
+@given(seed=seeds)
+def test_a_machine_that_rests_on_many_levels_is_not_clipped_on_its_outermost_ones(seed):
+    rng = np.random.default_rng(seed)
+    levels = np.round(rng.uniform(0.0, 10.0, 12), 5)
+    moves = [np.round(np.linspace(a, b, 12)[1:-1], 5) for a, b in zip(levels, levels[1:])]
+    rests = [np.full(rng.integers(60, 120), level) for level in levels]
+    value = np.concatenate([part for pair in zip(rests, moves) for part in pair] + [rests[-1]])
+    assert clipped(value) == 0
+
+
 def test_a_flawless_channel_gives_no_complaint():
     flawless = ChannelQuality("/y position[0]", Timing.of(np.arange(100) * 1e-3))
     assert flawless.complaints() == []

@@ -18,7 +18,7 @@ from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-DECAYS = 0.7  # of the motion's size from the first quarter to the last, above which it may be driven
+DECAYS = 0.7  # of the motion's size from the first quarter to the last, above which it may be driven unless it shrinks steadily
 
 
 @dataclass(frozen=True)
@@ -76,8 +76,8 @@ def check_driven(records: Sequence[Record], model: Model) -> str | None:
     for record in records:
         if record.input is not None or record.forcing is not None or record.reference is not None:
             continue
-        quarters = np.array_split(record.output.value - record.output.value.mean(), 4)
-        if float(np.std(quarters[-1])) > DECAYS * float(np.std(quarters[0])):
+        sizes = [float(np.std(quarter)) for quarter in np.array_split(record.output.value, 4)]
+        if sizes[-1] > DECAYS * sizes[0] and not np.all(np.diff(sizes) < 0.0):
             return (
                 f"{record.name}: has no input channel and is taken for a free motion, which hardly decays; if anything drives it, "
                 "name its channel under 'input:' (or 'forcing:') in signals.yaml"

@@ -163,7 +163,8 @@ def clipped_samples(value: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Whether samples lie in runs of at least 4 at the largest or smallest value, as a limit leaves them.
 
     Coarse rounding and plateaus also make such runs; it is clipping only if the next value inwards is far rarer than
-    the extreme one, for a signal that passes through has no reason to be. Signals of few levels have no such next value.
+    the extreme one, for a signal that passes through has no reason to be. Signals of few levels have no such next value. A machine that comes
+    to rest elsewhere as often and for as long may rest at its extremes, too.
     """
     if len(value) < CLIPPED_RUN:
         return np.zeros(len(value), dtype=bool)
@@ -215,9 +216,20 @@ def _at_limit(value: NDArray[np.float64]) -> NDArray[np.bool_]:
     few_levels = below == -math.inf or value.min() == below
     if few_levels or at_ends or found.sum() <= CLIPPED_EXCESS * np.sum(value == below):
         return np.zeros(len(value), dtype=bool)
-    if not _moving(value, [(begin, end) for begin, end in runs if end - begin >= CLIPPED_RUN]):
+    runs = [(begin, end) for begin, end in runs if end - begin >= CLIPPED_RUN]
+    if _rests(value, runs) or not _moving(value, runs):
         return np.zeros(len(value), dtype=bool)
     return found
+
+
+def _rests(value: NDArray[np.float64], runs: list[tuple[int, int]]) -> bool:
+    """Whether a signal (n,) keeps values between its extremes as often as in these runs and about as long; before its first move and after its
+    last one any signal does."""
+    changes = np.flatnonzero(np.diff(value)) + 1
+    lengths, level = np.diff(changes), value[changes[:-1]]
+    about = 0.5 * float(np.median([end - begin for begin, end in runs]))
+    between = (level > value.min()) & (level < value.max())
+    return int(np.sum((lengths >= about) & between)) >= len(runs)
 
 
 def _moving(value: NDArray[np.float64], runs: list[tuple[int, int]]) -> bool:
