@@ -20,7 +20,7 @@ from contests import (
 
 from rhythmid.diagnose.answer.result import FitQuality, MissingEffect
 from rhythmid.diagnose.answer.wording import summary_of
-from rhythmid.diagnose.constants import APART, FOLLOWS, HOLDS
+from rhythmid.diagnose.constants import FOLLOWS, HOLDS, RICHER
 from rhythmid.diagnose.rejections import RULES
 
 # what is missing
@@ -145,15 +145,21 @@ def test_a_law_with_more_parameters_is_named_where_it_predicts_better_and_else_t
 
 
 @pytest.mark.parametrize(
-    ("gain", "left", "row"),
-    [(0.5 * APART, 0.05, "beats_simpler"), (4.0 * APART, 0.19, "share_of_rest"), (4.0 * APART, 0.05, None)],
+    ("gain", "simple", "left", "row"),
+    [
+        (2.0, 0.2, 0.05, "beats_simpler"),
+        (300.0, 0.2, 0.17, "share_of_rest"),
+        (300.0, 0.9 * RICHER, 0.0, "share_of_mismatch"),
+        (300.0, 1.2 * RICHER, 0.0, None),
+        (10.0, 0.2, 0.05, None),
+    ],
 )
-def test_a_richer_law_takes_the_place_of_one_that_it_contains_where_it_is_far_better_and_else_is_told_to_lose(
-    gain, left, row
+def test_a_richer_law_takes_the_place_of_one_that_it_contains_where_it_removes_more_than_small_effects_do(
+    gain, simple, left, row
 ):
-    contained = supposed("plain", predicted(0.2, 700.0), free=6, richer={"plain": ("friction",)})
+    contained = supposed("plain", predicted(simple, 700.0), free=6, richer={"plain": ("friction",)})
     rich = friction(left, score=700.0 + gain, free=7)
-    found, decision = decided(contest(NOMINAL, contained, rich, maps={"velocity": predicted(0.001, 100.0)}))
+    found, decision = decided(contest(NOMINAL, contained, rich, maps={"velocity": predicted(0.0, 100.0)}))
     assert found.chosen.elements == (("friction",) if row is None else ("plain",))
     assert [one.name for one in found.rejections if one.hypothesis == ("friction",)] == [row] * (
         row is not None

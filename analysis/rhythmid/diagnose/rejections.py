@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from rhythmid.diagnose.constants import (
-    APART,
     BLOCK_ODDS,
     EDGE,
     EQUIVALENT,
@@ -21,6 +20,7 @@ from rhythmid.diagnose.constants import (
     MOVES,
     OWN_LINE,
     REST,
+    RICHER,
 )
 from rhythmid.diagnose.evidence import gain_ahead, weight_for
 from rhythmid.diagnose.hypothesis import Hypothesis, special_case
@@ -115,19 +115,9 @@ def _over_simpler(claim: Claim) -> float:
     return weight_for(claim.hypothesis.prediction, claim.simpler.prediction)
 
 
-def _needed_over_simpler(claim: Claim) -> float:
-    if claim.simpler is None or not special_case(claim.simpler, claim.hypothesis):
-        return decisive(1)
-    return decisive(1) if _leaves_most(claim, claim.simpler) else APART
-
-
-def _leaves_most(claim: Claim, simpler: Hypothesis) -> bool:
-    """Whether a simpler law leaves most of the mismatch, most of which the richer one removes: it is no name for what is missing,
-    though the two may be hard to tell apart."""
-    left = simpler.prediction.mean_square - claim.floor
-    removed = simpler.prediction.mean_square - claim.hypothesis.prediction.mean_square
-    whole = claim.nominal.prediction.mean_square - claim.floor
-    return left > MAINLY * whole and removed >= MAINLY * left
+def _needed_of_mismatch(claim: Claim) -> float:
+    richer = claim.simpler is not None and special_case(claim.simpler, claim.hypothesis)
+    return RICHER if richer else MISMATCH
 
 
 # least statistics of the fitted effects themselves: a hypothesis that falls short of one is no rival of any other
@@ -200,10 +190,11 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "share_of_mismatch",
-        "squared error that the effect removes, as a share of what the best prediction of all would remove from the nominal model's",
+        "squared error that the effect removes, and a richer law beyond one that it contains, as a share of what the best prediction of all would "
+        "remove from the nominal model's",
         "its share of the mismatch is not larger than what errors of the other effects may leave",
         _share_of_mismatch,
-        lambda _: MISMATCH,
+        _needed_of_mismatch,
     ),
     Rule(
         "practical_size",
@@ -218,7 +209,7 @@ RULES: tuple[Rule, ...] = (
         "of data brings more than 20 to 1",
         "a simpler explanation predicts as well",
         _over_simpler,
-        _needed_over_simpler,
+        lambda _: decisive(1),
     ),
     _shape_rule(
         "within_bounds",
@@ -268,8 +259,8 @@ OVER_CONTAINED = tuple(
 
 
 def replaces(claim: Claim) -> bool:
-    """Whether a richer law is named in the place of one that it contains, `claim.without` and `claim.simpler`: it is told apart by
-    far, and removes more than a small share of what the other leaves above the floor and of the whole mismatch."""
+    """Whether a richer law is named in the place of one that it contains, `claim.without` and `claim.simpler`: it predicts
+    better, and removes more than small effects do of what the other leaves above the floor and of the whole mismatch."""
     return not rejections_of(claim, OVER_CONTAINED)
 
 
