@@ -57,7 +57,7 @@ def cut_at_gaps(record: Record) -> Cut:
                 notes.append(
                     f"{record.name}: the {role} is recorded from {first:.6g} to {last:.6g} s only: {left_out:.3g} s of the output are left out"
                 )
-            channel = getattr(record, role)
+            channel = record.channels[role]
         held = role == "input" and record.hold == "zero"
         filled, count, open_ = _bridged(channel, record.output, held)
         spans += open_
