@@ -46,7 +46,7 @@ def test_an_effect_is_stated_only_where_its_size_is_determined():
 
 
 def test_a_small_effect_whose_size_is_open_leaves_the_large_one_stated():
-    made = contest(NOMINAL, supposed("a", predicted(0.1)), supposed("a b", predicted(0.01)))
+    made = contest(NOMINAL, supposed("a", predicted(0.03)), supposed("a b", predicted(0.01)))
     _, decision = decided(made, errors={"b": 1.0})
     assert (decision.verdict, decision.named, decision.beside) == ("missing_physics", ("a",), ("b",))
     assert decided(made)[1].named == ("a", "b")

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from scipy.stats import t as student
 
 from rhythmid.diagnose.constants import EQUIVALENT, FALSE_ALARM, STATED
@@ -172,8 +173,14 @@ def decide(
         labels = tuple(label for label in labels if label != chosen.elements[-1])
     if chosen.kind == "delay" and len(labels) > 1:  # a delay beside effects is told with the delays
         labels = tuple(label for label in labels if label != INPUT_DELAY)
+    alone = {label: _sure(shares[label], left.expected, size_errors.get(label, 0.0)) for label in labels}
+    open_ = [label for label in labels if alone[label] < STATED]
     sure = {
-        label: adequacy(_own_share(shares[label], left.expected)) * resolved(size_errors.get(label, 0.0))
+        label: _sure(
+            shares[label],
+            left.expected + _removed_by([one for one in open_ if one != label], chosen, contest),
+            size_errors.get(label, 0.0),
+        )
         for label in labels
     }
 
@@ -216,9 +223,22 @@ def decide(
     )
 
 
-def _own_share(share: float, left: float) -> float:
-    """Of the part of the mismatch that an effect is to explain, what it does explain: what is left may be that part's."""
-    return share / (share + left) if share + left > 0.0 else 0.0
+def _sure(share: float, left: float, size_error: float) -> float:
+    """Chance that an effect with this share of the mismatch is the law that its name says, where this much is left: of the part of the mismatch
+    that it is to explain, what is left may be a part."""
+    own = share / (share + left) if share + left > 0.0 else 0.0
+    return adequacy(own) * resolved(size_error)
+
+
+def _removed_by(some: Sequence[str], chosen: Hypothesis, contest: Contest) -> float:
+    """Share of the mismatch that these effects of a hypothesis remove beside its others. Laws that are hardly true remove what a law that
+    is not known does. None where the model without them was not fitted."""
+    whole = contest.nominal.prediction.mean_square - contest.floor
+    others = set(chosen.elements) - set(some)
+    without = [one.prediction.mean_square for one in contest.hypotheses if set(one.elements) == others]
+    if whole <= 0.0 or not without:
+        return 0.0
+    return float(np.clip((min(without) - chosen.prediction.mean_square) / whole, 0.0, 1.0))
 
 
 def _stated(labels: Sequence[str], probability: Callable[[Sequence[str]], float]) -> tuple[str, ...]:
