@@ -38,11 +38,9 @@ $(VENV)/.warm: $(VENV)/.packages
 	@touch $@
 
 test: lint ## Run the linters and all tests
-	@# folders with the longest files first, so that neither worker ends long after the other
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder \
-		tests/proof tests/browser tests/faults tests/unit
-	@# what runs in real time has the machine to itself
-	$(BIN)/python -m pytest tests/ros
+	@# three workers for two cores, because tests over topics mostly wait; folders with the longest files first, so that all end together
+	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder \
+		tests/proof tests/ros tests/browser tests/faults tests/unit
 
 lint: $(VENV)/.packages ## Run ruff and pyright
 	$(BIN)/ruff check .
