@@ -264,3 +264,47 @@ def test_rows_without_a_time_are_read_at_the_rate_that_is_given(tmp_path):
     np.savez(tmp_path / "run.npz", V1=FORCE, V2=X)
     assert said(tmp_path / "run.npz", rate=1000.0) == {"input": "V1", "output": "V2"}
     assert "sample_rate: 1000.0" in guess(tmp_path / "run.npz", rate=1000.0).signals
+
+
+def gapped(time: np.ndarray) -> np.ndarray:
+    """Times with a gap behind the first row, and a few more later on."""
+    later = np.zeros(len(time))
+    later[[1, *range(900, len(time), 900)]] = 0.41
+    return time + np.cumsum(later)
+
+
+@pytest.mark.parametrize(
+    ("name", "scale", "written"),
+    [("pi_time", 1.0, '{column: "pi_time"}'), ("0", 1e3, '{column: "0", scale: 0.001}'), ("T/ms", 1e3, "")],
+)
+def test_a_time_may_have_gaps(tmp_path, name, scale, written):
+    np.savez(tmp_path / "run.npz", **{name: scale * gapped(TIME[::8]), "force": FORCE[::8], "angle": X[::8]})
+    found = guess(tmp_path / "run.npz")
+    assert f"time: {written}" in found.signals
+    assert {role: str(choice.recorded) for role, choice in found.roles.choices.items()} == {
+        "input": "force", "output": "angle"
+    }  # fmt: skip
+    record = read_record(tmp_path / "run.npz", Signals.from_text(found.signals))
+    assert np.ptp(record.output.time) == pytest.approx(np.ptp(gapped(TIME[::8])), rel=1e-6)
+
+
+def test_what_only_drifts_upward_is_no_time(tmp_path):
+    np.savez(tmp_path / "run.npz", a=np.cumsum(np.abs(FORCE)), b=X)
+    with pytest.raises(InputError, match="no column goes forward like a time"):
+        guess(tmp_path / "run.npz")
+
+
+def test_a_velocity_is_recognised_beside_a_gap(tmp_path):
+    angle = X[::8].copy()
+    angle[0] = 5.0  # what was in the register before the machine was switched on
+    time = TIME[::8].copy()
+    time[1:] += 0.41
+    np.savez(tmp_path / "run.npz", t=time, angle=angle, omega=V[::8], torque=FORCE[::8])
+    assert said(tmp_path / "run.npz")["velocity"] == "omega"
+
+
+def test_a_time_is_no_channel_beside_a_rate_that_is_given(tmp_path):
+    table = {"0": 1e3 * gapped(TIME[::8]), "1": FORCE[::8], "2": X[::8]}
+    np.savez(tmp_path / "run.npz", **table)
+    text = guess(tmp_path / "run.npz", rate=125.0).signals
+    assert "Left out: 0: goes forward like a time" in text

@@ -32,12 +32,14 @@ SKIPPED_PACKAGES = (
 )
 SKIPPED_FIELDS = re.compile(r"header|stamp|.*covariance|orientation|layout|points|time_from_start")
 TIME = re.compile(
-    r"(?:elapsed_?|time_?|wall_?|ros_?)*(?:t|time|timestamp|stamp|seconds|secs?|clock)", re.IGNORECASE
+    r"(?:elapsed_?|time_?|wall_?|ros_?)*(?:t|seconds|secs?)|(?:.*_)?(?:elapsed|wall|ros)?(?:time|timestamp|stamp|clock)",
+    re.IGNORECASE,
 )
 COUNTER = re.compile(
     r"|index|idx|i|n|k|id|no|nr|frame|sample|step|row|count|counter|seq|unnamed: 0", re.IGNORECASE
 )
-EVEN = 0.2  # relative spread of the steps of an unnamed column, below which it is taken for the time
+NEAR = 0.5  # of the median step of an unnamed column: a step that differs by no more is a usual one
+USUAL = 0.95  # share of usual steps from which such a column is taken for the time; the others are gaps, and may be as long as they like
 FORWARD = 0.99  # share of steps of a time that go forward
 # the longest sample period [s] that is thought of: a time without a unit whose steps are longer is in ms, µs or ns
 LONGEST_STEP = 0.5
@@ -128,6 +130,9 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
         heading = heading_of(name)
         if clock.kind == "column" and (name == clock.column or _is_time(name, value)):
             continue
+        if clock.kind == "rate" and (_is_time(name, value) or (name.isdigit() and _even(value))):
+            left.append(f"{name}: goes forward like a time")
+            continue
         if COUNTER.fullmatch(heading.name) and np.ptp(np.diff(value)) == 0.0:
             left.append(f"{name}: counts the rows")
         elif not np.isfinite(value).any() or np.nanmax(value) == np.nanmin(value):
@@ -175,6 +180,15 @@ def _forward(value: Array) -> bool:
     return bool(value[-1] > value[0]) and float(np.mean(step >= 0.0)) >= FORWARD
 
 
+def _even(value: Array) -> bool:
+    """Whether a column goes forward by steps that are mostly of one size, as a time does that has gaps, too."""
+    if not _forward(value):
+        return False
+    step = np.diff(value)
+    usual = float(np.median(step))
+    return usual > 0.0 and float(np.mean(np.abs(step - usual) <= NEAR * usual)) >= USUAL
+
+
 def _table_clock(path: Path, columns: list[tuple[str, Array]]) -> tuple[Clock, str]:
     """The column that holds the time. Raises InputError where there is none."""
     for name, value in columns:
@@ -185,13 +199,13 @@ def _table_clock(path: Path, columns: list[tuple[str, Array]]) -> tuple[Clock, s
                 scale, why = _guessed_scale(value)
             return Clock("column", column=name, scale=scale), f"called a time, and goes forward; {why}"
     for name, value in columns:
-        step = np.diff(value)
-        if COUNTER.fullmatch(name) is None and _forward(value) and np.std(step) < EVEN * np.mean(step):
-            if name.isdigit() or not (step == 1.0).all():
+        untold = COUNTER.fullmatch(name) is None and not heading_of(name).unit
+        if untold and _even(value):
+            if name.isdigit() or not (np.diff(value) == 1.0).all():
                 scale, why = _guessed_scale(value)
                 return Clock(
                     "column", column=name, scale=scale
-                ), f"the only column that goes forward evenly; {why}"
+                ), f"the first column that goes forward by steps of one size; {why}"
     names = ", ".join(name for name, _ in columns)
     raise InputError(
         f"{path}: no column goes forward like a time ({names}); give the rows' rate with --rate HZ"

@@ -18,6 +18,8 @@ MOST_ROWS = 2000  # of an autoregression: more would tell no more
 PER_PERIOD = 16.0  # samples in the fastest period that carries power, for an autoregression
 POWER = 0.99  # share of the power below that frequency
 ROUNDING = 1e-8  # of a signal's variance: what an autoregression leaves below it is rounding
+GAP = 10.0  # of the median sample period: a longer step is a gap, across which no straight line is drawn
+MAIN_PART = 0.5  # of a record: a stretch without gaps that is at least so long tells enough alone
 SAME_SIZE = (0.5, 2.0)  # ratio within which an answer is of its command's size
 
 
@@ -36,14 +38,31 @@ class Follows:
 
 
 def together(first: Recorded, second: Recorded) -> tuple[float, Array, Array]:
-    """Both on a common grid by straight lines: period [s], and values (n,) each; n is 0 where they do not overlap."""
-    begin, end = max(first.time[0], second.time[0]), min(first.time[-1], second.time[-1])
+    """Both on a common grid by straight lines: period [s], and values (n,) each; n is 0 where they do not overlap.
+
+    Where most of them is free of gaps, no more than that is looked at: a line across a gap is no motion.
+    """
+    (begin, end), (other_begin, other_end) = _main_part(first), _main_part(second)
+    begin, end = max(begin, other_begin), min(end, other_end)
     rate = min(first.rate, second.rate)
     count = int((end - begin) * rate) if rate > 0.0 else 0
     if count < 4 * LAGS:
         return 1.0, np.empty(0), np.empty(0)
     grid = begin + np.arange(min(count, MOST_SAMPLES)) / rate
-    return 1.0 / rate, *(np.interp(grid, *_finite(one)) for one in (first, second))
+    return 1.0 / rate, np.interp(grid, *_finite(first)), np.interp(grid, *_finite(second))
+
+
+def _main_part(one: Recorded) -> tuple[float, float]:
+    """Begin and end [s] of the longest stretch without gaps where that is most of the record, else of the record."""
+    begin, end = float(one.time[0]), float(one.time[-1])
+    step = np.diff(one.time)
+    usual = float(np.median(step)) if len(step) else 0.0
+    gaps = np.flatnonzero(step > GAP * usual)
+    starts, ends = np.append(begin, one.time[gaps + 1]), np.append(one.time[gaps], end)
+    longest = int(np.argmax(ends - starts))
+    if usual > 0.0 and ends[longest] - starts[longest] >= MAIN_PART * (end - begin):
+        return float(starts[longest]), float(ends[longest])
+    return begin, end
 
 
 def _finite(one: Recorded) -> tuple[Array, Array]:
