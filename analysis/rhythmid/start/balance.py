@@ -20,6 +20,7 @@ LATER = 0.9  # of what is left without a delay: by so much a delay has to lower 
 COLUMNS = ("acceleration", "velocity", "position", "sine", "cosine", "constant")
 POSITIVE = frozenset({"acceleration", "velocity", "position"})
 MOST_ROWS = 4000  # of the balance: more would not make a first guess better
+FED_BACK = 1e-3  # share of what drives that a multiple of the position leaves, below which a controller made it of the position
 LEAST_ROWS = 40  # rows of a stretch without which nothing is guessed from it
 
 
@@ -67,7 +68,7 @@ class Rows:
 
     def delay(self, names: Sequence[str]) -> float:
         """By how much later [s] what drives acts, where that makes the balance of these columns clearly better; else 0."""
-        if self.by_base:
+        if self.by_base or self.is_fed_back():
             return 0.0
         period = max(self.period)
         most = min(
@@ -77,6 +78,18 @@ class Rows:
         at_once = self.fit(names)
         best = min((self.fit(names, one) for one in delays), key=lambda law: law.left, default=at_once)
         return best.delay if best.left < LATER * at_once.left else 0.0
+
+    def is_fed_back(self) -> bool:
+        """Whether what drives is −k times the position and a constant: a delayed balance would tell of that law, not of the machine."""
+        x, drive = (
+            np.concatenate(
+                [one[margin : len(one) - margin] for one, margin in zip(of, self.margin, strict=True)]
+            )
+            for of in ([one[:, COLUMNS.index("position")] for one in self.columns], self.drives)
+        )
+        x, drive = x - x.mean(), drive - drive.mean()
+        both = float(x @ drive)
+        return both < 0.0 and 1.0 - both**2 / (float(x @ x) * float(drive @ drive)) < FED_BACK
 
     def fit(self, names: Sequence[str], delay: float = 0.0) -> Law:
         """Force balance of these columns; coefficients of acceleration, velocity and position are not negative."""

@@ -123,6 +123,16 @@ def force_unit_of(one: Recorded) -> str:
     return next((unit for unit, names in ELECTRICAL.items() if words & set(names.split())), "")
 
 
+def is_lone_v(one: Recorded) -> bool:
+    """Whether nothing but a `v` names it: a velocity, or the voltage that drives."""
+    return words_of(one.said) == ["v"] and not one.unit
+
+
+def driving_unit_of(one: Recorded) -> str:
+    """Unit of what drives, where a `v` can be a voltage only."""
+    return force_unit_of(one) or ("V" if is_lone_v(one) else "")
+
+
 def poses(one: Recorded) -> bool:
     """Whether its name says that it is what a motion is to become: a target, a set point."""
     return bool({*words_of(one.said), *words_of(one.topic)} & POSED)

@@ -20,6 +20,8 @@ POWER = 0.99  # share of the power below that frequency
 ROUNDING = 1e-8  # of a signal's variance: what an autoregression leaves below it is rounding
 GAP = 10.0  # of the median sample period: a longer step is a gap, across which no straight line is drawn
 MAIN_PART = 0.5  # of a record: a stretch without gaps that is at least so long tells enough alone
+SURE = 5.0  # times what chance makes of a prediction's gain, from which it is none: of 12 lags beyond 1 in ten millions
+GOES_ALONG = 0.5  # coherence from which two plainly have to do with each other
 SAME_SIZE = (0.5, 2.0)  # ratio within which an answer is of its command's size
 
 
@@ -122,9 +124,28 @@ def drives(cause: Recorded, effect: Recorded) -> float:
     C. W. J. Granger, Econometrica 37 (1969) 424: the cause is what helps to predict. Great where the first drives the second, near 0
     where it does not.
     """
+    return _gain(cause, effect)[0]
+
+
+def predicts(cause: Recorded, effect: Recorded) -> float:
+    """How many times as much as by chance the past of `cause` helps to predict `effect`: about 1 where it does not help.
+
+    The gain in log variance times the number of rows is chi-squared by chance, with as many degrees of freedom as there are lags.
+    """
+    gain, rows = _gain(cause, effect)
+    return gain * rows / LAGS
+
+
+def goes_along(one: Recorded, other: Recorded) -> bool:
+    """Whether a channel plainly has to do with another one: by coherence, or as what helps to predict it."""
+    return coherent(one, other) >= GOES_ALONG or predicts(one, other) >= SURE
+
+
+def _gain(cause: Recorded, effect: Recorded) -> tuple[float, int]:
+    """Gain of a prediction in log variance, and the rows by which it was told."""
     period, u, y = together(cause, effect)
     if not len(u) or np.ptp(u) == 0.0 or np.ptp(y) == 0.0:
-        return 0.0
+        return 0.0, 0
     step = max(1, int(1.0 / (PER_PERIOD * max(_fastest(u, period), _fastest(y, period)) * period)))
     while len(u) // step < 4 * LAGS and step > 1:
         step //= 2
@@ -135,7 +156,7 @@ def drives(cause: Recorded, effect: Recorded) -> float:
     own, other, target = past(y[:-1], LAGS)[::every], past(u[:-1], LAGS)[::every], y[LAGS:][::every]
     alone = _left(own, target)
     both = _left(np.hstack([own, other]), target)
-    return math.log((alone + ROUNDING) / (both + ROUNDING))
+    return math.log((alone + ROUNDING) / (both + ROUNDING)), len(target)
 
 
 def _left(columns: Array, target: Array) -> float:

@@ -9,9 +9,11 @@ import numpy as np
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Inventory, Recorded
 from rhythmid.record.signals import InputKind, OutputKind
+from rhythmid.start.carried import carried_motion
+from rhythmid.start.copies import correlation_of_copy, doubt_of_copy, note_of_copy
 from rhythmid.start.joint import Joint, joint_of
-from rhythmid.start.meaning import Meaning, Quantity, is_ignored, meaning_of, poses, rotary_of
-from rhythmid.start.relation import coherent, derivative, drives, follows
+from rhythmid.start.meaning import Meaning, Quantity, is_ignored, is_lone_v, meaning_of, poses, rotary_of
+from rhythmid.start.relation import coherent, derivative, drives, follows, goes_along
 
 Ask = Callable[
     [str, Sequence[str]], int
@@ -36,7 +38,7 @@ class Choice:
 
 @dataclass(frozen=True, eq=False)
 class Roles:
-    """Roles by name as in signals.yaml, what the input and the output are, and whether the machine turns."""
+    """Roles by name as in signals.yaml, what the input and the output are, whether the machine turns, and what a user should know."""
 
     choices: Mapping[str, Choice]
     input_kind: InputKind
@@ -71,9 +73,14 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     known = _without_empty_letters(known)
     if not known:
         raise InputError(f"{found.path}: holds nothing that could be a motion")
-    chosen = joint_of([(one.one, one.meaning) for one in known], joint, ask, str(found.path))
+    said = [(one.one, one.meaning) for one in known]
+    carried = carried_motion(said) if joint is None else None
+    chosen = joint_of(said, joint, ask, str(found.path)) if carried is None else Joint()
     known = [one for one in known if chosen.includes(one.one, one.meaning)]
-    output, known = _output(known, ask, str(found.path))
+    if carried is not None:
+        output = Choice(carried.driven, f"a measured position: {carried.reason}", (carried.driver,))
+    else:
+        output, known = _output(known, ask, str(found.path))
     choices = {"output": output}
     measured = next(one for one in known if one.one is output.recorded).quantity or "position"
     rest = [one for one in known if one.one is not output.recorded]
@@ -81,11 +88,65 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     if velocity is not None:
         choices["velocity"] = velocity
         rest = [one for one in rest if one.one is not velocity.recorded]
+    rest = [_voltage(one, output.recorded, measured) for one in rest]
+    rest, copies, notes = _without_copies(rest, output.recorded)
     rest = [_by_data(one, output.recorded, measured, velocity) for one in rest]
     more, kind, reference_of = _drivers(rest, output.recorded, measured, ask)
-    choices |= more
-    rotary, why = _rotary(choices, output.recorded, ask)
-    return Roles(choices, kind, _output_kind(measured), rotary, why, chosen, reference_of)
+    if carried is not None:
+        reason = f"a motion that drives {carried.driven}, and nothing else drives"
+        more = {"input": Choice(carried.driver, reason, doubts=(carried.doubt,))}
+    choices |= {role: _doubted(choice, copies) for role, choice in more.items()}
+    if not more:
+        notes += _idle(rest, output.recorded)
+    rotary, why = _rotary(choices if carried is None else {"output": output}, output.recorded, ask)
+    return Roles(choices, kind, _output_kind(measured), rotary, why, chosen, reference_of, tuple(notes))
+
+
+def _voltage(one: _Known, output: Recorded, measured: Quantity) -> _Known:
+    """A `v` that is not the velocity of the measured position, but has to do with it, is a voltage."""
+    if measured != "position" or not is_lone_v(one.one) or one.quantity != "velocity":
+        return one
+    if derivative(output, one.one)[0] > INTEGRAL or not goes_along(one.one, output):
+        return one
+    reason = "'v' is not the slope of the output, though it goes with it, so that it stands for a voltage"
+    return replace(one, meaning=replace(one.meaning, quantity="effort", reason=reason))
+
+
+def _without_copies(rest: list[_Known], output: Recorded) -> tuple[list[_Known], dict[int, float], list[str]]:
+    """What is left without copies of the output, the correlation of those that are kept, by id, and what to tell of the others.
+
+    A copy is kept where its name says that it drives or is asked for, and nothing else that says so is there: a controller whose
+    reference stands still makes such an effort.
+    """
+    correlation = {id(one.one): correlation_of_copy(one.one, output) for one in rest}
+    copies = [
+        one for one in rest
+        if correlation[id(one.one)] != 0.0 and (one.quantity == "effort" or not one.meaning.commanded)
+    ]  # fmt: skip
+    named = any(one.quantity == "effort" and one not in copies for one in rest)
+    kept = [one for one in copies if one.quantity == "effort" and not named]
+    notes = [note_of_copy(one.one, correlation[id(one.one)]) for one in copies if one not in kept]
+    left = [one for one in rest if one not in copies or one in kept]
+    return left, {id(one.one): correlation[id(one.one)] for one in kept}, notes
+
+
+def _doubted(choice: Choice, copies: Mapping[int, float]) -> Choice:
+    if id(choice.recorded) not in copies:
+        return choice
+    return replace(choice, doubts=(*choice.doubts, doubt_of_copy(copies[id(choice.recorded)])))
+
+
+def _idle(rest: list[_Known], output: Recorded) -> list[str]:
+    """What was left unused where nothing drives the machine, though it goes with the output."""
+    told = [(coherent(one.one, output), one) for one in rest if goes_along(one.one, output)]
+    told.sort(key=lambda pair: -pair[0])
+    listed = "; ".join(
+        f"{one.one} ({one.quantity or 'unknown'}: {one.meaning.reason or 'nothing says what it is'}; coherence {share:.2f})"
+        for share, one in told
+    )
+    return (
+        [f"nothing is taken to drive the machine, though this goes with the output: {listed}"] if told else []
+    )
 
 
 def _output_kind(quantity: Quantity) -> OutputKind:

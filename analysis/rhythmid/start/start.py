@@ -12,7 +12,7 @@ from rhythmid.model import Model
 from rhythmid.record.inventory import Inventory, inventory
 from rhythmid.record.read import load_records, read_record
 from rhythmid.record.signals import Clock, Signals
-from rhythmid.start.meaning import force_unit_of
+from rhythmid.start.meaning import driving_unit_of
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
 from rhythmid.start.roles import Ask, Roles, first_answer, guess_roles
 from rhythmid.start.written import clock_of, model_yaml, signals_yaml
@@ -32,6 +32,7 @@ class Guess:
         choices = self.roles.choices.items()
         found = [f"{role}: {choice.recorded}: {choice.reason}" for role, choice in choices]
         found += [f"CHECK {role}: {doubt}" for role, choice in choices for doubt in choice.doubts]
+        found += [f"CHECK {note}" for note in self.roles.notes]
         if self.roles.joint.others:
             found.append(f"joint: {self.roles.joint.name} (others: {', '.join(self.roles.joint.others)})")
         return found
@@ -104,4 +105,4 @@ def _units(roles: Roles) -> Units:
     forces = [roles.choices[role] for role in ("input", "effort", "forcing") if role in roles.choices]
     if roles.input_kind != "force" or not forces:
         return per_inertia(units_of(roles, ""))
-    return units_of(roles, force_unit_of(forces[0].recorded))
+    return units_of(roles, driving_unit_of(forces[0].recorded))

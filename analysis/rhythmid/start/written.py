@@ -8,7 +8,7 @@ from rhythmid.elements.element import SLOTS
 from rhythmid.model import INERTIA, Term
 from rhythmid.record.inventory import Inventory, Recorded, header_clock
 from rhythmid.record.signals import ROLES, Clock
-from rhythmid.start.meaning import force_unit_of, meaning_of
+from rhythmid.start.meaning import driving_unit_of, meaning_of
 from rhythmid.start.nominal import Nominal
 from rhythmid.start.roles import Choice, Roles
 from rhythmid.units import Units
@@ -61,6 +61,8 @@ def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clo
                 f"joint: {name}; standard deviation of its motion {own:.3g}. Others (--joint NAME): {moved}."
             ),
         ]
+    for note in roles.notes:
+        lines += ["", *_comment(f"CHECK: {note}.")]
     if rest:
         lines += ["", *_comment(f"Recorded too, and not used: {_listed(rest, 3 * LISTED)}.")]
     if found.left_out:
@@ -153,7 +155,7 @@ def _unit(role: str, one: Recorded, roles: Roles, units: Units) -> str:
         return by_kind[roles.reference_of]
     if role == "input" and roles.input_kind != "force":
         return by_kind[roles.input_kind.removeprefix("base_").replace("displacement", "position")]
-    return force_unit_of(one) or ("N*m" if roles.rotary else "N")
+    return driving_unit_of(one) or ("N*m" if roles.rotary else "N")
 
 
 def _scale(scale: float) -> str:

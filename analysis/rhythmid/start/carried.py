@@ -1,0 +1,80 @@
+"""A motion that drives another one where nothing else does, such as the tilt of a beam on which a ball rolls."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rhythmid.record.inventory import Recorded
+from rhythmid.start.meaning import Meaning, rotary_of
+from rhythmid.start.relation import SURE, follows, predicts
+
+ONE_WAY = 4.0  # times the evidence for the other way that has to be there for the one
+BEYOND_CHANCE = 3.0  # times the evidence of shifted records, the most of them
+SHIFTS = 6  # parts of a record by which it is shifted
+LEAST_CORRELATION = 0.3  # of what drives with what it drives, at the lag where it is greatest
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """The driven motion, what drives it, and how much surer that is than by chance, there and back."""
+
+    driven: Recorded
+    driver: Recorded
+    there: float
+    back: float
+
+    @property
+    def reason(self) -> str:
+        """Why it is the driven one, as a phrase."""
+        return f"{self.driver} drives it: its past tells of this one ({self.there:.3g} times as much as by chance; back {self.back:.2g})"
+
+    @property
+    def doubt(self) -> str:
+        """What a user should know of a motion that is taken for a force, as a phrase."""
+        unit = self.driver.unit or "its unit"
+        return (
+            f"a motion, not a force: the model's forces are in {unit}, as if they were in proportion to it; "
+            "a base that moves is kind: base_displacement"
+        )
+
+
+def carried_motion(known: Sequence[tuple[Recorded, Meaning]]) -> Carried | None:
+    """The motion that slides where one that turns drives it, or the other way about, and no effort, command or base was recorded.
+
+    Two of one kind may be joints of one robot, whose plan moves one before the other: of them nothing is told.
+    """
+    motions = [one for one, meaning in known if meaning.quantity == "position"]
+    others = [
+        meaning for _, meaning in known
+        if meaning.quantity in (None, "effort") or meaning.commanded or meaning.forcing or meaning.base
+    ]  # fmt: skip
+    if others:
+        return None
+    turning = {id(one): rotary_of(one)[0] for one in motions}
+    pairs = [
+        (first, second) for first in motions for second in motions
+        if turning[id(first)] is True and turning[id(second)] is False
+    ]  # fmt: skip
+    found: list[Carried] = []
+    for first, second in pairs:
+        there, back = predicts(first, second), predicts(second, first)
+        if there >= max(SURE, ONE_WAY * back) and _surely(first, second, there):
+            found.append(Carried(second, first, there, back))
+        elif back >= max(SURE, ONE_WAY * there) and _surely(second, first, back):
+            found.append(Carried(first, second, back, there))
+    return max(found, key=lambda one: one.there, default=None)
+
+
+def _surely(driver: Recorded, driven: Recorded, evidence: float) -> bool:
+    """Whether the one goes with the other, later, and the record of the driver, shifted in time, tells much less of the driven.
+
+    Two smooth motions help to predict each other however they came about, and so do shifted ones.
+    """
+    told = follows(driver, driven)
+    if told.lag < 0.0 or abs(told.correlation) < LEAST_CORRELATION:
+        return False
+    count = len(driver.value)
+    shifted = [np.roll(driver.value, part * count // SHIFTS) for part in range(1, SHIFTS)]
+    chance = max(predicts(replace(driver, value=value), driven) for value in shifted)
+    return evidence >= BEYOND_CHANCE * chance
