@@ -397,3 +397,9 @@ def test_two_motions_of_which_neither_drives_the_other_are_joints(tmp_path):
     )
     np.savez(tmp_path / "run.npz", t=TIME, arm_rad=arm, lift_mm=1e3 * lift)
     assert said(tmp_path / "run.npz") == {"output": "lift_mm"}
+
+
+def test_a_unit_that_is_glued_to_a_name_tells_that_the_machine_turns(tmp_path):
+    np.savez(tmp_path / "run.npz", t=TIME, u=FORCE, yrad=X)
+    found = guess(tmp_path / "run.npz")
+    assert found.roles.rotary and 'output: {column: "yrad", unit: "rad"}' in found.signals

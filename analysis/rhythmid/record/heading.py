@@ -33,6 +33,21 @@ LETTERS = {  # a single letter is a unit only behind a word that it suits: pos_a
     "s": "t time timestamp stamp elapsed", "m": "pos position x y z height displacement disp length travel stroke",
     "n": "f force load thrust", "a": "i iq current cur", "v": "u voltage volt supply",
 }  # fmt: skip
+# units that may be glued to a name, and the names that they suit: a yrad is one, a grad and a thread are words
+GLUED = {
+    "deg rad mrad": "x y q ang angle pos position theta phi psi alpha beta gamma roll pitch yaw tilt enc encoder",
+    "mm": "x y z pos position height disp displacement dist distance length travel stroke",
+    "cm": "pos position height disp displacement dist distance length travel stroke",  # an xcm is the place of a centre of mass
+    "rpm rads radps degps dps": "w n vel velocity speed omega rate",
+    "ms us ns msec usec nsec sec secs": "t time timestamp stamp elapsed", "nm mnm": "tau torque moment trq", "ma": "cur current curr iq",
+    "mv": "volt voltage",
+}  # fmt: skip
+_GLUED = {
+    stem + unit: unit for units, stems in GLUED.items() for unit in units.split() for stem in stems.split()
+}
+# with a capital, behind any name: not those that are abbreviations of something else, as in velMa, xCm and velMs
+CAPITALS = frozenset("deg degrees rad radians mrad rads radps degps dps rpm mm nm mnm".split())
+_CAPITAL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")  # where a word of kneePosRad begins
 _BRACKETS = re.compile(r"^(.*?)\s*[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]\s*$")
 _SLASH = re.compile(r"^(.+?)\s+(?:/|in)\s+(\S+)$")  # "angle / deg", "angle in deg"
 
@@ -56,11 +71,15 @@ class Heading:
 
 
 def heading_of(column: str) -> Heading:
-    """The heading `column` taken apart: a unit in brackets, behind a slash, or as a suffix after an underscore."""
+    """The heading `column` taken apart: a unit in brackets, behind a slash, as a suffix after an underscore or with a capital, or
+    glued to a name that it suits."""
     column = column.strip()
     for pattern in (_BRACKETS, _SLASH):
         if (match := pattern.match(column)) and (known := _unit(match[2])) is not None:
             return Heading(match[1].strip() or column, *known, match[2])
+    suffix = _glued(column)
+    if suffix and (known := _unit(_spelled(suffix))) is not None:
+        return Heading(column[: -len(suffix)], *known, column[-len(suffix) :])
     lowered = column.lower()
     for suffix in SUFFIXES:
         if lowered.endswith("_" + suffix) and len(column) > len(suffix) + 1:
@@ -70,6 +89,14 @@ def heading_of(column: str) -> Heading:
             assert known is not None
             return Heading(column[: -len(suffix) - 1], *known, column[-len(suffix) :])
     return Heading(column)
+
+
+def _glued(column: str) -> str:
+    """The unit at the end of a name with nothing between them, in lower case; empty where there is none."""
+    *before, last = _CAPITAL.split(re.split(r"[\s_.]", column)[-1])
+    if before and last.lower() in CAPITALS:
+        return last.lower()
+    return _GLUED.get(last.lower()) or (_GLUED.get((before[-1] + last).lower(), "") if before else "")
 
 
 def is_unit(text: str) -> bool:
