@@ -403,3 +403,21 @@ def test_a_unit_that_is_glued_to_a_name_tells_that_the_machine_turns(tmp_path):
     np.savez(tmp_path / "run.npz", t=TIME, u=FORCE, yrad=X)
     found = guess(tmp_path / "run.npz")
     assert found.roles.rotary and 'output: {column: "yrad", unit: "rad"}' in found.signals
+
+
+def test_an_inertia_that_the_record_does_not_tell_is_what_follows_within_a_sample(tmp_path):
+    every, damping = 20, 0.6
+    speed = FORCE / damping
+    place = foreign.STEP * np.cumsum(speed)
+    rng = np.random.default_rng(0)
+    noisy = FORCE + 0.05 * rng.standard_normal(len(FORCE))
+    np.savez(tmp_path / "run.npz", t=TIME[::every], position=place[::every], force=noisy[::every])
+    begun = start([tmp_path / "run.npz"])
+    model = begun.nominal.model
+    step = every * foreign.STEP
+    assert model.value("viscous_damper.damping") == pytest.approx(damping, rel=0.1)
+    assert model.value("inertia.mass") / model.value("viscous_damper.damping") == pytest.approx(
+        step, rel=0.05
+    )
+    assert "CHECK inertia.mass: the records do not tell the inertia" in "\n".join(begun.lines())
+    assert "#   CHECK: the records do not tell the inertia" in begun.model

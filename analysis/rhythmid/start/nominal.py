@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -30,11 +30,13 @@ LEAST_DAMPING = 0.01  # of inertia times the motion's angular frequency, where t
 
 @dataclass(frozen=True)
 class Nominal:
-    """A model to begin with, the reason for its inertia and each of its terms (by label), and what was not guessed."""
+    """A model to begin with, the reason for its inertia and each of its terms (by label), what was not guessed, and what is doubtful
+    about any of them (by label)."""
 
     model: Model
     reasons: dict[str, str]
     remarks: tuple[str, ...]
+    doubts: dict[str, str] = field(default_factory=dict)
 
 
 def nominal_of(records: Sequence[Record], roles: Roles, units: Units, catalogue: Catalogue) -> Nominal:
@@ -74,13 +76,14 @@ def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Ca
         law, kind = _restoring(rows, roles.rotary, inertial=True)
     except InputError as error:
         return _by_size(records, units, catalogue, str(error))
-    if law.coefficients["acceleration"] <= 0.0:
+    inertia, doubts = _shown(law, rows)
+    if inertia <= 0.0:
         return _by_size(records, units, catalogue, "the balance of forces shows no inertia")
     if law.left > UNEXPLAINED:
         why = f"the balance of forces explains only {1.0 - law.left:.0%} of what drives"
         return _by_size(records, units, catalogue, why)
     told = f"by the balance of forces, which explains {max(0.0, 1.0 - law.left):.0%} of what drives"
-    model = _bare(units, _short(law.coefficients["acceleration"]))
+    model = _bare(units, _short(inertia))
     reasons = {INERTIA: told}
     remarks: list[str] = []
     if "reference" in roles.choices:
@@ -90,7 +93,20 @@ def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Ca
         model = model.with_element(catalogue["input_delay"], {"delay": _short(law.delay)})
         reasons["input_delay"] = "the balance is better when what drives acts so much later"
     model, more = _forces(model, law, kind, rows, catalogue)
-    return Nominal(model, reasons | more, tuple(remarks))
+    return Nominal(model, reasons | more, tuple(remarks), doubts)
+
+
+def _shown(law: Law, rows: Rows) -> tuple[float, dict[str, str]]:
+    """The inertia of a balance, and what is doubtful about it: none is seen that follows damper and spring within a sample."""
+    found, period = law.coefficients, max(rows.period)
+    least = max(found["velocity"] * period, found.get("position", 0.0) * period**2)
+    if found["acceleration"] >= least:
+        return found["acceleration"], {}
+    doubt = (
+        f"the records do not tell the inertia, which the balance puts at {found['acceleration']:.1g}: this is the largest that "
+        f"follows the other forces within a sample ({1e3 * period:.3g} ms); put in what is known, and fix it"
+    )
+    return least, {INERTIA: doubt}
 
 
 def _restoring(rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:

@@ -49,7 +49,8 @@ class Start:
     def lines(self) -> list[str]:
         """The guesses in plain text, one line each."""
         elements = ", ".join(term.label for term in self.nominal.model.terms)
-        return [*self.guess.lines(), f"nominal model: inertia, {elements}"]
+        doubts = [f"CHECK {label}: {doubt}" for label, doubt in self.nominal.doubts.items()]
+        return [*self.guess.lines(), f"nominal model: inertia, {elements}", *doubts]
 
 
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other

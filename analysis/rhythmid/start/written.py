@@ -93,19 +93,25 @@ def model_yaml(nominal: Nominal, roles: Roles, units: Units, explicit: bool) -> 
         lines.append(
             f"units: {{force: {units.force}, position: {units.position}, mass: {json.dumps(units.mass)}}}"
         )
-    lines += ["", *_comment(f"{nominal.reasons[INERTIA]}."), f"inertia: {{mass: {_value(model.mass)}}}"]
+    lines += ["", *_why(INERTIA, nominal), f"inertia: {{mass: {_value(model.mass)}}}"]
     for slot in SLOTS:
         terms = [term for term in model.terms if term.element.slot == slot]
         if terms:
             lines += ["", f"{slot}:"]
             for term in terms:
                 lines += [
-                    *(f"  {line}" for line in _comment(f"{nominal.reasons[term.label]}.")),
+                    *(f"  {line}" for line in _why(term.label, nominal)),
                     f"  - {_term(term)}",
                 ]
     for remark in nominal.remarks:
         lines += ["", *_comment(remark)]
     return "\n".join(lines) + "\n"
+
+
+def _why(label: str, nominal: Nominal) -> list[str]:
+    """The reason for a part of the model, and what is doubtful about it."""
+    lines = _comment(f"{nominal.reasons[label]}.")
+    return lines + (_comment(f"  CHECK: {nominal.doubts[label]}.") if label in nominal.doubts else [])
 
 
 def _term(term: Term) -> str:
