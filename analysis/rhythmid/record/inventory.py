@@ -43,6 +43,7 @@ USUAL = 0.95  # share of usual steps from which such a column is taken for the t
 FORWARD = 0.99  # share of steps of a time that go forward
 # the longest sample period [s] that is thought of: a time without a unit whose steps are longer is in ms, µs or ns
 LONGEST_STEP = 0.5
+NANOSECOND = 1e-9  # s, the smallest unit in which times are written
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +187,8 @@ def _even(value: Array) -> bool:
         return False
     step = np.diff(value)
     usual = float(np.median(step))
-    return usual > 0.0 and float(np.mean(np.abs(step - usual) <= NEAR * usual)) >= USUAL
+    in_any_unit = 0.0 < usual <= LONGEST_STEP / NANOSECOND
+    return in_any_unit and float(np.mean(np.abs(step - usual) <= NEAR * usual)) >= USUAL
 
 
 def _table_clock(path: Path, columns: list[tuple[str, Array]]) -> tuple[Clock, str]:
@@ -218,7 +220,7 @@ def _guessed_scale(value: Array) -> tuple[float, str]:
     for scale, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
         if step * scale < LONGEST_STEP:
             return scale, f"steps of {step:.4g} are taken to be {unit}"
-    return 1e-9, f"steps of {step:.4g} are taken to be ns"
+    return NANOSECOND, f"steps of {step:.4g} are taken to be ns"
 
 
 def _of_bag(bag: Bag) -> Inventory:
