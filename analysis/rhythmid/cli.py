@@ -34,6 +34,7 @@ PARTS = (
     "examples",
     "joint_design",
     "machines",
+    "model_line",
     "options",
     "terminal",
 )  # modules of `commands` that are no command

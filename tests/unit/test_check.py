@@ -117,3 +117,62 @@ def test_an_output_that_is_mostly_clipped_cannot_be_used(tmp_path, command):
     assert answer.code == 2 and "choose a wider range of the sensor" in answer.err
     written = json.loads((tmp_path / "answer.json").read_text())
     assert not written["usable"] and written["cut"] is None
+
+
+MODEL = """inertia: {mass: {value: 2.0, unit: kg, fixed: true}}
+force:
+  - linear_spring: {stiffness: {value: 5.0, unit: N/m}}
+  - viscous_damper: {damping: {value: 1.0, unit: N*s/m}}
+"""
+
+
+def test_the_size_and_the_columns_of_a_table_are_told(tmp_path):
+    report = checked(tmp_path)
+    size = (tmp_path / "run.csv").stat().st_size
+    assert report.size == size and report.columns == 3
+    assert report.lines()[0].endswith(f": {size / 1e3:.1f} kB, {TIME[-1]:.3f} s, 3 columns read")
+    named = SIGNALS.replace("column: t}", "column: t}\ntables: {file: run.csv}")
+    (tmp_path / "named.yaml").write_text(named)
+    assert quality_report(tmp_path / "named.yaml").lines()[0].endswith("3 columns read")
+    assert quality_report(tmp_path / "named.yaml").size == size
+
+
+def test_a_model_is_told_in_one_line_with_the_records(tmp_path, command):
+    checked(tmp_path)
+    (tmp_path / "model.yaml").write_text(MODEL)
+    answer = command("check", "run.csv", "--signals", "signals.yaml", "--model", "model.yaml")
+    assert answer.code == 0 and answer.err == ""
+    assert answer.out.splitlines()[-1] == (
+        "model.yaml: inertia 2 kg (fixed); linear_spring, viscous_damper; 2 free parameters (linear_spring.stiffness, "
+        "viscous_damper.damping); units N, m, kg"
+    )
+
+
+def test_units_of_the_records_that_are_not_the_models_are_noted(tmp_path, command):
+    checked(tmp_path)
+    (tmp_path / "signals.yaml").write_text(SIGNALS.replace("unit: N", "unit: V"))
+    (tmp_path / "model.yaml").write_text(MODEL)
+    answer = command("check", "run.csv", "--signals", "signals.yaml", "--model", "model.yaml")
+    assert answer.code == 0
+    assert answer.out.splitlines()[-1] == "  note: run: the input is in V by signals.yaml, in N by the model"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (MODEL.replace("viscous", "viscos"), "model.yaml:4: unknown element 'viscos_damper'"),
+        (MODEL.replace("unit: N/m", "unit: kg"), "model.yaml:3: force[0].linear_spring.stiffness: unit 'kg'"),
+        (
+            MODEL + "command: [{position_control: {proportional: 9.0, derivative: 1.0}}]\n",
+            "the model has a controller, but no reference is recorded",
+        ),
+    ],
+)
+def test_a_model_that_is_wrong_or_does_not_fit_the_records_is_refused_after_the_report(
+    tmp_path, command, text, words
+):
+    checked(tmp_path)
+    (tmp_path / "model.yaml").write_text(text)
+    answer = command("check", "run.csv", "--signals", "signals.yaml", "--model", "model.yaml")
+    assert answer.code == 2 and words in answer.err and answer.err.count("\n") == 1
+    assert "columns read" in answer.out

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rhythmid.commands.options import JsonFile, Quiet, ReportFile, SignalsFile, command_line
+from rhythmid.commands.options import Elements, JsonFile, Quiet, ReportFile, SignalsFile, command_line
 from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new, write_json
 
@@ -13,6 +13,7 @@ EXAMPLES = (
     "rhythmid check bag",
     "rhythmid check run.csv --signals signals.yaml --json -",
     "rhythmid check small.csv large.csv --signals signals.yaml",
+    "rhythmid check run.csv --signals signals.yaml --model model.yaml",
     "rhythmid check bag --report page.html",
 )
 
@@ -25,13 +26,20 @@ def check(
         ),
     ],
     signals: SignalsFile = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            "--model", help="Model to check with the recordings: what it is, or what is wrong with it."
+        ),
+    ] = None,
+    elements: Elements = None,
     json: JsonFile = None,
     report: ReportFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Report data quality: topics, rates, gaps, duplicates, jitter, clock. Exit code 2 if a recording cannot be used.
 
-    Several recordings are reported one after the other, and the JSON is then a list.
+    Several recordings are reported one after the other, and the JSON is then a list. With --model, a last line says what the model is.
     """
     from rhythmid.errors import InputError
     from rhythmid.progress_bar import progress
@@ -57,6 +65,15 @@ def check(
         refused += found.problems
         for line in found.lines():
             terminal.say(line)
+    try:
+        if model is not None:
+            from rhythmid.commands.model_line import model_lines
+
+            records = [found.record for found in made if found.usable and found.record is not None]
+            for line in model_lines(model, records, elements or ()):
+                terminal.say(line)
+    except InputError as error:
+        refused.append(str(error))
     if json is not None and made:
         told = [found.to_dict() for found in made]
         write_json(json, told if len(bags) > 1 else told[0])

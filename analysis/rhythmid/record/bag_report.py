@@ -22,6 +22,8 @@ from rhythmid.record.record import Record
 from rhythmid.record.signals import Signals
 from rhythmid.record.timing import Timing
 
+MEGABYTE = 1e6  # bytes; what is smaller is told in kB
+
 
 @dataclass(frozen=True)
 class TopicReport:
@@ -61,7 +63,7 @@ class BagReport:
 
     Attributes
     ----------
-    path, size : where it is and how large [bytes].
+    path, size : where it is and how large [bytes]; of tables the files that are read.
     duration : from the first to the last message received [s].
     topics : one report each, in order of name; empty for tables.
     channels : quality of the mapped channels by role; empty if they cannot be read.
@@ -70,6 +72,7 @@ class BagReport:
     damage : those of the notes that tell damage of the files; empty for a whole recording.
     record : what could be read; None if it cannot be used as mapped.
     left_out : samples that no analysis will use, one entry for each reason; the notes tell of them, too.
+    columns : how many columns of tables are read, the time's too; 0 for a bag.
     cut : the record as an analysis will take it, cut where commands are missing; None if it cannot be used.
     """
 
@@ -85,6 +88,7 @@ class BagReport:
     record: Record | None = None
     left_out: tuple[LeftOut, ...] = ()
     cut: Cut | None = None
+    columns: int = 0
 
     @property
     def remarks(self) -> list[str]:
@@ -124,7 +128,9 @@ class BagReport:
 
     def lines(self) -> list[str]:
         """The report as plain text, without the problems."""
-        found = [f"{self.path}: {self.size / 1e6:.1f} MB, {self.duration:.3f} s, {len(self.topics)} topics"]
+        size = f"{self.size / 1e6:.1f} MB" if self.size >= MEGABYTE else f"{self.size / 1e3:.1f} kB"
+        held = f"{self.columns} columns read" if self.columns else f"{len(self.topics)} topics"
+        found = [f"{self.path}: {size}, {self.duration:.3f} s, {held}"]
         width = max((len(topic.name) for topic in self.topics), default=0)
         for topic in self.topics:
             timing = topic.stamped or topic.received
@@ -192,9 +198,10 @@ def quality_report(
         except InputError as error:
             problems.append(str(error))
     if not is_bag(source):
+        size, columns = _tables(source, signals)
         return BagReport(
-            source, source.stat().st_size, duration, (), channels, problems=tuple(problems), notes=tuple(notes),
-            record=record, left_out=left_out, cut=cut,
+            source, size, duration, (), channels, problems=tuple(problems), notes=tuple(notes),
+            record=record, left_out=left_out, cut=cut, columns=columns,
         )  # fmt: skip
     bag = Bag(source, verify=True)
     received, stamped = _times(bag)
@@ -215,6 +222,20 @@ def quality_report(
         source, size, duration, topics, channels, bag.truncated, tuple(problems), tuple(notes), damage, record,
         left_out, cut,
     )  # fmt: skip
+
+
+def _tables(source: Path, signals: Signals | JointSignals | None) -> tuple[int, int]:
+    """Size [bytes] of the tables that are read, and how many of their columns."""
+    if source.suffix in (".yaml", ".yml"):
+        signals = JointSignals.load(source) if names_joints(source) else Signals.load(source)
+    if isinstance(signals, JointSignals):
+        given = [*signals.joints.values(), *([] if signals.base is None else [signals.base])]
+    else:
+        given = [] if signals is None else [signals]
+    read = {(one.file or source, one.column) for part in given for one in part.channels.values()}
+    files = {file for file, _ in read}
+    read |= {(file, part.time.column) for part in given if part.time.kind == "column" for file in files}
+    return sum(file.stat().st_size for file in files), len(read)
 
 
 def _times(bag: Bag) -> tuple[dict[str, NDArray[np.int64]], dict[str, Columns]]:

@@ -1,0 +1,61 @@
+"""A model file in one line, and whether records fit it: what `rhythmid check --model` says."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rhythmid.model import INERTIA, Model
+
+if TYPE_CHECKING:
+    from rhythmid.record.record import Record
+
+
+def model_lines(path: Path, records: Sequence["Record"], elements: Sequence[Path] = ()) -> list[str]:
+    """What a model is, in one line, and a note on each unit of the records that is not the model's.
+
+    Raises InputError as a diagnosis would, where the model is wrong or the records do not fit it.
+    """
+    from rhythmid.commands.machines import is_machine
+    from rhythmid.diagnose.admission import admitted
+    from rhythmid.elements.catalogue import load_catalogue
+
+    catalogue = load_catalogue(elements)
+    if is_machine(path):
+        from rhythmid.body.machine import Machine
+
+        machine = Machine.load(path, catalogue)
+        paths = "; ".join(f"{joint}: {_elements(model)}" for joint, model in machine.paths.items())
+        return [f"{path}: {len(machine.joints)} joints; {paths}; {_free(machine.free)}"]
+    model = Model.load(path, catalogue)
+    if records:
+        admitted(records, [], model)
+    units = model.units
+    mass = model.parameters[INERTIA]
+    told = f"inertia {mass.value:g} {mass.unit}{' (fixed)' if mass.fixed else ''}; {_elements(model)}; {_free(model.free)}"
+    return [
+        f"{path}: {told}; units {units.force}, {units.position}, {units.mass}",
+        *(f"  note: {note}" for one in records for note in _foreign_units(one, model)),
+    ]
+
+
+def _elements(model: Model) -> str:
+    return ", ".join(term.label for term in model.terms) or "no elements"
+
+
+def _free(names: Sequence[str]) -> str:
+    listed = f" ({', '.join(names)})" if names else ""
+    return f"{len(names)} free parameter{'' if len(names) == 1 else 's'}{listed}"
+
+
+def _foreign_units(record: "Record", model: Model) -> list[str]:
+    """Notes on channels whose unit is not that of the model."""
+    expected = {"output": (record.output, model.units.position)} if record.output_kind == "position" else {}
+    if record.input is not None and record.input_kind == "force":
+        expected["input"] = (record.input, model.units.force)
+    if record.effort is not None:
+        expected["effort"] = (record.effort, model.units.force)
+    return [
+        f"{record.name}: the {role} is in {channel.unit} by signals.yaml, in {unit} by the model"
+        for role, (channel, unit) in expected.items()
+        if model.units.of(channel.unit) != unit and channel.unit != unit
+    ]
