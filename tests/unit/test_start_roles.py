@@ -288,6 +288,12 @@ def test_a_time_may_have_gaps(tmp_path, name, scale, written):
     assert np.ptp(record.output.time) == pytest.approx(np.ptp(gapped(TIME[::8])), rel=1e-6)
 
 
+def test_a_column_called_time_is_the_time_before_a_kind_of_time(tmp_path):
+    np.savez(tmp_path / "run.npz", cpu_time=0.3 * TIME, t=TIME, force=FORCE, angle=X)
+    text = guess(tmp_path / "run.npz").signals
+    assert 'time: {column: "t"}' in text and "cpu_time" not in text
+
+
 def test_what_only_drifts_upward_is_no_time(tmp_path):
     np.savez(tmp_path / "run.npz", a=np.cumsum(np.abs(FORCE)), b=X)
     with pytest.raises(InputError, match="no column goes forward like a time"):

@@ -32,9 +32,9 @@ SKIPPED_PACKAGES = (
 )
 SKIPPED_FIELDS = re.compile(r"header|stamp|.*covariance|orientation|layout|points|time_from_start")
 TIME = re.compile(
-    r"(?:elapsed_?|time_?|wall_?|ros_?)*(?:t|seconds|secs?)|(?:.*_)?(?:elapsed|wall|ros)?(?:time|timestamp|stamp|clock)",
-    re.IGNORECASE,
+    r"(?:elapsed_?|time_?|wall_?|ros_?)*(?:t|time|timestamp|stamp|seconds|secs?|clock)", re.IGNORECASE
 )
+KIND_OF_TIME = re.compile(r".*_(?:time|timestamp|stamp|clock)", re.IGNORECASE)  # pi_time, cpu_time
 COUNTER = re.compile(
     r"|index|idx|i|n|k|id|no|nr|frame|sample|step|row|count|counter|seq|unnamed: 0", re.IGNORECASE
 )
@@ -166,12 +166,18 @@ def _vectors(table: Table) -> Iterator[tuple[str, Array]]:
 
 
 def _is_time(name: str, value: Array) -> bool:
-    """Whether a column is called a time and goes forward as one."""
-    heading = heading_of(name)
-    called = (
-        TIME.fullmatch(heading.name.rsplit(".", 1)[-1].replace(" ", "_")) is not None or heading.unit == "s"
-    )
-    return called and _forward(value)
+    """Whether a column is called a time, or a kind of time, and goes forward as one."""
+    called = _called(name)
+    return (_is_plain_time(name) or KIND_OF_TIME.fullmatch(called) is not None) and _forward(value)
+
+
+def _is_plain_time(name: str) -> bool:
+    """Whether a column is called a time and nothing else, or its unit is one of time."""
+    return TIME.fullmatch(_called(name)) is not None or heading_of(name).unit == "s"
+
+
+def _called(name: str) -> str:
+    return heading_of(name).name.rsplit(".", 1)[-1].replace(" ", "_")
 
 
 def _forward(value: Array) -> bool:
@@ -193,7 +199,7 @@ def _even(value: Array) -> bool:
 
 def _table_clock(path: Path, columns: list[tuple[str, Array]]) -> tuple[Clock, str]:
     """The column that holds the time. Raises InputError where there is none."""
-    for name, value in columns:
+    for name, value in sorted(columns, key=lambda column: not _is_plain_time(column[0])):
         if _is_time(name, value):
             heading = heading_of(name)
             scale, why = heading.scale, f"its heading says {heading.written}" if heading.unit else ""
