@@ -63,7 +63,7 @@ EXPLAINED = 0.8
 MAINLY = 0.5
 # chance that the catalogue holds the truth, as a function of what the names leave of all that anything explains: half at
 # `ADEQUATE`, falling with its power `STEEPNESS` (fitted to sealed cases whose truth was in the catalogue or not: docs/proof.md)
-ADEQUATE = 0.1
+ADEQUATE = 0.18
 STEEPNESS = 1.5
 # chance that the catalogue holds the truth where the names explain all, their sizes are known and no other name predicts as well
 # (fitted to sealed cases, a quarter of whose laws the catalogue lacked: docs/proof.md)
