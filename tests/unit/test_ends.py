@@ -74,6 +74,12 @@ def test_nothing_is_left_out_where_hardly_any_measurement_would_remain():
     assert cut_at_gaps(made).stretches == (made,)
 
 
+def test_a_forcing_is_not_continued_for_longer_than_it_was_recorded():
+    made = record(input=None, forcing=within(PUMP, 9.0, 12.0))
+    (one,) = cut_at_gaps(made).stretches
+    assert one.output.time[0] >= 9.0 and one.forcing is not None and len(one.forcing) < 800
+
+
 def test_ends_within_a_sample_are_no_gap():
     made = record(input=replace(within(BROAD, 0.0, 12.0), time=TIME + 0.5 / RATE), hold="linear")
     assert cut_at_gaps(made).stretches == (made,)

@@ -43,9 +43,10 @@ def within_samples_of(record: Record, role: str, least: int) -> tuple[Record, fl
     added: list[tuple[Array, Array]] = []
     first, last = -np.inf, np.inf
     for count, step, edge in zip(counts, (-period, period), channel.time[[0, -1]]):
-        if change_within(channel.value, count) * count < allowed:
+        if count == 0 or change_within(channel.value, count) * count < allowed:
             continue
-        if law is not None and law.left * count < allowed:
+        # no further than the record of it is long
+        if law is not None and count < len(channel) and law.left * count < allowed:
             time = edge + step * np.arange(1, count + 1)
             added.append((time, law(time)))
         elif step < 0.0:
@@ -67,6 +68,4 @@ def change_within(value: Array, count: int) -> float:
     """rms change of a signal (n,) over so many samples; infinite where there are too few to tell."""
     if 2 * count >= len(value):
         return np.inf
-    if count == 0:
-        return 0.0
     return float(np.sqrt(np.mean((value[count:] - value[:-count]) ** 2)))
