@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 
 from rhythmid.record.bag_writer import add_topic, new_bag
+from rhythmid.record.read import read_record
+from rhythmid.record.signals import Signals
+from rhythmid.start.start import guess
 
 Array = NDArray[np.float64]
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -45,6 +48,13 @@ def servo(reference: Array, gain: float = 400.0, damping: float = 28.0) -> tuple
         v += STEP * force
         x += STEP * v
     return position, speed, torque
+
+
+def roles_of(path: Path, **options: Any) -> dict[str, str]:
+    """What `init` takes for each role, after its signals.yaml was read back and a record with it."""
+    found = guess(path, **options)
+    read_record(path, Signals.from_text(found.signals))
+    return {role: str(choice.recorded) for role, choice in found.roles.choices.items()}
 
 
 def message(kind: str, stamp: float | None = None, **values: Any) -> Any:

@@ -1,26 +1,15 @@
 """What drives a machine, of channels that all go with its motion: voltages, copies of the output, and motions that drive others."""
 
-from pathlib import Path
-
 import foreign
 import numpy as np
 import pytest
-from foreign import moved, tones
+from foreign import moved, roles_of, tones
 
-from rhythmid.record.read import read_record
-from rhythmid.record.signals import Signals
 from rhythmid.start.start import guess, start
 
 TIME = np.arange(8000) * foreign.STEP
 FORCE = tones(1, TIME)
 X, V = moved(FORCE, 0.05, 0.1, 6.0)
-
-
-def said(path: Path, **options) -> dict[str, str]:
-    """What plays each role, after signals.yaml was read back and a record with it."""
-    found = guess(path, **options)
-    read_record(path, Signals.from_text(found.signals))
-    return {role: str(choice.recorded) for role, choice in found.roles.choices.items()}
 
 
 def test_a_voltage_that_a_controller_made_of_the_position_is_the_input(tmp_path):
@@ -34,7 +23,7 @@ def test_a_voltage_that_a_controller_made_of_the_position_is_the_input(tmp_path)
         x += foreign.STEP * v
     np.savez(tmp_path / "run.npz", t=time, z=cart, v=gain * (place - cart))
     begun = start([tmp_path / "run.npz"])
-    assert said(tmp_path / "run.npz") == {"input": "v", "output": "z"}
+    assert roles_of(tmp_path / "run.npz") == {"input": "v", "output": "z"}
     assert "CHECK input: it is a copy of the output (correlation -1.00000 at once)" in "\n".join(
         begun.lines()
     )
@@ -48,7 +37,7 @@ def test_a_voltage_that_a_controller_made_of_the_position_is_the_input(tmp_path)
 
 def test_a_v_that_is_the_slope_of_the_position_is_its_velocity(tmp_path):
     np.savez(tmp_path / "run.npz", t=TIME, x=X, v=V, f=FORCE)
-    assert said(tmp_path / "run.npz") == {"input": "f", "output": "x", "velocity": "v"}
+    assert roles_of(tmp_path / "run.npz") == {"input": "f", "output": "x", "velocity": "v"}
 
 
 @pytest.mark.parametrize("rounded", [3, 9])
@@ -68,7 +57,7 @@ def test_a_copy_of_the_output_is_no_effort(tmp_path, rounded):
 def test_a_force_that_a_slow_spring_makes_a_copy_of_the_motion_is_kept_and_doubted(tmp_path):
     slow = 0.1 * np.sin(0.5 * TIME)
     np.savez(tmp_path / "run.npz", t=TIME, position=slow, force=30.0 * slow)
-    assert said(tmp_path / "run.npz")["input"] == "force"
+    assert roles_of(tmp_path / "run.npz")["input"] == "force"
     assert "CHECK input: it is a copy of the output" in "\n".join(guess(tmp_path / "run.npz").lines())
 
 
@@ -95,11 +84,11 @@ def test_a_motion_that_another_one_drives_is_the_output_however_much_that_one_mo
     time = 0.01 * np.arange(len(tilt))
     np.savez(tmp_path / "run.npz", t=time, beam_deg=np.degrees(tilt), ball_mm=1e3 * rolling(tilt))
     begun = start([tmp_path / "run.npz"])
-    assert said(tmp_path / "run.npz") == {"input": "beam_deg", "output": "ball_mm"}
+    assert roles_of(tmp_path / "run.npz") == {"input": "beam_deg", "output": "ball_mm"}
     assert "CHECK input: a motion, not a force: the model's forces are in rad" in "\n".join(begun.lines())
     assert not begun.guess.roles.rotary and begun.nominal.model.units.force == "rad"
     assert begun.nominal.model.value("inertia.mass") == pytest.approx(1.0 / 7.0, rel=0.5)
-    assert said(tmp_path / "run.npz", joint="beam") == {"output": "beam_deg"}
+    assert roles_of(tmp_path / "run.npz", joint="beam") == {"output": "beam_deg"}
 
 
 def test_two_motions_of_which_neither_drives_the_other_are_joints(tmp_path):
@@ -109,4 +98,4 @@ def test_two_motions_of_which_neither_drives_the_other_are_joints(tmp_path):
         for one in (tones(5, TIME, 1.0, 0.37, 5.3), X)
     )
     np.savez(tmp_path / "run.npz", t=TIME, arm_rad=arm, lift_mm=1e3 * lift)
-    assert said(tmp_path / "run.npz") == {"output": "lift_mm"}
+    assert roles_of(tmp_path / "run.npz") == {"output": "lift_mm"}

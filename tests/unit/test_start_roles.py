@@ -1,11 +1,9 @@
 """Roles of what foreign robots record: found by types, names, units and by what the data say."""
 
-from pathlib import Path
-
 import foreign
 import numpy as np
 import pytest
-from foreign import joint_state, message, moved, servo, tones
+from foreign import joint_state, message, moved, roles_of, servo, tones
 
 from rhythmid.errors import InputError
 from rhythmid.record.read import read_record
@@ -18,13 +16,6 @@ X, V = moved(FORCE, 0.05, 0.1, 6.0)
 REFERENCE = tones(2, TIME, 0.3, 0.2, 1.5)
 ROWS = range(0, 8000, 4)
 NOW = 1.7e9
-
-
-def said(path: Path, **options) -> dict[str, str]:
-    """What plays each role, after signals.yaml was read back and a record with it."""
-    found = guess(path, **options)
-    read_record(path, Signals.from_text(found.signals))
-    return {role: str(choice.recorded) for role, choice in found.roles.choices.items()}
 
 
 def two_joints(command, command_type="effort") -> dict:
@@ -54,7 +45,7 @@ OTHER = 0.1 * tones(9, TIME)
 )
 def test_an_effort_command_of_any_type_is_the_input_of_the_joint_that_moves_most(tmp_path, command, field):
     bag = foreign.write(tmp_path / "bag", two_joints(command))
-    assert said(bag) == {
+    assert roles_of(bag) == {
         "output": "/robot/joint_states position[knee]", "velocity": "/robot/joint_states velocity[knee]",
         "input": f"/robot/commands {field}",
     }  # fmt: skip
@@ -66,7 +57,7 @@ def test_an_effort_command_of_any_type_is_the_input_of_the_joint_that_moves_most
 def test_a_joint_may_be_asked_for_and_one_that_is_not_there_is_refused(tmp_path):
     command = two_joints(lambda k: joint_state(NOW + TIME[k], ["hip", "knee"], effort=[OTHER[k], FORCE[k]]))
     bag = foreign.write(tmp_path / "bag", command)
-    assert said(bag, joint="hip")["input"] == "/robot/commands effort[hip]"
+    assert roles_of(bag, joint="hip")["input"] == "/robot/commands effort[hip]"
     with pytest.raises(InputError, match="no joint is called 'ankle'; it has hip, knee"):
         guess(bag, joint="ankle")
 
@@ -75,7 +66,7 @@ def test_a_wrench_beside_a_command_is_the_forcing(tmp_path):
     pump = np.cos(2.0 * np.pi * TIME)
     topics = two_joints(lambda k: joint_state(NOW + TIME[k], ["knee"], effort=[FORCE[k]]))
     topics["/pump"] = [(NOW + TIME[k], foreign.wrench(NOW + TIME[k], 0.0, float(pump[k]))) for k in ROWS]
-    found = said(foreign.write(tmp_path / "bag", topics))
+    found = roles_of(foreign.write(tmp_path / "bag", topics))
     assert found["forcing"] == "/pump wrench.force.z" and found["input"] == "/robot/commands effort[knee]"
 
 
@@ -150,7 +141,7 @@ def test_a_pose_and_a_force_plate_whose_axis_the_data_tell(tmp_path):
             (NOW + TIME[k], foreign.wrench(NOW + TIME[k], float(OTHER[k]), float(FORCE[k]))) for k in ROWS
         ],
     }
-    found = said(foreign.write(tmp_path / "bag", topics))
+    found = roles_of(foreign.write(tmp_path / "bag", topics))
     assert found == {"output": "/mocap/pose pose.position.z", "input": "/plate wrench.force.z"}
 
 
@@ -187,7 +178,7 @@ def test_the_roles_of_a_tables_columns_are_found(tmp_path, layout):
     columns, expected = TABLES[layout]
     rows = slice(0, None, 8)
     np.savez(tmp_path / "run.npz", **{name: np.asarray(value)[rows] for name, value in columns.items()})
-    assert said(tmp_path / "run.npz") == expected
+    assert roles_of(tmp_path / "run.npz") == expected
     Signals.from_text(start([tmp_path / "run.npz"]).guess.signals)
 
 
@@ -262,7 +253,7 @@ def test_a_source_that_tells_no_motion_is_refused_in_one_line(tmp_path, columns,
 
 def test_rows_without_a_time_are_read_at_the_rate_that_is_given(tmp_path):
     np.savez(tmp_path / "run.npz", V1=FORCE, V2=X)
-    assert said(tmp_path / "run.npz", rate=1000.0) == {"input": "V1", "output": "V2"}
+    assert roles_of(tmp_path / "run.npz", rate=1000.0) == {"input": "V1", "output": "V2"}
     assert "sample_rate: 1000.0" in guess(tmp_path / "run.npz", rate=1000.0).signals
 
 
@@ -306,7 +297,7 @@ def test_a_velocity_is_recognised_beside_a_gap(tmp_path):
     time = TIME[::8].copy()
     time[1:] += 0.41
     np.savez(tmp_path / "run.npz", t=time, angle=angle, omega=V[::8], torque=FORCE[::8])
-    assert said(tmp_path / "run.npz")["velocity"] == "omega"
+    assert roles_of(tmp_path / "run.npz")["velocity"] == "omega"
 
 
 def test_a_time_is_no_channel_beside_a_rate_that_is_given(tmp_path):
