@@ -56,7 +56,7 @@ class Fitted:
         return len(self.fit.names)
 
     def claimed(self, prediction: Prediction, nrmse: float | None = None) -> Hypothesis:
-        """The hypothesis with what it predicts, and its error on held-out data as a share of the effort."""
+        """The hypothesis with what it predicts, and its error on held-out data as a share of the effort's variation."""
         model = self.fit.model
         return Hypothesis(
             self.elements,

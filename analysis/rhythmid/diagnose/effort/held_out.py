@@ -32,5 +32,5 @@ class HeldOut:
         return self.balance.predicted(fit.model, fit.alignment) - self.balance.measured
 
     def error(self, fitted: Fitted) -> float:
-        """Error (rms) of the predicted effort, as a share of the recorded one."""
+        """Error (rms) of the predicted effort, as a share of the variation of the recorded one."""
         return float(np.sqrt(np.mean(self.residual(fitted) ** 2))) / variation_of(self.balance)

@@ -29,7 +29,7 @@ class Curve:
 class Remainder:
     """The residual of a fit: recorded less predicted effort.
 
-    `size` is its rms as a share of the effort; `curves` are sorted, the quantity that it goes with first. `record`, `time` [s],
+    `size` is its rms as a share of the effort's variation; `curves` are sorted, the quantity that it goes with first. `record`, `time` [s],
     `measured`, `predicted` (n,) are of the rows.
     """
 
