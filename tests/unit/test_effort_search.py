@@ -203,6 +203,16 @@ def test_friction_of_a_share_of_the_effort_that_matters_is_named_and_of_less_is_
         assert "practical_size" in {row.name for row in answer.rejections}
 
 
+def test_friction_that_matters_for_the_motion_is_named_whatever_weight_the_effort_holds():
+    light = axis(friction=0.06, noise=0.002, length=10.0)
+    assert light.input is not None
+    heavy = replace(light, input=replace(light.input, value=light.input.value + 100.0))
+    model = axis_model().with_element(CATALOGUE["constant_force"], {"force": -100.0})
+    answer = diagnose([heavy], model, catalogue=FEW).diagnosis
+    assert [effect.element for effect in answer.missing] == ["coulomb_friction"]
+    assert answer.augmented.train_nrmse > 1e-3  # of what varies, not of the weight
+
+
 @pytest.mark.parametrize(("least", "named"), [(0.5, True), (0.9, False)])
 def test_an_actuators_effect_that_takes_more_of_the_effort_than_it_may_is_kept_and_rejected(
     monkeypatch, least, named
