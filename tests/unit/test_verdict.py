@@ -266,6 +266,7 @@ def test_a_second_name_that_is_open_does_not_take_the_first_one_with_it():
     assert (decision.verdict, decision.named) == NAMED
     assert decision.joint >= 0.8
     assert all(decision.probability[label] < 0.8 for label in ("a", "b") if label in decision.probability)
+    assert decision.equivalent == ()  # that a and b are not separated says nothing of friction
 
 
 @pytest.mark.parametrize(("floor", "expected"), [(0.03, "missing_physics"), (0.01, "undecided")])

@@ -5,7 +5,7 @@ from typing import Any
 
 import yaml
 
-from rhythmid.body.mujoco_body import mujoco
+from rhythmid.body.robot_file import mujoco
 from rhythmid.document import as_node
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError

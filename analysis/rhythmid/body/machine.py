@@ -25,7 +25,8 @@ from pydantic import ConfigDict, StrictBool, TypeAdapter
 from pydantic import Field as Limits
 
 from rhythmid.body.body import BODY
-from rhythmid.body.mujoco_body import FIXED, FREE, MujocoBody
+from rhythmid.body.mujoco_body import MujocoBody
+from rhythmid.body.robot_file import FIXED, FREE
 from rhythmid.document import Node, read
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.elements.element import SLOTS, Element, Parameter

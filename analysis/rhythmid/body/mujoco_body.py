@@ -14,20 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.body.body import Array, Body, Joint, Passive
+from rhythmid.body.robot_file import FIXED, FREE, LEAST_MASS, mujoco, read_robot, refused, warnings_told
 from rhythmid.errors import InputError
 
-MISSING = "machines of several joints need MuJoCo: pip install 'rhythmid[legs]'"
-FIXED, FREE = "fixed", "free"
 HEAVIEST = 1e6  # [kg] a link with a larger mass is a mistake
-
-
-def mujoco() -> Any:
-    """The module `mujoco`. Raises InputError where it is not installed."""
-    try:
-        import mujoco as module
-    except ImportError:
-        raise InputError(MISSING) from None
-    return module
+WEIGHTLESS = (
+    1e-10  # [kg] links that weigh less together have no mass of their own, but what makes them divisible
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +35,7 @@ class MujocoBody(Body):
     contacts: bool = True
     passive: Mapping[str, Passive] = field(default_factory=dict)
     given: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()  # in words, what of the file was left out or changed
 
     @classmethod
     def load(
@@ -52,20 +46,12 @@ class MujocoBody(Body):
         The file's viscous damping and dry friction of joints are taken out of it, see `passive`; its actuators are switched off.
         """
         mj, path = mujoco(), Path(path)
-        if not path.is_file():
-            raise InputError(f"{path}: no such file")
-        try:
-            spec = mj.MjSpec.from_file(str(path))
-            if base == FIXED:
-                floating = [one for one in spec.joints if one.type == mj.mjtJoint.mjJNT_FREE]
-                for one in (
-                    *floating,
-                    *(spec.keys if floating else ()),
-                ):  # key frames hold its positions, too
-                    spec.delete(one)
-            model = spec.compile()
-        except (ValueError, mj.FatalError) as error:
-            raise InputError(f"{path}: MuJoCo refuses it: {' '.join(str(error).split())}") from None
+        robot = read_robot(path, base, contacts)
+        with warnings_told() as told:
+            try:
+                model = robot.spec.compile()
+            except (ValueError, mj.FatalError) as error:
+                raise refused(path, error) from None
         joints, passive = _joints(model, path), _passive(model)
         if base not in (FIXED, FREE, *joints):
             raise InputError(f"{path}: base: {base!r} is neither fixed, free nor a joint; {_listed(joints)}")
@@ -74,7 +60,7 @@ class MujocoBody(Body):
         weightless = [
             model.body(i).name
             for i in range(1, model.nbody)
-            if model.body_mass[i] <= 0.0 and model.body_jntnum[i] > 0 and model.body_subtreemass[i] <= 0.0
+            if model.body_jntnum[i] > 0 and model.body_subtreemass[i] < WEIGHTLESS
         ]
         if weightless:
             raise InputError(f"{path}: the link {weightless[0]!r} moves but has no mass")
@@ -85,7 +71,16 @@ class MujocoBody(Body):
         off = mj.mjtDisableBit.mjDSBL_ACTUATION | mj.mjtDisableBit.mjDSBL_AUTORESET
         off = off if contacts else off | mj.mjtDisableBit.mjDSBL_CONTACT
         model.opt.disableflags |= int(off)
-        return cls(path, model, joints, float(model.opt.timestep), base, contacts, passive)
+        return cls(
+            path,
+            model,
+            joints,
+            float(model.opt.timestep),
+            base,
+            contacts,
+            passive,
+            notes=(*robot.notes, *told),
+        )
 
     def with_losses(self, joints: Iterable[str]) -> "MujocoBody":
         """A copy in which these joints, which have no path, lose again what the file says: a rail on which the base slides."""
@@ -112,7 +107,7 @@ class MujocoBody(Body):
         return {
             self.model.body(i).name: i
             for i in range(1, self.model.nbody)
-            if self.model.body_weldid[i] != 0 and self.model.body_mass[i] > 0.0
+            if self.model.body_weldid[i] != 0 and self.model.body_mass[i] > LEAST_MASS
         }
 
     def joint_of(self, link: str) -> str:

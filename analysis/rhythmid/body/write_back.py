@@ -7,12 +7,14 @@ MJCF holds the paths themselves, too: `rhythmid.mujoco.apply` makes them act in 
 
 import os
 import xml.etree.ElementTree as tree
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from rhythmid.body.embedded import NAME, text_of
 from rhythmid.body.live_source import generate_live, numbers_of, rows_of
 from rhythmid.body.machine import Machine
-from rhythmid.body.mujoco_body import FIXED, mujoco
+from rhythmid.body.mujoco_body import MujocoBody
+from rhythmid.body.robot_file import read_robot
 from rhythmid.errors import InputError
 from rhythmid.export import mujoco as mjcf
 from rhythmid.export.from_model import joint_of
@@ -81,8 +83,7 @@ def losses_of(machine: Machine, joint: str) -> tuple[float, float]:
 
 def mjcf_of(machine: Machine, folder: Path) -> str:
     """The body's file with the machine's values, as MJCF that stands in `folder`."""
-    mj = mujoco()
-    spec = mj.MjSpec.from_file(str(machine.body.path))
+    spec = read_robot(machine.body.path, machine.body.base, machine.body.contacts).spec
     model = machine.body.model
     for link, number in machine.body.links.items():
         body = spec.body(link)
@@ -90,17 +91,13 @@ def mjcf_of(machine: Machine, folder: Path) -> str:
         body.mass = float(model.body_mass[number])
         body.ipos, body.iquat = model.body_ipos[number], model.body_iquat[number]
         body.inertia = model.body_inertia[number]
-    if machine.body.base == FIXED:
-        floating = [one for one in spec.joints if one.type == mj.mjtJoint.mjJNT_FREE]
-        for one in (*floating, *(spec.keys if floating else ())):
-            spec.delete(one)
-    folders = {"meshdir": [*spec.meshes, *spec.hfields], "texturedir": spec.textures}
-    for kind in (one for one, files in folders.items() if files):  # relative to the file that is written
-        known = machine.body.path.resolve().parent / getattr(spec, kind)
-        setattr(spec, kind, os.path.relpath(known, folder.resolve()))
     step = min(float(spec.option.timestep), machine.body.step)
     spec.compile()
     root = tree.fromstring(spec.to_xml())
+    folders = {"meshdir": [*spec.meshes, *spec.hfields], "texturedir": spec.textures}
+    for kind in (one for one, files in folders.items() if files):  # relative to the file that is written
+        known = machine.body.path.resolve().parent / getattr(spec, kind)
+        _section(root, "compiler").set(kind, os.path.relpath(known, folder.resolve()))
     _values(root, machine)
     if not machine.body.contacts:
         _section(_section(root, "option"), "flag").set("contact", "disable")
@@ -170,6 +167,32 @@ def _embed(root: tree.Element, machine: Machine, step: float) -> None:
     tree.SubElement(custom, "text", name=NAME, data=text_of(machine.paths))
 
 
+def _carrier(link: str, parents: Mapping[str, str], moving: Collection[str]) -> str:
+    """The moving link that a link of a URDF is part of: itself, or the nearest one to which fixed joints lead."""
+    while link not in moving and link in parents:
+        link = parents[link]
+    return link
+
+
+def _fixed_to(root: tree.Element) -> dict[str, str]:
+    """The link to which each link of a URDF that does not move against it is fixed."""
+    ends = [
+        [one.get("link", "") for end in ("child", "parent") for one in joint.findall(end)]
+        for joint in root.iter("joint")
+        if joint.get("type") == "fixed"
+    ]
+    return dict(ends)
+
+
+def _scale(link: tree.Element, share: float) -> None:
+    """Scale mass and inertia of a link of a URDF."""
+    if (mass := link.find("inertial/mass")) is not None:
+        mass.set("value", repr(share * float(mass.get("value", "1"))))
+    if (inertia := link.find("inertial/inertia")) is not None:
+        for key, value in inertia.attrib.items():
+            inertia.set(key, repr(share * float(value)))
+
+
 def urdf_of(machine: Machine) -> str:
     """The body's URDF with the machine's values. Raises InputError where the body's file is no URDF."""
     if machine.kind != "urdf":
@@ -177,18 +200,12 @@ def urdf_of(machine: Machine) -> str:
             f"{machine.body.path}: is no URDF, so none can be written from it; write .xml (MJCF)"
         )
     document = tree.parse(machine.body.path)
-    known = machine.body.parameters
+    known, given = machine.body.parameters, MujocoBody.load(machine.body.path, contacts=False).parameters
+    fixed = _fixed_to(document.getroot())
     for link in document.iter("link"):
-        mass = link.find("inertial/mass")
-        name = f"{link.get('name')}.mass"
-        if mass is None or name not in known:
-            continue
-        share = known[name] / float(mass.get("value", "1"))
-        mass.set("value", repr(known[name]))
-        inertia = link.find("inertial/inertia")
-        for key, value in (inertia.attrib if inertia is not None else {}).items():
-            assert inertia is not None
-            inertia.set(key, repr(share * float(value)))
+        name = f"{_carrier(str(link.get('name')), fixed, machine.body.links)}.mass"
+        if name in known:
+            _scale(link, known[name] / given[name])
     for joint in document.iter("joint"):
         if (name := str(joint.get("name"))) not in machine.paths:
             continue

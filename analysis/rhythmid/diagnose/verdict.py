@@ -51,7 +51,7 @@ class Decision:
     probability : of each of them, by label.
     joint : joint probability of all `named`.
     weights : of each hypothesis, by its key.
-    equivalent : groups of names that the evidence does not separate, the chosen one first.
+    equivalent : groups of names that the evidence does not separate, the chosen one first; of `named` only.
     unexplained : what is left.
     explained : share of what anything explains that the names explain.
     beside : names of effects that the chosen model has, too, too uncertain for the answer to stand by them.
@@ -207,6 +207,7 @@ def decide(
     )
     rule = rule_for(found)
     named = stated if rule.verdict == "missing_physics" else labels
+    told = {names[label] for label in named}
     return Decision(
         rule.verdict,
         rule.reason_of(found),
@@ -216,7 +217,7 @@ def decide(
         each,
         probability(stated or labels),
         weights,
-        groups,
+        tuple(group for group in groups if group[0] in told),
         left,
         1.0 - left.share,
         tuple(names[label] for label in labels if label not in named),

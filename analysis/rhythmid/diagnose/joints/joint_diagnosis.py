@@ -118,7 +118,7 @@ def diagnose_machine(
     answers = {joint: _answer(one) for joint, one in found.items()}
     stated = {joint: stated_at(one) for joint, one in found.items()}
     told = () if records[0].sampled else tuple(told_of(balances.leads))
-    notes = (*said, *of_holdout, *told)
+    notes = (*machine.body.notes, *said, *of_holdout, *told)
     diagnosis = compose_machine(nominal, found, answers, stated, links, refused, notes)
     return MachineAnswer(diagnosis, _augmented(machine, found, stated), found)
 

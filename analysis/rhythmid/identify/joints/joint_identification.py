@@ -172,7 +172,7 @@ def identify_machine(
         tell("inertias of the links")
         inertia = estimate_inertia(balances, fits)
     tell("free runs")
-    runs, notes = {}, [*said, *of_holdout]
+    runs, notes = {}, [*machine.body.notes, *said, *of_holdout]
     others = JointBalances.of(machine, unseen, balances)
     try:
         runs["given"] = free_runs(machine, others, unseen).nrmse

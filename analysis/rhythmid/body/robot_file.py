@@ -1,0 +1,203 @@
+"""A robot's MJCF or URDF file as a specification that MuJoCo compiles.
+
+URDF files of real robots seldom compile as they are. Their meshes are named by ROS package (`package://`) or have formats that MuJoCo does not
+read, links that only carry a frame have no mass, and some inertias, rounded or guessed, are those of no rigid body. Masses and
+inertias are what a body needs; its shapes matter only where something touches.
+"""
+
+import os
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.errors import InputError
+
+MISSING = "machines of several joints need MuJoCo: pip install 'rhythmid[legs]'"
+FIXED, FREE = "fixed", "free"
+MESHES = (".stl", ".obj", ".msh")  # formats that MuJoCo reads (its documentation, "mesh")
+PACKAGE, FILE = "package://", "file://"
+# [kg, kg m^2] of a moving link that has no mass of its own, so that MuJoCo can divide by it
+LEAST_MASS, LEAST_INERTIA = 1e-12, 1e-14
+ROUNDING = 1e-9  # of a moment by which it stays within what is possible, so that MuJoCo's own rounding does not refuse it
+ROUNDED = 1e-3  # share by which an inertia may be impossible through rounding in the file, about which nothing is said
+
+
+def mujoco() -> Any:
+    """The module `mujoco`. Raises InputError where it is not installed."""
+    try:
+        import mujoco as module
+    except ImportError:
+        raise InputError(MISSING) from None
+    return module
+
+
+@dataclass(frozen=True)
+class RobotFile:
+    """What is in a robot's file.
+
+    Attributes
+    ----------
+    spec : a `mujoco.MjSpec`, to be compiled.
+    notes : in words, what had to be left out or changed.
+    """
+
+    spec: Any
+    notes: tuple[str, ...] = ()
+
+
+def read_robot(path: Path, base: str = FIXED, contacts: bool = True) -> RobotFile:
+    """The specification in a file, without the free joint of a base that is fixed.
+
+    Of a URDF meshes are left out where there are no contacts. Raises InputError where contacts need one that cannot be read, and where
+    MuJoCo refuses the file.
+    """
+    mj = mujoco()
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    with warnings_told() as told:
+        try:
+            spec = mj.MjSpec.from_file(str(path))
+        except (ValueError, mj.FatalError) as error:
+            raise refused(path, error) from None
+    if base == FIXED:
+        floating = [one for one in spec.joints if one.type == mj.mjtJoint.mjJNT_FREE]
+        for one in (*floating, *(spec.keys if floating else ())):  # key frames hold its positions, too
+            spec.delete(one)
+    if path.suffix.lower() != ".urdf":
+        return RobotFile(spec, tuple(told))
+    spec.compiler.inertiafromgeom = 0  # a link without <inertial> has no mass, whatever its shape
+    spec.compiler.boundmass, spec.compiler.boundinertia = LEAST_MASS, LEAST_INERTIA
+    if contacts:
+        _find_meshes(spec, path)
+    else:
+        _leave_meshes_out(spec)
+    return RobotFile(spec, (*told, *_held_fast(spec), *_with_possible_inertias(spec)))
+
+
+@contextmanager
+def warnings_told() -> Iterator[list[str]]:
+    """MuJoCo's warnings, a line each, which it would otherwise print and write to a file in the current folder."""
+    mj, told = mujoco(), list[str]()
+    before = mj.get_mju_user_warning()
+    mj.set_mju_user_warning(lambda line: told.append(" ".join(line.split())))
+    try:
+        with warnings.catch_warnings(record=True) as others:
+            yield told
+    finally:
+        mj.set_mju_user_warning(before)
+    told.extend(str(one.message) for one in others)
+
+
+def refused(path: Path, error: Exception) -> InputError:
+    """What MuJoCo says of a file, in one line."""
+    return InputError(f"{path}: MuJoCo refuses it: {' '.join(str(error).split())}")
+
+
+def _leave_meshes_out(spec: Any) -> None:
+    for shape in [one for one in spec.geoms if one.type == mujoco().mjtGeom.mjGEOM_MESH]:
+        spec.delete(shape)
+    for mesh in list(spec.meshes):
+        spec.delete(mesh)
+
+
+def _find_meshes(spec: Any, path: Path) -> None:
+    """Give every mesh the place of its file. Raises InputError where there is none that MuJoCo reads."""
+    folder = path.resolve().parent
+    unreadable = []
+    for mesh in spec.meshes:
+        found = mesh_file(mesh.file, folder)
+        if found is None or found.suffix.lower() not in MESHES:
+            unreadable.append(mesh.file)
+        else:
+            mesh.file = os.path.relpath(found, folder)
+    if unreadable:
+        raise InputError(
+            f"{path}: {len(unreadable)} of {len(spec.meshes)} meshes cannot be read, the first is {unreadable[0]}: where nothing touches, write "
+            f"contacts: false under body:; else MuJoCo reads {', '.join(MESHES)}, and packages are sought above the file, on ROS_PACKAGE_PATH "
+            "and in share/ on AMENT_PREFIX_PATH"
+        )
+
+
+def mesh_file(name: str, folder: Path) -> Path | None:
+    """The file that a mesh is named by, in a URDF in `folder`; None where there is none.
+
+    A package is a folder of that name above the file, or in one of ROS_PACKAGE_PATH, or in share/ of one of AMENT_PREFIX_PATH.
+    """
+    if name.startswith(PACKAGE):
+        package = name.removeprefix(PACKAGE)
+        places = [
+            *folder.parents,
+            folder,
+            *_listed("ROS_PACKAGE_PATH"),
+            *(one / "share" for one in _listed("AMENT_PREFIX_PATH")),
+        ]
+        named = [one / package for one in places]
+    else:
+        named = [folder / name.removeprefix(FILE)]
+    return next((one for one in named if one.is_file()), None)
+
+
+def _listed(variable: str) -> list[Path]:
+    return [Path(one) for one in os.environ.get(variable, "").split(os.pathsep) if one]
+
+
+def _held_fast(spec: Any) -> Iterator[str]:
+    """Take out the joints that move no mass, such as those of a gripper that is described by its shapes only."""
+    idle = [joint for joint in spec.joints if _mass_beyond(joint.parent) == 0.0]
+    if idle:
+        yield f"held fast, because what they move has no mass: {', '.join(joint.name for joint in idle)}"
+    names = {joint.name for joint in idle}
+    for one in [one for one in spec.equalities if names & {one.name1, one.name2}]:
+        spec.delete(one)
+    for joint in idle:
+        spec.delete(joint)
+
+
+def _mass_beyond(link: Any) -> float:
+    """Mass [kg] of a link and of all that hang on it."""
+    return float(sum(one.mass for one in (link, *link.find_all("body"))))
+
+
+def _with_possible_inertias(spec: Any) -> Iterator[str]:
+    """Replace inertias that no rigid body has by the nearest possible ones."""
+    for link in spec.bodies:
+        if not link.explicitinertial or not np.all(np.isfinite(link.fullinertia)):
+            continue
+        own = _matrix(link.fullinertia)
+        moments, axes = np.linalg.eigh(own)
+        nearest = possible_moments(moments)
+        change, size = float(np.max(np.abs(nearest - moments))), float(np.max(np.abs(moments)))
+        if change == 0.0:
+            continue
+        near = axes @ np.diag(nearest) @ axes.T
+        link.fullinertia = near[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        if change > ROUNDED * size:
+            yield (
+                f"the inertia of link {link.name!r} is that of no rigid body (principal moments "
+                f"{', '.join(f'{one:.3g}' for one in moments)} kg*m^2); the nearest possible one is taken"
+            )
+
+
+def _matrix(six: Any) -> NDArray[np.float64]:
+    """The inertia (3, 3) of xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = (float(one) for one in six)
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def possible_moments(moments: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The principal moments of inertia (3,) of a rigid body nearest to these, in ascending order.
+
+    None is negative, and none is greater than the sum of the other two (L. D. Landau, E. M. Lifshitz, Mechanics, section 32).
+    """
+    low, middle, high = np.maximum(moments, LEAST_INERTIA)
+    beyond = high - low - middle
+    if beyond <= 0.0:
+        return np.array([low, middle, high])
+    third = beyond / 3.0 * (1.0 + ROUNDING)
+    return np.array([low + third, middle + third, high - third])

@@ -1,0 +1,130 @@
+"""Robot files as they are published: meshes by package, links without mass, inertias that no body has."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rhythmid.body.machine import Machine
+from rhythmid.body.mujoco_body import MujocoBody
+from rhythmid.body.robot_file import mesh_file, possible_moments
+from rhythmid.body.write_back import save_machine
+from rhythmid.errors import InputError
+
+LINK = '<inertial><origin xyz="0 0 -0.1"/><mass value="{mass}"/><inertia ixx="{ixx}" iyy="0.01" izz="{izz}" ixy="0" ixz="0" iyz="0"/></inertial>'
+MESH = '<collision><geometry><mesh filename="{mesh}"/></geometry></collision>'
+TETRAHEDRON = """v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"""
+
+
+def urdf(
+    mesh: str = "package://arm/meshes/upper.dae", mass: float = 1.0, ixx: float = 0.01, izz: float = 0.001
+) -> str:
+    """An arm: a base, a link that moves, a tool fixed to it, and a finger without mass."""
+    link = LINK.format(mass=mass, ixx=ixx, izz=izz)
+    return f"""<robot name="arm"><link name="base"/>
+<link name="upper">{link}{MESH.format(mesh=mesh)}</link>
+<link name="tool">{LINK.format(mass=0.5, ixx=0.01, izz=0.001)}</link>
+<link name="finger"><visual><geometry><sphere radius="0.01"/></geometry></visual></link>
+<joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>
+<joint name="mount" type="fixed"><parent link="upper"/><child link="tool"/><origin xyz="0 0 -0.3"/></joint>
+<joint name="grip" type="prismatic"><parent link="tool"/><child link="finger"/><axis xyz="1 0 0"/><limit lower="0" upper="0.01" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+def written(folder: Path, **values: object) -> Path:
+    path = folder / "arm.urdf"
+    path.write_text(urdf(**values))  # pyright: ignore[reportArgumentType]
+    return path
+
+
+def test_meshes_do_not_matter_where_nothing_touches(tmp_path: Path):
+    body = MujocoBody.load(written(tmp_path), contacts=False)
+    assert list(body.joints) == ["shoulder"]
+    assert body.parameters["upper.mass"] == pytest.approx(1.5)  # the tool is a part of it
+
+
+def test_a_mesh_that_contacts_need_and_nobody_can_read_is_told_with_what_to_do(tmp_path: Path):
+    with pytest.raises(InputError, match=r"upper\.dae.*contacts: false") as caught:
+        MujocoBody.load(written(tmp_path))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("place", ["above", "ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH", "beside"])
+def test_a_mesh_is_found_where_ros_puts_packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str):
+    folder = {
+        "above": tmp_path / "arm",
+        "ROS_PACKAGE_PATH": tmp_path / "ws" / "arm",
+        "AMENT_PREFIX_PATH": tmp_path / "opt" / "share" / "arm",
+        "beside": tmp_path / "arm" / "urdf",
+    }[place]
+    (folder / "meshes").mkdir(parents=True)
+    (folder / "meshes" / "upper.obj").write_text(TETRAHEDRON)
+    (tmp_path / "arm" / "urdf").mkdir(parents=True, exist_ok=True)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "ws"))
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "opt"))
+    name = "meshes/upper.obj" if place == "beside" else "package://arm/meshes/upper.obj"
+    body = MujocoBody.load(written(tmp_path / "arm" / "urdf", mesh=name))
+    assert body.model.nmesh == 1
+    assert mesh_file("package://hand/meshes/upper.obj", tmp_path / "arm" / "urdf") is None
+
+
+def test_joints_that_move_no_mass_are_held_fast_and_told(tmp_path: Path):
+    notes = MujocoBody.load(written(tmp_path), contacts=False).notes
+    assert notes == ("held fast, because what they move has no mass: grip",)
+
+
+def test_an_inertia_that_no_body_has_is_replaced_by_the_nearest_and_told(tmp_path: Path):
+    body = MujocoBody.load(written(tmp_path, ixx=0.1), contacts=False)
+    assert "inertia of link 'upper' is that of no rigid body" in body.notes[-1]
+
+
+def test_an_inertia_that_is_impossible_through_rounding_only_is_not_told(tmp_path: Path):
+    body = MujocoBody.load(written(tmp_path, ixx=0.010001, izz=0.000001), contacts=False)
+    assert len(body.notes) == 1
+
+
+@given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3))
+def test_possible_moments_are_those_of_a_rigid_body_and_near(given_moments: list[float]):
+    moments = np.sort(given_moments)
+    low, middle, high = possible_moments(moments)
+    assert 0.0 < low <= middle <= high <= (low + middle) * (1.0 + 1e-12)
+    if moments[0] >= 1e-6 and moments[2] <= moments[0] + moments[1]:
+        np.testing.assert_array_equal((low, middle, high), moments)
+
+
+def test_mujocos_warnings_are_notes_and_leave_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "arm.urdf").write_text(urdf().replace('upper="0.01"', 'upper="0"'))
+    body = MujocoBody.load(tmp_path / "arm.urdf", contacts=False)
+    assert "joint 'grip' has equal lower and upper limits, limit ignored" in body.notes
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["arm.urdf"]
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_link_that_is_fixed_to_another_is_scaled_with_it(tmp_path: Path):
+    written(tmp_path)
+    (tmp_path / "arm.yaml").write_text("body: {urdf: arm.urdf, contacts: false}\njoints: {shoulder: {}}\n")
+    machine = Machine.load(tmp_path / "arm.yaml").with_inertial({"upper.mass": 3.0})
+    for name in ("better.urdf", "better.xml"):
+        save_machine(machine, tmp_path / name)
+        again = MujocoBody.load(tmp_path / name, contacts=False)
+        assert again.parameters["upper.mass"] == pytest.approx(3.0)
+        motion = np.array([[0.3]]), np.array([[0.5]]), np.array([[2.0]])
+        np.testing.assert_allclose(again.inverse(*motion), machine.body.inverse(*motion), rtol=1e-9)
+
+
+def test_an_mjcf_with_meshes_is_written_into_another_folder(tmp_path: Path):
+    (tmp_path / "robot" / "meshes").mkdir(parents=True)
+    (tmp_path / "robot" / "meshes" / "upper.obj").write_text(TETRAHEDRON)
+    (tmp_path / "robot" / "arm.xml").write_text(
+        "<mujoco><compiler meshdir='meshes'/><asset><mesh name='upper' file='upper.obj'/></asset><worldbody><body name='upper'>"
+        "<joint name='shoulder' axis='0 1 0'/><geom type='mesh' mesh='upper' mass='1'/></body></worldbody></mujoco>"
+    )
+    (tmp_path / "robot" / "arm.yaml").write_text("body: {mjcf: arm.xml}\njoints: {shoulder: {}}\n")
+    save_machine(Machine.load(tmp_path / "robot" / "arm.yaml"), tmp_path / "better.xml")
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "better.xml")).nmesh == 1
