@@ -18,8 +18,8 @@ import numpy as np
 from rhythmid.body.body import Array, Joint
 from rhythmid.body.embedded import paths_in
 from rhythmid.body.live_source import ARRAYS, generate_live, numbers_of, rows_of
-from rhythmid.body.robot_file import mujoco
 from rhythmid.body.path_source import COLUMNS, Layout
+from rhythmid.body.robot_file import mujoco
 from rhythmid.body.simulate import start_states, vector_of
 from rhythmid.errors import InputError
 from rhythmid.model import Model

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from foreign import moved, roles_of, tones
 
+from rhythmid.errors import InputError
 from rhythmid.start.start import guess, start
 
 TIME = np.arange(8000) * foreign.STEP
@@ -99,3 +100,34 @@ def test_two_motions_of_which_neither_drives_the_other_are_joints(tmp_path):
     )
     np.savez(tmp_path / "run.npz", t=TIME, arm_rad=arm, lift_mm=1e3 * lift)
     assert roles_of(tmp_path / "run.npz") == {"output": "lift_mm"}
+
+
+def test_a_device_says_less_of_a_quantity_than_a_word_for_it(tmp_path):
+    np.savetxt(
+        tmp_path / "run.csv",
+        np.column_stack([TIME, V, FORCE]),
+        delimiter=",",
+        header="t,vel encoder,duty",
+        comments="",
+    )
+    begun = start([tmp_path / "run.csv"])
+    assert begun.guess.roles.output_kind == "velocity"
+    assert begun.nominal.model.units.force == "1"  # a share of full duty
+
+
+def test_a_second_angle_is_no_effort(tmp_path):
+    np.savez(tmp_path / "run.npz", time=TIME, phi=X, psi=0.3 * np.roll(X, 40))
+    assert "input" not in roles_of(tmp_path / "run.npz")
+
+
+def test_a_table_of_another_layout_is_told_as_such_and_no_file_is_named_that_is_not_there(tmp_path):
+    np.savez(tmp_path / "a.npz", t=TIME, x=X, f=FORCE)
+    np.savez(tmp_path / "b.npz", t=TIME, x=X, u=FORCE)
+    with pytest.raises(InputError, match=r"^guessed signals\.yaml:\d+: input: .*b\.npz: has no column 'f'"):
+        start([tmp_path / "a.npz", tmp_path / "b.npz"])
+
+
+def test_a_time_of_another_length_is_told(tmp_path):
+    np.savez(tmp_path / "run.npz", t=TIME[:-9], x=X, f=FORCE)
+    with pytest.raises(InputError, match="of another length than their 8000 rows: t has 7991 rows"):
+        start([tmp_path / "run.npz"])

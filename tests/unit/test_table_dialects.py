@@ -74,6 +74,13 @@ def test_a_column_of_words_does_not_hide_the_others(tmp_path):
         table.column("state")
 
 
+@pytest.mark.parametrize("empty", [",", ", ,", '"",""'])
+def test_rows_of_empty_cells_below_a_table_are_no_rows(tmp_path, empty):
+    path = tmp_path / "table.csv"
+    path.write_text("t,x\n0,1\n1,2\n" + f"{empty}\n" * 300)
+    np.testing.assert_array_equal(read_text(path)["x"], [1.0, 2.0])
+
+
 def test_an_empty_cell_is_no_number_in_any_column(tmp_path):
     (tmp_path / "run.csv").write_text("t;q\n0;1,5\n1;\n2;2,5\n")
     np.testing.assert_array_equal(Table.load(tmp_path / "run.csv").column("q"), [1.5, np.nan, 2.5])

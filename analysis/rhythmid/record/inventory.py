@@ -120,11 +120,12 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
     if not columns:
         raise InputError(f"{table.path}: holds no column of numbers")
     count = max((len(value) for _, value in columns), key=[len(value) for _, value in columns].count)
+    unequal = [(name, value) for name, value in columns if len(value) != count]
     columns = [(name, value) for name, value in columns if len(value) == count]
     if rate is not None:
         clock, reason, time = Clock("rate", rate=rate), "as given with --rate", np.arange(count) / rate
     else:
-        clock, reason = _table_clock(table.path, columns)
+        clock, reason = _table_clock(table.path, columns, unequal)
         time = dict(columns)[str(clock.column)] * clock.scale
     found, left = [], []
     for name, value in columns:
@@ -197,8 +198,10 @@ def _even(value: Array) -> bool:
     return in_any_unit and float(np.mean(np.abs(step - usual) <= NEAR * usual)) >= USUAL
 
 
-def _table_clock(path: Path, columns: list[tuple[str, Array]]) -> tuple[Clock, str]:
-    """The column that holds the time. Raises InputError where there is none."""
+def _table_clock(
+    path: Path, columns: list[tuple[str, Array]], unequal: list[tuple[str, Array]]
+) -> tuple[Clock, str]:
+    """The column that holds the time. Raises InputError where there is none among those of equal length; `unequal` are the others."""
     for name, value in sorted(columns, key=lambda column: not _is_plain_time(column[0])):
         if _is_time(name, value):
             heading = heading_of(name)
@@ -215,8 +218,10 @@ def _table_clock(path: Path, columns: list[tuple[str, Array]]) -> tuple[Clock, s
                     "column", column=name, scale=scale
                 ), f"the first column that goes forward by steps of one size; {why}"
     names = ", ".join(name for name, _ in columns)
+    others = ", ".join(f"{name} has {len(value)} rows" for name, value in unequal)
+    why = f"; of another length than their {len(columns[0][1])} rows: {others}" if others else ""
     raise InputError(
-        f"{path}: no column goes forward like a time ({names}); give the rows' rate with --rate HZ"
+        f"{path}: no column goes forward like a time ({names}){why}; give the rows' rate with --rate HZ"
     )
 
 

@@ -23,6 +23,7 @@ TEXT = (".csv", ".tsv", ".txt", ".dat")
 COMPRESSED = ".gz"
 COMMENTS = ("#", "%")
 SEPARATORS = ("\t", ";", ",", None)  # None: any number of spaces; in this order where two do equally well
+EMPTY = " \t\r\n;,\"'"  # what a line of empty cells is made of
 LOOKED_AT = 200  # lines from which the dialect is told: more than any head has
 SAMPLE = 1 << 16  # bytes from which the encoding is told
 BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
@@ -180,8 +181,8 @@ def _rows(lines: Iterable[str], dialect: Dialect, columns: tuple[int, ...]) -> n
 
 
 def _content(line: str) -> bool:
-    """Whether a line is anything but blank or a comment."""
-    return bool(line.strip()) and line.lstrip()[0] not in COMMENTS
+    """Whether a line is anything but a comment or empty cells, of which spreadsheets leave thousands below a table."""
+    return bool(line.strip(EMPTY)) and line.lstrip()[0] not in COMMENTS
 
 
 def _cells(line: str, separator: str | None) -> list[str]:

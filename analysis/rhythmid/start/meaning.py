@@ -13,8 +13,8 @@ BY_UNIT: dict[str, Quantity] = {
 }  # fmt: skip
 WORDS: dict[Quantity, frozenset[str]] = {
     "position": frozenset(
-        "position positions pos angle angles theta phi alpha pose height displacement disp encoder enc deflection extension length "
-        "travel rotation".split()
+        "position positions pos angle angles theta phi psi alpha pose height distance displacement disp deflection extension "
+        "length travel rotation".split()
     ),
     "velocity": frozenset("velocity velocities vel speed rate omega twist dq qd qdot thetadot dtheta xdot dx angvel".split()),
     "acceleration": frozenset("acceleration accelerations accel acc ddq qdd xddot ddx".split()),
@@ -23,6 +23,10 @@ WORDS: dict[Quantity, frozenset[str]] = {
         "moment iq".split()
     ),
 }  # fmt: skip
+DEVICES: dict[str, Quantity] = {
+    "encoder": "position",
+    "enc": "position",
+}  # what a device measures, where no word says what it is of
 LETTERS: dict[str, Quantity] = {  # what one letter stands for by custom, where nothing else is said
     "q": "position", "x": "position", "y": "position", "z": "position", "v": "velocity", "w": "velocity", "a": "acceleration",
     "u": "effort", "f": "effort", "i": "effort", "t": "effort",
@@ -146,6 +150,9 @@ def _quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity 
             for quantity, known in WORDS.items():
                 if word in known:
                     return quantity, f"its {where} says {word!r}", True
+    for word in (*reversed(near), *reversed(far)):
+        if word in DEVICES:
+            return DEVICES[word], f"its name says {word!r}", True
     for word in reversed(near):
         if word in LETTERS:
             return LETTERS[word], f"{word!r} usually stands for that", False
@@ -160,7 +167,7 @@ def _joint_of_column(one: Recorded) -> str:
     """What tells a column from others of the same quantity: `3` of dof_pos[3], `knee` of knee_pos; empty for messages."""
     if one.topic:
         return ""
-    known = COMMANDED | MEASURED | GENERIC | FORCING | BASE | frozenset().union(*WORDS.values())
+    known = COMMANDED | MEASURED | GENERIC | FORCING | BASE | frozenset().union(*WORDS.values(), DEVICES)
     left = [word for word in words_of(one.column.replace(one.written_unit, "") if one.written_unit else one.column)
             if word not in known and word not in LETTERS]  # fmt: skip
     return "_".join(left)

@@ -18,6 +18,8 @@ from rhythmid.start.roles import Ask, Roles, first_answer, guess_roles
 from rhythmid.start.written import clock_of, model_yaml, signals_yaml
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
+GUESSED = "guessed signals.yaml"  # what messages call the file that is not written yet
+
 
 @dataclass(frozen=True, eq=False)
 class Guess:
@@ -64,7 +66,7 @@ def guess(
     clock, reason = clock_of(found, roles)
     text = signals_yaml(found, roles, units, clock, reason)
     try:
-        read_record(source, Signals.from_text(text))
+        read_record(source, Signals.from_text(text, GUESSED))
     except InputError as error:
         if clock.kind != "header":
             raise
@@ -92,7 +94,7 @@ def start(
     Raises InputError, one line, where a source cannot be read, or nothing in it can be a motion.
     """
     guessed = guess(sources[0], joint, rate, ask)
-    records = load_records(sources, Signals.from_text(guessed.signals))
+    records = load_records(sources, Signals.from_text(guessed.signals, GUESSED))
     catalogue = load_catalogue() if catalogue is None else catalogue
     units = _units(guessed.roles)
     nominal = nominal_of(records, guessed.roles, units, catalogue)

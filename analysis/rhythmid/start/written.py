@@ -91,7 +91,7 @@ def model_yaml(nominal: Nominal, roles: Roles, units: Units, explicit: bool) -> 
     ]
     if explicit:
         lines.append(
-            f"units: {{force: {units.force}, position: {units.position}, mass: {json.dumps(units.mass)}}}"
+            f"units: {{force: {json.dumps(units.force)}, position: {units.position}, mass: {json.dumps(units.mass)}}}"
         )
     lines += ["", *_why(INERTIA, nominal), f"inertia: {{mass: {_value(model.mass)}}}"]
     for slot in SLOTS:
