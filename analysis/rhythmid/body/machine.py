@@ -146,6 +146,8 @@ class Machine:
         path = self.body.path if beside is None else Path(os.path.relpath(self.body.path, beside))
         body: dict[str, Any] = {self.kind: str(path), "base": self.body.base}
         body |= {"step": self.body.step, "contacts": self.body.contacts}
+        if self.body.hold:
+            body["hold"] = dict(self.body.hold)
         if self.inertial:
             body["free"] = {
                 name: entry_of(value, _inertial_parameter(name)) | {"fixed": value.fixed}
@@ -220,6 +222,7 @@ class _Body:
     base: str = FIXED
     step: Annotated[Number, Limits(ge=1e-7, le=LONGEST_STEP)] | None = None
     contacts: StrictBool = True
+    hold: list[str] | dict[str, Number] | None = None
     free: dict[str, Any] | None = None
 
 
@@ -233,7 +236,8 @@ def _body(node: Node, folder: Path) -> tuple[MujocoBody, str]:
         node.fail("name one file: mjcf: leg.xml, or urdf: leg.urdf")
     kind, name = next(iter(named.items()))
     try:
-        return MujocoBody.load(folder / name, given.base, given.step, given.contacts), kind
+        hold = given.hold if isinstance(given.hold, dict) else dict.fromkeys(given.hold or (), 0.0)
+        return MujocoBody.load(folder / name, given.base, given.step, given.contacts, hold), kind
     except InputError as error:
         raise InputError(f"{node.at(kind).place}: {error}") from None
 

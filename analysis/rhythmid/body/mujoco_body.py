@@ -36,17 +36,23 @@ class MujocoBody(Body):
     passive: Mapping[str, Passive] = field(default_factory=dict)
     given: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()  # in words, what of the file was left out or changed
+    hold: Mapping[str, float] = field(default_factory=dict)  # positions of the file's joints that are held
 
     @classmethod
     def load(
-        cls, path: str | Path, base: str = FIXED, step: float | None = None, contacts: bool = True
+        cls,
+        path: str | Path,
+        base: str = FIXED,
+        step: float | None = None,
+        contacts: bool = True,
+        hold: Mapping[str, float] | None = None,
     ) -> "MujocoBody":
-        """The body in a file. Raises InputError where MuJoCo refuses the file, or `base` is no joint of it.
+        """The body in a file, some of its joints held fast. Raises InputError where MuJoCo refuses the file, or `base` is no joint of it.
 
         The file's viscous damping and dry friction of joints are taken out of it, see `passive`; its actuators are switched off.
         """
         mj, path = mujoco(), Path(path)
-        robot = read_robot(path, base, contacts)
+        robot = read_robot(path, base, contacts, hold)
         with warnings_told() as told:
             try:
                 model = robot.spec.compile()
@@ -80,6 +86,7 @@ class MujocoBody(Body):
             contacts,
             passive,
             notes=(*robot.notes, *told),
+            hold=hold or {},
         )
 
     def with_losses(self, joints: Iterable[str]) -> "MujocoBody":

@@ -7,7 +7,7 @@ inertias are what a body needs; its shapes matter only where something touches.
 
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from rhythmid.errors import InputError
 
@@ -51,8 +52,10 @@ class RobotFile:
     notes: tuple[str, ...] = ()
 
 
-def read_robot(path: Path, base: str = FIXED, contacts: bool = True) -> RobotFile:
-    """The specification in a file, without the free joint of a base that is fixed.
+def read_robot(
+    path: Path, base: str = FIXED, contacts: bool = True, hold: Mapping[str, float] | None = None
+) -> RobotFile:
+    """The specification in a file, without the free joint of a base that is fixed, and with the joints in `hold` fixed at these positions.
 
     Of a URDF meshes are left out where there are no contacts. Raises InputError where contacts need one that cannot be read, and where
     MuJoCo refuses the file.
@@ -70,14 +73,17 @@ def read_robot(path: Path, base: str = FIXED, contacts: bool = True) -> RobotFil
         for one in (*floating, *(spec.keys if floating else ())):  # key frames hold its positions, too
             spec.delete(one)
     if path.suffix.lower() != ".urdf":
-        return RobotFile(spec, tuple(told))
+        _hold(spec, hold or {}, path)
+        return RobotFile(spec, (*told, *_coupled(spec)))
     spec.compiler.inertiafromgeom = 0  # a link without <inertial> has no mass, whatever its shape
     spec.compiler.boundmass, spec.compiler.boundinertia = LEAST_MASS, LEAST_INERTIA
     if contacts:
         _find_meshes(spec, path)
     else:
         _leave_meshes_out(spec)
-    return RobotFile(spec, (*told, *_held_fast(spec), *_with_possible_inertias(spec)))
+    told.extend(_with_possible_inertias(spec))
+    _hold(spec, hold or {}, path)
+    return RobotFile(spec, (*told, *_held_fast(spec), *_coupled(spec)))
 
 
 @contextmanager
@@ -147,16 +153,74 @@ def _listed(variable: str) -> list[Path]:
     return [Path(one) for one in os.environ.get(variable, "").split(os.pathsep) if one]
 
 
+def _hold(spec: Any, hold: Mapping[str, float], path: Path) -> None:
+    """Take joints out, the links that they move turned or shifted to where the joints are at these positions.
+
+    Raises InputError where the file has no such hinge or slide.
+    """
+    mj = mujoco()
+    kinds = mj.mjtJoint.mjJNT_HINGE, mj.mjtJoint.mjJNT_SLIDE
+    joints = {one.name: one for one in spec.joints if one.type in kinds}
+    for name in hold:
+        if name not in joints:
+            raise InputError(f"{path}: hold: has no hinge or slide {name!r}; its joints: {', '.join(joints)}")
+    drawn = _compiled(spec.copy(), path) if any(hold.values()) else None
+    for name, position in hold.items():
+        if drawn is not None:
+            _turn(joints[name], drawn, position)
+    _take_out(spec, [joints[name] for name in hold])
+
+
+def _turn(joint: Any, drawn: Any, position: float) -> None:
+    """Put the link that a joint moves where it is at this position; `drawn` is the compiled file, whose frames all are in one form."""
+    link, known = joint.parent, drawn.joint(joint.name)
+    number = int(known.bodyid[0])
+    frame = Rotation.from_quat(np.roll(drawn.body_quat[number], -1))
+    moved = (position - float(known.qpos0[0])) * known.axis
+    if joint.type == mujoco().mjtJoint.mjJNT_SLIDE:
+        shift, turn = moved, Rotation.identity()
+    else:
+        turn = Rotation.from_rotvec(moved)
+        shift = known.pos - turn.apply(known.pos)
+    link.pos = drawn.body_pos[number] + frame.apply(shift)
+    link.alt.type = mujoco().mjtOrientation.mjORIENTATION_QUAT
+    link.quat = np.roll((frame * turn).as_quat(), 1)
+
+
+def _compiled(spec: Any, path: Path) -> Any:
+    with warnings_told():
+        try:
+            return spec.compile()
+        except (ValueError, mujoco().FatalError) as error:
+            raise refused(path, error) from None
+
+
 def _held_fast(spec: Any) -> Iterator[str]:
     """Take out the joints that move no mass, such as those of a gripper that is described by its shapes only."""
     idle = [joint for joint in spec.joints if _mass_beyond(joint.parent) == 0.0]
     if idle:
         yield f"held fast, because what they move has no mass: {', '.join(joint.name for joint in idle)}"
-    names = {joint.name for joint in idle}
-    for one in [one for one in spec.equalities if names & {one.name1, one.name2}]:
+    _take_out(spec, idle)
+
+
+def _coupled(spec: Any) -> Iterator[str]:
+    """Joints that the file couples, such as the fingers of a gripper (`mimic` in a URDF)."""
+    for one in spec.equalities:
+        if one.type == mujoco().mjtEq.mjEQ_JOINT and one.name2:
+            yield (
+                f"the file couples {one.name1} to {one.name2}: the force of that coupling is in no balance of efforts; where it does not matter, "
+                f"write hold: [{one.name1}] under body:"
+            )
+
+
+def _take_out(spec: Any, joints: Sequence[Any]) -> None:
+    """Take joints out, and what refers to them: couplings, actuators, sensors, key frames, whose positions have other places then."""
+    names = {joint.name for joint in joints}
+    spoken = [one for one in spec.equalities if names & {one.name1, one.name2}]
+    spoken += [one for one in spec.actuators if one.target in names]
+    spoken += [one for one in spec.sensors if one.objname in names]
+    for one in (*spoken, *(spec.keys if joints else ()), *joints):
         spec.delete(one)
-    for joint in idle:
-        spec.delete(joint)
 
 
 def _mass_beyond(link: Any) -> float:

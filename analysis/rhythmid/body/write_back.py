@@ -83,7 +83,8 @@ def losses_of(machine: Machine, joint: str) -> tuple[float, float]:
 
 def mjcf_of(machine: Machine, folder: Path) -> str:
     """The body's file with the machine's values, as MJCF that stands in `folder`."""
-    spec = read_robot(machine.body.path, machine.body.base, machine.body.contacts).spec
+    known = machine.body
+    spec = read_robot(known.path, known.base, known.contacts, known.hold).spec
     model = machine.body.model
     for link, number in machine.body.links.items():
         body = spec.body(link)
@@ -174,12 +175,12 @@ def _carrier(link: str, parents: Mapping[str, str], moving: Collection[str]) -> 
     return link
 
 
-def _fixed_to(root: tree.Element) -> dict[str, str]:
+def _fixed_to(root: tree.Element, held: Collection[str]) -> dict[str, str]:
     """The link to which each link of a URDF that does not move against it is fixed."""
     ends = [
         [one.get("link", "") for end in ("child", "parent") for one in joint.findall(end)]
         for joint in root.iter("joint")
-        if joint.get("type") == "fixed"
+        if joint.get("type") == "fixed" or joint.get("name") in held
     ]
     return dict(ends)
 
@@ -200,8 +201,10 @@ def urdf_of(machine: Machine) -> str:
             f"{machine.body.path}: is no URDF, so none can be written from it; write .xml (MJCF)"
         )
     document = tree.parse(machine.body.path)
-    known, given = machine.body.parameters, MujocoBody.load(machine.body.path, contacts=False).parameters
-    fixed = _fixed_to(document.getroot())
+    body = machine.body
+    known = body.parameters
+    given = MujocoBody.load(body.path, contacts=False, hold=body.hold).parameters
+    fixed = _fixed_to(document.getroot(), body.hold)
     for link in document.iter("link"):
         name = f"{_carrier(str(link.get('name')), fixed, machine.body.links)}.mass"
         if name in known:
