@@ -27,7 +27,7 @@ from pydantic import Field as Limits
 from rhythmid.body.body import BODY
 from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.body.robot_file import FIXED, FREE
-from rhythmid.document import Node, read
+from rhythmid.document import Node, parse, read
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.elements.element import SLOTS, Element, Parameter
 from rhythmid.errors import InputError
@@ -66,6 +66,11 @@ class Machine:
         """The machine in a YAML file. Raises InputError naming line, parameter and unit of what is wrong."""
         known = load_catalogue() if catalogue is None else catalogue
         return _machine(read(path), Path(path).resolve().parent, known)
+
+    @classmethod
+    def from_text(cls, text: str, folder: Path, catalogue: Catalogue, path: str = "model.yaml") -> "Machine":
+        """The machine in a YAML text that stands for the file `path` in a folder."""
+        return _machine(parse(text, path), folder, catalogue)
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from rhythmid.output import require_new, require_writable, write_text
 EXAMPLES = (
     "rhythmid init run.csv",
     "rhythmid init bag --joint knee --out files --yes",
+    "rhythmid init bag --body robot.urdf",
 )
 
 
@@ -26,6 +27,10 @@ def init(
     out: Annotated[Path, typer.Option("--out", help="Folder for signals.yaml and model.yaml.")] = Path(),
     joint: Annotated[
         str | None, typer.Option("--joint", help="Joint to use; by default the one that moves most.")
+    ] = None,
+    body: Annotated[
+        Path | None,
+        typer.Option("--body", help="MJCF or URDF file of a robot, all of whose recorded joints are meant."),
     ] = None,
     rate: Annotated[
         float | None,
@@ -40,17 +45,26 @@ def init(
 ) -> None:
     """Guess what each channel is and a first nominal model; write both, every guess with its reason."""
     from rhythmid.elements.catalogue import load_catalogue
-    from rhythmid.start.roles import first_answer
-    from rhythmid.start.start import start
 
     if rate is not None and not (math.isfinite(rate) and rate > 0.0):
         raise InputError("--rate is a number of rows a second, greater than 0")
     signals, model = out / "signals.yaml", out / "model.yaml"
     for path in (signals, model):
         require_writable(path) if force else require_new(path)
-    asking = not yes and not quiet and sys.stdin.isatty()
-    begun = start(sources, joint, rate, _prompt if asking else first_answer, load_catalogue(elements or ()))
-    write_text(signals, begun.guess.signals)
+    if body is not None and joint is not None:
+        raise InputError("--joint is one joint, --body are all of a robot; give one of the two")
+    known = load_catalogue(elements or ())
+    if body is not None:
+        from rhythmid.start.robot import start_robot
+
+        begun = start_robot(sources, body, out, rate, known)
+    else:
+        from rhythmid.start.roles import first_answer
+        from rhythmid.start.start import start
+
+        asking = not yes and not quiet and sys.stdin.isatty()
+        begun = start(sources, joint, rate, _prompt if asking else first_answer, known)
+    write_text(signals, begun.signals)
     write_text(model, begun.model)
     terminal = Terminal(quiet)
     for line in begun.lines():

@@ -48,6 +48,11 @@ class Start:
     nominal: Nominal
     model: str
 
+    @property
+    def signals(self) -> str:
+        """The text of signals.yaml."""
+        return self.guess.signals
+
     def lines(self) -> list[str]:
         """The guesses in plain text, one line each."""
         elements = ", ".join(term.label for term in self.nominal.model.terms)

@@ -26,10 +26,10 @@ MEANS = {
 def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clock_reason: str) -> str:
     """The text of signals.yaml."""
     lines = [
-        *_comment(f"Which channel of {found.path.name} is what. Guessed by `rhythmid init`: look through it and correct what is wrong."),
+        *comment(f"Which channel of {found.path.name} is what. Guessed by `rhythmid init`: look through it and correct what is wrong."),
         "",
-        *_comment(f"time: {clock_reason}."),
-        f"time: {_time(clock)}",
+        *comment(f"time: {clock_reason}."),
+        f"time: {time_of(clock)}",
     ]  # fmt: skip
     for role in ROLES:
         if role in roles.choices:
@@ -43,7 +43,7 @@ def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clo
             why = "nothing that was recorded drives the machine" + (
                 "" if "forcing" not in roles.choices else " but the forcing"
             )
-            lines += ["", *_comment(f"input: {why}."), "input: none"]
+            lines += ["", *comment(f"input: {why}."), "input: none"]
     taken = [choice.recorded for choice in roles.choices.values()]
     rest = [
         str(one)
@@ -57,17 +57,17 @@ def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clo
         name, own = roles.joint.name, roles.joint.motion[roles.joint.name]
         lines += [
             "",
-            *_comment(
+            *comment(
                 f"joint: {name}; standard deviation of its motion {own:.3g}. Others (--joint NAME): {moved}."
             ),
         ]
     for note in roles.notes:
-        lines += ["", *_comment(f"CHECK: {note}.")]
+        lines += ["", *comment(f"CHECK: {note}.")]
     if rest:
-        lines += ["", *_comment(f"Recorded too, and not used: {_listed(rest, 3 * LISTED)}.")]
+        lines += ["", *comment(f"Recorded too, and not used: {_listed(rest, 3 * LISTED)}.")]
     if found.left_out:
-        lines += ["", *_comment(f"Left out: {_listed(found.left_out, LISTED)}.")]
-    lines += ["", *_comment("Only a part of the record:"), "# use: [0, 60]                            # s"]
+        lines += ["", *comment(f"Left out: {_listed(found.left_out, LISTED)}.")]
+    lines += ["", *comment("Only a part of the record:"), "# use: [0, 60]                            # s"]
     return "\n".join(lines) + "\n"
 
 
@@ -82,12 +82,12 @@ def model_yaml(nominal: Nominal, roles: Roles, units: Units, explicit: bool) -> 
     """The text of model.yaml; `explicit` where the file has to declare its units."""
     model = nominal.model
     lines = [
-        *_comment(
+        *comment(
             "A nominal model to begin with, guessed by `rhythmid init` from what was recorded: put in what is known of the machine. "
             "All values that are not fixed are estimated."
         ),
         "",
-        *_comment(f"It {'turns' if roles.rotary else 'slides'}: {roles.rotary_reason}."),
+        *comment(f"It {'turns' if roles.rotary else 'slides'}: {roles.rotary_reason}."),
     ]
     if explicit:
         lines.append(
@@ -104,14 +104,14 @@ def model_yaml(nominal: Nominal, roles: Roles, units: Units, explicit: bool) -> 
                     f"  - {_term(term)}",
                 ]
     for remark in nominal.remarks:
-        lines += ["", *_comment(remark)]
+        lines += ["", *comment(remark)]
     return "\n".join(lines) + "\n"
 
 
 def _why(label: str, nominal: Nominal) -> list[str]:
     """The reason for a part of the model, and what is doubtful about it."""
-    lines = _comment(f"{nominal.reasons[label]}.")
-    return lines + (_comment(f"  CHECK: {nominal.doubts[label]}.") if label in nominal.doubts else [])
+    lines = comment(f"{nominal.reasons[label]}.")
+    return lines + (comment(f"  CHECK: {nominal.doubts[label]}.") if label in nominal.doubts else [])
 
 
 def _term(term: Term) -> str:
@@ -124,7 +124,8 @@ def _value(value: Value) -> str:
     )
 
 
-def _time(clock: Clock) -> str:
+def time_of(clock: Clock) -> str:
+    """How signals.yaml says how times are told."""
     if clock.kind == "rate":
         return f"{{sample_rate: {clock.rate!r}}}"
     if clock.kind == "column":
@@ -171,13 +172,13 @@ def _scale(scale: float) -> str:
 def _said(role: str, choice: Choice) -> list[str]:
     """The reason of a choice, what is doubtful, and what else could play the role."""
     one = choice.recorded
-    lines = _comment(f"{role}, {MEANS[role]}: {choice.reason}.")
+    lines = comment(f"{role}, {MEANS[role]}: {choice.reason}.")
     if one.scale != 1.0:
-        lines += _comment(f"  scale: its heading says {one.written_unit}.")
+        lines += comment(f"  scale: its heading says {one.written_unit}.")
     for doubt in choice.doubts:
-        lines += _comment(f"  CHECK: {doubt}.")
+        lines += comment(f"  CHECK: {doubt}.")
     if choice.others:
-        lines += _comment(f"  or else: {_listed([str(other) for other in choice.others], LISTED)}.")
+        lines += comment(f"  or else: {_listed([str(other) for other in choice.others], LISTED)}.")
     return lines
 
 
@@ -190,7 +191,8 @@ def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def _comment(text: str) -> list[str]:
+def comment(text: str) -> list[str]:
+    """Lines of a comment in YAML."""
     indent = " " * (len(text) - len(text.lstrip()))
     return [f"# {line}" for line in textwrap.wrap(text.strip(), WIDTH, initial_indent=indent, subsequent_indent=indent + "  ",
                                                  break_long_words=False, break_on_hyphens=False)]  # fmt: skip

@@ -1,0 +1,97 @@
+"""Families of channels: numbers of several joints that were recorded side by side, and the robot's joints that they belong to.
+
+Fields of one message that differ in the joint's name, columns whose names differ in it or in a number, entries of an array.
+"""
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from rhythmid.record.inventory import Inventory, Recorded
+from rhythmid.start.meaning import Quantity, meaning_of, words_of
+
+GENERIC = frozenset({"joint"})  # words that a robot's file and its recordings add to a joint's name at will
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Channels that differ in the joint only: `pattern` has a star in its place, `members` are by the recording's name of the joint.
+
+    `told` says whether joints are told apart by their names and not by numbers, whose order is a guess.
+    """
+
+    topic: str
+    pattern: str
+    members: Mapping[str, Recorded]
+    told: bool
+
+    @property
+    def first(self) -> Recorded:
+        return next(iter(self.members.values()))
+
+    @property
+    def quantity(self) -> Quantity | None:
+        return meaning_of(self.first).quantity
+
+    @property
+    def commanded(self) -> bool:
+        return meaning_of(self.first).commanded is True
+
+    def channel(self, bag: bool) -> str:
+        """The channel as signals.yaml has it, without its braces."""
+        named = (
+            f"topic: {self.topic}, field: {json.dumps(self.pattern)}"
+            if bag
+            else f"column: {json.dumps(self.pattern)}"
+        )
+        scale = "" if self.first.scale == 1.0 else f", scale: {self.first.scale:.10g}"
+        return named + scale
+
+
+def families_of(found: Inventory, joints: Sequence[str]) -> Iterator[Family]:
+    """The families of channels in a source, those with the most members first."""
+    made: dict[tuple[str, str, bool], dict[str, Recorded]] = {}
+    for one in found.recorded:
+        for topic, pattern, name, told in _patterns(one, joints):
+            made.setdefault((topic, pattern, told), {})[name] = one
+    sizes = sorted(made.items(), key=lambda each: (-len(each[1]), not each[0][2], len(each[0][1])))
+    used: set[tuple[str, int]] = set()
+    for (topic, pattern, told), members in sizes:
+        left = {name: one for name, one in members.items() if (topic, id(one)) not in used}
+        if len(left) > 1 or (left and told):
+            used |= {(topic, id(one)) for one in left.values()}
+            yield Family(topic, pattern, left, told)
+
+
+def _patterns(one: Recorded, joints: Sequence[str]) -> Iterator[tuple[str, str, str, bool]]:
+    """Topic, pattern, the joint's name in the recording, and whether that is a name, of every family a channel may be of."""
+    if one.topic:
+        if one.joint and f"[{one.joint}]" in one.field:
+            yield one.topic, one.field.replace(f"[{one.joint}]", "[*]"), one.joint, True
+        return
+    for joint in joints:
+        for name in {joint, _plain(joint)}:
+            if name and name in one.column:
+                yield "", one.column.replace(name, "*", 1), name, True
+    for number in re.finditer(r"\d+", one.column):
+        begin, end = number.span()
+        yield "", f"{one.column[:begin]}*{one.column[end:]}", number.group(), False
+
+
+def _plain(joint: str) -> str:
+    """A joint's name without the words that say nothing."""
+    return "_".join(word for word in re.split(r"[_\s]+", joint) if word.lower() not in GENERIC)
+
+
+def joints_of(own: Sequence[str], recorded: Sequence[str], told: bool) -> dict[str, str]:
+    """The recording's name of every joint of the robot that was recorded, in the robot's order."""
+    if not told:
+        inside = sorted(recorded, key=int)
+        return dict(zip(own, inside, strict=False)) if len(inside) <= len(own) else {}
+    known = {frozenset(words_of(name)) - GENERIC: name for name in recorded}
+    found = {
+        joint: joint if joint in recorded else known.get(frozenset(words_of(joint)) - GENERIC)
+        for joint in own
+    }
+    return {joint: name for joint, name in found.items() if name is not None}

@@ -1,0 +1,225 @@
+"""From recordings of a robot and its MJCF or URDF file to the signals.yaml and model.yaml of a machine of several joints.
+
+Of the families of channels the one that holds measured positions is the output; measured forces are the effort, and positions that were
+asked for the references.
+"""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rhythmid.body.machine import KINDS, Machine
+from rhythmid.body.mujoco_body import MujocoBody
+from rhythmid.elements.catalogue import Catalogue
+from rhythmid.errors import InputError
+from rhythmid.record.inventory import Inventory, header_clock, inventory
+from rhythmid.record.joint_record import JointSignals, load_joint_records
+from rhythmid.start.families import Family, families_of, joints_of
+from rhythmid.start.meaning import Quantity, meaning_of
+from rhythmid.start.written import comment, time_of
+
+LITTLE = 0.02  # share of the effort that a first guess of the viscous damping takes
+GUESSED = "guessed signals.yaml"  # what messages call the file that is not written yet
+# first guess of a controller whose gains nobody tells: this frequency [Hz] and damping ratio with the inertia of the joint
+STIFF, DAMPED = 3.0, 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class RobotStart:
+    """The texts of both files, and the guesses in plain text, one line each."""
+
+    signals: str
+    model: str
+    told: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """The guesses in plain text, one line each."""
+        return list(self.told)
+
+
+def start_robot(
+    sources: Sequence[str | Path], body: Path, out: Path, rate: float | None, catalogue: Catalogue
+) -> RobotStart:
+    """Look at recordings of a robot and guess which channels are those of its joints.
+
+    Parameters
+    ----------
+    sources : bags or tables of one layout.
+    body : the robot's MJCF (.xml) or URDF file.
+    out : folder of the files that will be written, from which the model names the robot's file.
+    rate : of a table without a time [Hz].
+
+    Raises InputError, one line, where no position of a joint of the robot was recorded, or neither an effort nor a reference.
+    """
+    robot = MujocoBody.load(body, contacts=False)
+    found = inventory(sources[0], rate)
+    families = list(families_of(found, list(robot.joints)))
+    output = _chosen(families, "position", False, robot)
+    if output is None:
+        raise InputError(
+            f"{found.path}: no measured position of a joint of {body.name} is among {', '.join(map(str, found.recorded))}; "
+            f"its joints: {', '.join(robot.joints)}"
+        )
+    joints = joints_of(list(robot.joints), list(output.members), output.told)
+    effort = _beside(families, "effort", False, output)
+    reference = _beside(families, "position", True, output)
+    forward = _beside(families, "effort", True, output) if reference is not None else None
+    if effort is None and reference is None:
+        raise InputError(
+            f"{found.path}: neither efforts nor references of {', '.join(output.members)} are among "
+            f"{', '.join(one.pattern for one in families)}"
+        )
+    told = [_line("output", output, found.is_bag, joints)]
+    told += [
+        _line(role, one, found.is_bag, joints)
+        for role, one in (("effort", effort), ("input", reference))
+        if one
+    ]
+    signals, doubts = _signals(found, joints, output, effort, reference, forward)
+    records = load_joint_records(sources, JointSignals.from_text(signals, GUESSED))
+    speeds = {
+        name: float(np.std(np.gradient(one.output.value, one.output.time)))
+        for name, one in records[0].joints.items()
+    }
+    sizes = {
+        name: float(np.std(one.effort.value)) if one.effort else 0.0
+        for name, one in records[0].joints.items()
+    }
+    known = robot, body, joints, speeds, sizes, reference is not None
+    Machine.from_text(_model(str(body.resolve()), *known), Path(), catalogue)  # `out` need not be there yet
+    model = _model(os.path.relpath(body.resolve(), out.resolve()), *known)
+    idle = [name for name in robot.joints if name not in joints]
+    doubts += [f"held at zero, because not recorded: {', '.join(idle)}"] if idle else []
+    doubts += list(robot.notes)
+    return RobotStart(signals, model, (*told, *(f"CHECK {doubt}" for doubt in doubts)))
+
+
+def _chosen(
+    families: Sequence[Family], quantity: Quantity, commanded: bool, robot: MujocoBody
+) -> Family | None:
+    """The family of this quantity with the most joints of the robot."""
+    fits = [
+        (len(matched), one)
+        for one in families
+        if one.quantity == quantity and one.commanded == commanded
+        and (matched := joints_of(list(robot.joints), list(one.members), one.told))
+    ]  # fmt: skip
+    return max(fits, key=lambda each: each[0], default=(0, None))[1]
+
+
+def _beside(families: Sequence[Family], quantity: Quantity, commanded: bool, output: Family) -> Family | None:
+    """The first family of this quantity that has every joint of the output's; a command of which nothing more is said is a position."""
+    of = (quantity, None) if commanded and quantity == "position" else (quantity,)
+    fits = (
+        one
+        for one in families
+        if one is not output and one.quantity in of and one.commanded == commanded
+        and set(one.members) >= set(output.members)
+    )  # fmt: skip
+    return next(fits, None)
+
+
+def _line(role: str, one: Family, bag: bool, joints: Mapping[str, str]) -> str:
+    where = f"{one.topic} {one.pattern}" if bag else one.pattern
+    return f"{role}: {where} of {len(joints)} joints: {meaning_of(one.first).reason or 'the only one left'}"
+
+
+def _signals(
+    found: Inventory,
+    joints: Mapping[str, str],
+    output: Family,
+    effort: Family | None,
+    reference: Family | None,
+    forward: Family | None,
+) -> tuple[str, list[str]]:
+    """The text of signals.yaml, and what is doubtful about it."""
+    bag, doubts = found.is_bag, list[str]()
+    chosen = {"output": output.first} | ({"input": reference.first} if reference else {})
+    clock, reason = header_clock(chosen) if bag else (found.clock, found.clock_reason)
+    same = all(joint == name for joint, name in joints.items())
+    if output.told:
+        names = (
+            ", ".join(joints)
+            if same
+            else ", ".join(f"{joint}: {json.dumps(name)}" for joint, name in joints.items())
+        )
+    elif output.pattern.endswith("[*]"):  # entries of an array are told by their places in the list
+        names, same = ", ".join(joints), True
+    else:
+        names = ", ".join(f"{joint}: {json.dumps(name)}" for joint, name in joints.items())
+    if not output.told:
+        doubts.append(
+            "joints: they are numbered in the recording; their order is taken to be that of the robot's file"
+        )
+    lines = [
+        *comment(f"Which channels of {found.path.name} are those of the robot's joints. Guessed by `rhythmid init`: look through it and correct what is wrong."),
+        "", *(line for doubt in doubts for line in comment(f"CHECK {doubt}.")),
+        f"joints: {'[' if same else '{'}{names}{']' if same else '}'}",
+        "", *comment(f"time: {reason}."), f"time: {time_of(clock)}",
+        "", f"output: {{{output.channel(bag)}}}",
+    ]  # fmt: skip
+    if reference is not None:
+        extra = (
+            f", feedforward: {json.dumps(forward.pattern)}"
+            if forward is not None and forward.topic == reference.topic
+            else ""
+        )
+        lines += [
+            "",
+            *comment("what the robot's controllers are asked for."),
+            f"input: {{{reference.channel(bag)}, kind: reference{extra}}}",
+        ]
+    if effort is not None:
+        doubts.append(
+            "effort: whether it was recorded before the actuator or at the joint, and as a mean or at an instant, is not told"
+        )
+        lines += [
+            "", *comment("taken: after_actuator where a sensor at the joint measures it. sampled: mean, or instant where it was read when the reference jumps."),
+            f"effort: {{{effort.channel(bag)}, taken: before_actuator}}",
+        ]  # fmt: skip
+    return "\n".join(lines) + "\n", doubts
+
+
+def _model(
+    place: str,
+    robot: MujocoBody,
+    path: Path,
+    joints: Mapping[str, str],
+    speeds: Mapping[str, float],
+    efforts: Mapping[str, float],
+    controlled: bool,
+) -> str:
+    """The text of model.yaml."""
+    kind = KINDS[1] if path.suffix.lower() == ".urdf" else KINDS[0]
+    hold = [name for name in robot.joints if name not in joints]
+    free = ", ".join(f"{joint}.armature: {{}}" for joint in joints)
+    lines = [
+        *comment("A nominal model to begin with, made by `rhythmid init` of the robot's file: all values below are first guesses and are estimated."),
+        "", *comment("free: the inertia of each rotor, which such files seldom have."),
+        "body:", f"  {kind}: {json.dumps(place)}", "  base: fixed", "  contacts: false",
+    ]  # fmt: skip
+    if hold:
+        lines.append(f"  hold: [{', '.join(hold)}]")
+    lines += [f"  free: {{{free}}}", "joints:"]
+    if controlled:
+        lines += comment(
+            "  CHECK position_control: the gains of the robot's controllers are not told by what was recorded. Without an effort, forces have their scale from them."
+        )
+    for joint in joints:
+        lines.append(f"  {joint}:")
+        inertia = robot.effective_inertia(joint)
+        if controlled:
+            stiffness = inertia * (2.0 * np.pi * STIFF) ** 2
+            damping = 2.0 * DAMPED * np.sqrt(inertia * stiffness)
+            lines.append(
+                f"    command: [{{position_control: {{proportional: {stiffness:.3g}, derivative: {damping:.3g}}}}}]"
+            )
+        guess = robot.passive[joint].damping or LITTLE * (efforts[joint] or inertia) / max(
+            speeds[joint], 1e-9
+        )
+        lines.append(f"    force: [{{viscous_damper: {{damping: {guess:.3g}}}}}]")
+    return "\n".join(lines) + "\n"

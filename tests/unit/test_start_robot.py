@@ -1,0 +1,137 @@
+"""`rhythmid init --body`: from a robot's file and its recordings to the files of a machine of several joints."""
+
+import json
+from pathlib import Path
+
+import foreign
+import mujoco
+import numpy as np
+import pytest
+from foreign import joint_state
+
+from rhythmid.body.machine import Machine
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.errors import InputError
+from rhythmid.start.robot import RobotStart, start_robot
+from rhythmid.units import ROTATIONAL
+
+LINK = '<inertial><origin xyz="0 0 -0.15"/><mass value="{mass}"/><inertia ixx="0.01" iyy="0.01" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial>'
+JOINT = '<joint name="{name}" type="{kind}"><parent link="{above}"/><child link="{below}"/><origin xyz="0 0 {down}"/><axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="9" velocity="9"/></joint>'
+ARM = f"""<robot name="arm"><link name="base"/><link name="upper">{LINK.format(mass=1.0)}</link><link name="lower">{LINK.format(mass=0.5)}</link>
+<link name="finger">{LINK.format(mass=0.05)}</link>{JOINT.format(name="shoulder_joint", kind="revolute", above="base", below="upper", down=0)}
+{JOINT.format(name="elbow_joint", kind="revolute", above="upper", below="lower", down=-0.3)}
+{JOINT.format(name="finger_joint", kind="prismatic", above="lower", below="finger", down=-0.3)}</robot>"""
+FRICTION = 0.3
+NOW = 1.7e9
+
+
+@pytest.fixture(scope="module")
+def run() -> dict[str, np.ndarray]:
+    """Twelve seconds of the arm under a controller, its finger fast, and dry friction in the elbow."""
+    spec = mujoco.MjSpec.from_string(ARM)
+    spec.delete(spec.joint("finger_joint"))
+    model = spec.compile()
+    model.opt.timestep = 0.001
+    model.dof_damping[:] = 0.05
+    model.dof_frictionloss[1] = FRICTION
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(0)
+    lines = rng.uniform(0.2, 1.5, (2, 5)), rng.uniform(0.0, 6.0, (2, 5))
+    rows = {name: [] for name in ("time", "asked", "position", "effort")}
+    for step in range(12000):
+        asked = 0.25 * np.sin(2.0 * np.pi * lines[0] * data.time + lines[1]).sum(axis=1) * min(1.0, data.time)
+        force = 60.0 * (asked - data.qpos) - 4.0 * data.qvel
+        if step % 4 == 0:
+            for name, value in zip(rows, (data.time, asked, data.qpos.copy(), force), strict=True):
+                rows[name].append(value)
+        data.qfrc_applied[:] = force
+        mujoco.mj_step(model, data)
+    return {name: np.array(values) for name, values in rows.items()}
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Path:
+    (tmp_path / "arm.urdf").write_text(ARM)
+    return tmp_path / "arm.urdf"
+
+
+def begun(source: Path, robot: Path, **more: float) -> RobotStart:
+    return start_robot([source], robot, source.parent / "files", more.get("rate"), load_catalogue())
+
+
+def table(path: Path, run: dict[str, np.ndarray], heads: list[str], *what: str) -> Path:
+    columns = np.column_stack([run["time"], *(run[name] for name in what)])
+    np.savetxt(path, columns, delimiter=",", header=",".join(["t", *heads]), comments="")
+    return path
+
+
+def test_a_robots_log_leads_to_the_joint_and_the_physics_that_its_file_lacks(tmp_path, robot, run, rhythmid):
+    heads = [f"{kind}_{joint}" for kind in ("ref", "q", "tau") for joint in ("shoulder", "elbow")]
+    table(tmp_path / "run.csv", run, heads, "asked", "position", "effort")
+    said = rhythmid("init", "run.csv", "--body", "arm.urdf")
+    assert (said.returncode, said.stderr) == (0, "")
+    assert "CHECK held at zero, because not recorded: finger_joint" in said.stdout
+    for line in [one.split()[1:] for one in said.stdout.splitlines() if one.startswith("  rhythmid ")]:
+        done = rhythmid(*line, *(["--json", "answer.json"] if line[0] == "diagnose" else []))
+        assert done.returncode == 0
+    answer = json.loads((tmp_path / "answer.json").read_text())
+    assert [(one["joint"], one["element"]) for one in answer["missing"]][:1] == [
+        ("elbow_joint", "coulomb_friction")
+    ]
+    force = answer["missing"][0]["parameters"]["force"]
+    assert force["value"] == pytest.approx(FRICTION, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("heads", "joints"),
+    [
+        (["q_elbow_joint", "q_shoulder_joint"], "joints: [shoulder_joint, elbow_joint]"),
+        (["q shoulder", "q elbow"], 'joints: {shoulder_joint: "shoulder", elbow_joint: "elbow"}'),
+        (["q1", "q2"], 'joints: {shoulder_joint: "1", elbow_joint: "2"}'),
+    ],
+)
+def test_joints_are_told_by_their_names_or_else_by_their_numbers(tmp_path, robot, run, heads, joints):
+    efforts = [head.replace("q", "tau", 1) for head in heads]
+    found = begun(table(tmp_path / "run.csv", run, [*heads, *efforts], "position", "effort"), robot)
+    assert joints in found.signals
+    assert any("they are numbered" in line for line in found.told) == ("1" in joints)
+
+
+def test_entries_of_an_array_are_told_by_their_places(tmp_path, robot, run):
+    np.savez(tmp_path / "run.npz", t=run["time"], q=run["position"], tau=run["effort"])
+    found = begun(tmp_path / "run.npz", robot)
+    assert "joints: [shoulder_joint, elbow_joint]" in found.signals
+    assert 'output: {column: "q[*]"}' in found.signals and 'effort: {column: "tau[*]"' in found.signals
+
+
+def test_references_alone_get_controllers_whose_gains_are_to_be_checked(tmp_path, robot, run):
+    names = ["shoulder_joint", "elbow_joint"]
+    times = NOW + run["time"]
+    topics = {
+        "/arm/joint_states": [
+            (at, joint_state(at, names, position=list(q))) for at, q in zip(times, run["position"])
+        ],
+        "/arm/command": [
+            (at, joint_state(at, names, position=list(q))) for at, q in zip(times, run["asked"])
+        ],
+    }
+    found = begun(foreign.write(tmp_path / "bag", topics), robot)
+    assert 'input: {topic: /arm/command, field: "position[*]", kind: reference}' in found.signals
+    machine = Machine.from_text(found.model.replace("../", ""), tmp_path, load_catalogue())
+    assert machine.controlled("elbow_joint") and machine.body.hold == {"finger_joint": 0.0}
+    assert "CHECK position_control" in found.model
+    assert machine.paths["elbow_joint"].units == ROTATIONAL
+
+
+def test_a_log_without_joints_or_without_what_drives_them_is_refused(tmp_path, robot, run, rhythmid):
+    table(tmp_path / "run.csv", run, ["x_shoulder", "x_elbow"], "position")
+    with pytest.raises(InputError, match="neither efforts nor references of shoulder, elbow"):
+        begun(tmp_path / "run.csv", robot)
+    table(tmp_path / "run.csv", run, ["torque", "current"], "effort")
+    with pytest.raises(InputError, match="no measured position of a joint of arm.urdf"):
+        begun(tmp_path / "run.csv", robot)
+    done = rhythmid("init", "run.csv", "--body", "arm.urdf", "--joint", "elbow")
+    assert (done.returncode, done.stderr.strip()) == (
+        2, "error: --joint is one joint, --body are all of a robot; give one of the two",
+    )  # fmt: skip
+    assert not (tmp_path / "signals.yaml").exists()
