@@ -29,7 +29,7 @@ from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.estimate import fit_effort
-from rhythmid.identify.joints.held_reference import balances_of, with_likely_lead
+from rhythmid.identify.joints.held_reference import balances_of, likely_readings
 from rhythmid.record.joint_record import JointRecord
 
 BODIES = ("leg", "arm", "quadruped")
@@ -120,7 +120,7 @@ def share_of(
     """
 
     def missed(one: Machine, of: JointRecord) -> float:
-        balances = with_likely_lead(balances_of(one, [of]), [of])
+        balances = likely_readings(balances_of(one, [of]), [of])[0]
         return fit_effort(balances.balance(joint), balances.models[joint]).error
 
     late = any(term.element.name == "actuator_delay" for term in plant.paths[joint].terms)

@@ -12,7 +12,7 @@ from rhythmid.body.joint_experiment import JointExperiment, perform
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
 from rhythmid.elements.catalogue import load_catalogue
-from rhythmid.identify.joints.held_reference import balances_of, with_likely_lead
+from rhythmid.identify.joints.held_reference import balances_of, lead_of_most, likely_readings
 from rhythmid.identify.joints.joint_identification import identify_machine
 from rhythmid.identify.joints.reference_lead import held_reference
 from rhythmid.record.joint_messages import write_joint_bag
@@ -45,7 +45,7 @@ def hopped(plant: Machine, **how: bool) -> JointRecord:
 
 
 def leads(machine: Machine, record: JointRecord) -> Mapping[str, float]:
-    return with_likely_lead(balances_of(machine, [record]), [record]).leads
+    return likely_readings(balances_of(machine, [record]), [record])[0].leads
 
 
 @pytest.mark.parametrize("rate", [500, 1000])
@@ -78,6 +78,25 @@ def test_a_lead_is_taken_away_where_it_is_there_and_only_where_it_is_there():
     (lead,) = set(leads(leg(), hopped(leg(), held=True)).values())
     assert lead == pytest.approx(0.75e-3, abs=0.2e-3)  # half of 2 ms less a step of the body of 0.5 ms
     assert not leads(leg(), hopped(leg(), held=False))
+
+
+@pytest.mark.parametrize(("others", "expected"), [(2, 0.5), (1, None)])
+def test_a_joint_that_lacks_something_does_not_hide_a_lead_that_most_joints_show(others, expected):
+    tried = np.linspace(-1.0, 1.0, 41)
+    shows = 0.5 * np.log(0.1 + (tried - 0.5) ** 2) - 0.5 * np.log(0.35)
+    lacks = 0.1 * tried  # fits worse the later the reference is taken
+    assert lead_of_most(tried, np.array([*[shows] * others, lacks])) == pytest.approx(expected)
+
+
+def test_a_lead_at_the_end_of_what_is_possible_is_none():
+    tried = np.linspace(-1.0, 1.0, 41)
+    assert lead_of_most(tried, np.array([-tried, -tried])) is None
+
+
+def test_a_wrong_link_is_named_alone_where_the_efforts_of_both_joints_are_of_instants():
+    heavy = leg().with_inertial({"thigh.mass": 0.6 * leg().body.parameters["thigh.mass"]})
+    found = diagnose_machine([hopped(heavy, held=True)], leg()).diagnosis
+    assert [(one.joint, one.element) for one in found.missing] == [("hip", "link_mass")]
 
 
 def test_a_heavier_rotor_of_one_joint_is_no_lead_of_all():

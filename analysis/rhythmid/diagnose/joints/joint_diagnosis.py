@@ -21,7 +21,7 @@ from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, nam
 from rhythmid.diagnose.joints.joint_compose import compose_machine, estimate_of
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
-from rhythmid.identify.joints.held_reference import balances_of, with_likely_lead
+from rhythmid.identify.joints.held_reference import balances_of, likely_readings
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.joints.joint_order import check_order
 from rhythmid.identify.joints.reference_delay import reference_delay
@@ -92,18 +92,63 @@ def diagnose_machine(
     if not records:
         raise InputError("no record is given; name at least one bag or table")
     known, spent = catalogue or load_catalogue(), Budget(budget)
-    nominal = machine
-    links: dict[str, JointResult] = {}
     records, said = cleaned_joints(records)
     holdout, of_holdout = cleaned_joints(holdout)
     balances = balances_of(machine, records)
     check_order(balances)
-    balances = with_likely_lead(balances, records)
+    best = None
+    for reading in likely_readings(balances, records):
+        tried = _explained(machine, reading, records, holdout, known, tell, spent)
+        best = tried if best is None or tried.causes < best.causes else best
+        if best.causes <= 1 or spent.spent:
+            break
+    assert best is not None  # there is one reading at least
+    if not best.found:
+        raise InputError(f"no joint can be judged: {next(iter(best.refused.values()))}")
+    answers = {joint: _answer(one) for joint, one in best.found.items()}
+    told = () if records[0].sampled else tuple(told_of(best.leads))
+    notes = (*machine.body.notes, *said, *of_holdout, *told)
+    diagnosis = compose_machine(machine, best.found, answers, best.stated, best.links, best.refused, notes)
+    return MachineAnswer(diagnosis, _augmented(best.machine, best.found, best.stated), best.found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Explained:
+    """What was found at the joints: the machine with the links' masses that are put right, and the `leads` [s] that were allowed for."""
+
+    machine: Machine
+    found: Mapping[str, JointResult]
+    refused: Mapping[str, str]
+    links: Mapping[str, JointResult]
+    leads: Mapping[str, float]
+
+    @property
+    def stated(self) -> dict[str, tuple[str, ...]]:
+        """Labels by which the answer stands, by joint."""
+        return {joint: stated_at(one) for joint, one in self.found.items()}
+
+    @property
+    def causes(self) -> int:
+        """How many causes it takes to explain the records: what is stated, and joints that are not consistent though nothing is."""
+        open_ = [
+            joint
+            for joint, one in self.found.items()
+            if one.result.decision.verdict != "consistent" and not self.stated[joint] and _different(one)
+        ]
+        return len(self.links) + sum(map(len, self.stated.values())) + len(open_)
+
+
+def _explained(
+    machine: Machine, balances: JointBalances, records: Sequence[JointRecord], holdout: Sequence[JointRecord],
+    catalogue: Catalogue, tell: Tell, budget: Budget,
+) -> _Explained:  # fmt: skip
+    """Search every joint, put a link's mass right where one is found, and search again what feels it."""
+    links: dict[str, JointResult] = {}
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
-    found, refused = _searched(balances, unseen, machine.joints, known, tell, spent)
+    found, refused = _searched(balances, unseen, machine.joints, catalogue, tell, budget)
     for _ in range(MOST_LINKS):
         best = _heaviest(found, set(links))
-        if best is None or spent.spent:
+        if best is None or budget.spent:
             break
         link, result = best
         links[link] = result
@@ -111,16 +156,9 @@ def diagnose_machine(
         balances = JointBalances.of(machine, records, balances)
         unseen = JointBalances.of(machine, holdout, balances) if holdout else None
         again = [joint for joint in machine.joints if link in balances.links(joint)]
-        better, refused = _searched(balances, unseen, again, known, tell, spent)
+        better, refused = _searched(balances, unseen, again, catalogue, tell, budget)
         found = {**found, **better}
-    if not found:
-        raise InputError(f"no joint can be judged: {next(iter(refused.values()))}")
-    answers = {joint: _answer(one) for joint, one in found.items()}
-    stated = {joint: stated_at(one) for joint, one in found.items()}
-    told = () if records[0].sampled else tuple(told_of(balances.leads))
-    notes = (*machine.body.notes, *said, *of_holdout, *told)
-    diagnosis = compose_machine(nominal, found, answers, stated, links, refused, notes)
-    return MachineAnswer(diagnosis, _augmented(machine, found, stated), found)
+    return _Explained(machine, found, refused, links, balances.leads)
 
 
 def _searched(
@@ -142,8 +180,8 @@ def _searched(
 def stated_at(one: JointResult) -> tuple[str, ...]:
     """Labels by which the answer at a joint stands: elements, or a value of the body that is wrong, or a delay."""
     decision, chosen = one.result.decision, one.result.selection.chosen
-    own = [label for label in chosen.elements if one.result.chosen.fit.model.term(label) is None]
-    if not all(_differs(one, label) for label in own):
+    own = _own_labels(one)
+    if not _different(one):
         return ()
     if decision.verdict == "missing_physics":
         return decision.named
@@ -154,6 +192,17 @@ def stated_at(one: JointResult) -> tuple[str, ...]:
         return ()
     known = all(label == INERTIA or name_of(one.joint, label)[0] != label for label in own)
     return decision.named if known else ()  # another value of the path is its author's to check
+
+
+def _own_labels(one: JointResult) -> list[str]:
+    """Values of the body, the path or its delay among what was chosen at a joint."""
+    chosen = one.result.selection.chosen
+    return [label for label in chosen.elements if one.result.chosen.fit.model.term(label) is None]
+
+
+def _different(one: JointResult) -> bool:
+    """Whether all values that were chosen at a joint have come out other than they were."""
+    return all(_differs(one, label) for label in _own_labels(one))
 
 
 def _held_by_alike(one: JointResult) -> float:

@@ -2,13 +2,16 @@
 
 Such samples do not tell whether an effort is that of the instant or the mean over the period: the readings differ by damping and inertia at
 every joint in proportion to its controller's gains. So signals.yaml may say which it is. Where it does not, a diagnosis takes one lead for
-all joints that makes the efforts of every joint fit the model better, which an effect that a joint lacks does not do to the others. An
-identification, to which inertia and damping are unknown, cannot.
+all joints that makes the efforts of most joints fit the model better, which an effect that a few joints lack does not do to the others; at
+these few the lead may do harm. An effect that many joints feel, such as a link's mass, hides the lead or exaggerates it. So where a reading
+leaves several causes, the other readings are searched as well, for one that needs fewer. An identification, to which inertia and damping are
+unknown, cannot tell.
 """
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from rhythmid.body.machine import Machine
@@ -17,8 +20,16 @@ from rhythmid.identify.inverse_dynamics.estimate import linearise
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.record.joint_record import JointRecord
 
-LEADS = 101  # that are compared, from half a period behind to half a period ahead
-BETTER = 0.05  # of a joint's error on average, by which it has to fall for a lead to be believed in
+Array = NDArray[np.float64]
+LEADS = 121  # that are compared
+FURTHEST = 1.2  # times half a period, ahead or behind, up to which: at an end it stands for something else
+SCATTERED = (
+    2.0 / 3.0,
+    1.0,
+)  # of the lead of efforts at the very instants, that they have on average whose stamps scatter
+LESS = np.log(
+    0.95
+)  # logarithm of the share to which the error of the middle one of all joints has to fall for a lead to be believed in
 NO_WORSE = 1e-9  # of a joint's error, by which rounding may raise it
 
 
@@ -27,36 +38,53 @@ def balances_of(machine: Machine, records: Sequence[JointRecord]) -> JointBalanc
 
     Raises InputError where the records hold too little."""
     plain = JointBalances.of(machine, records)
-    if records[0].sampled != "instant":
-        return plain
-    step = machine.body.step  # for which the machine's controllers hold what they ask for
-    return plain.with_leads(
-        {joint: 0.5 * max(period - step, 0.0) for joint, period in _periods(plain).items()}
-    )
+    return plain.with_leads(_of_instants(plain)) if records[0].sampled == "instant" else plain
+
+
+def _of_instants(balances: JointBalances) -> dict[str, float]:
+    """The lead [s] of each joint whose effort was recorded at the instants at which its reference jumps."""
+    step = balances.machine.body.step  # for which the machine's controllers hold what they ask for
+    return {joint: 0.5 * max(period - step, 0.0) for joint, period in _periods(balances).items()}
 
 
 @threadpool_limits.wrap(limits=1)
-def with_likely_lead(balances: JointBalances, records: Sequence[JointRecord]) -> JointBalances:
-    """The balances with one lead taken away from all joints, where nothing is said of it and every joint fits the model better so."""
+def likely_readings(balances: JointBalances, records: Sequence[JointRecord]) -> list[JointBalances]:
+    """The balances as they may have to be read where nothing is said of how efforts were sampled, the likeliest first: with the lead taken
+    away from all joints that most joints fit better with, else as they are; and with those that efforts of instants have."""
     periods = _periods(balances)
     if records[0].sampled is not None or not periods:
-        return balances
-    half = 0.5 * max(periods.values())
-    tried = np.linspace(-half, half, LEADS)
+        return [balances]
+    furthest = FURTHEST * 0.5 * max(periods.values())
+    tried = np.linspace(-furthest, furthest, LEADS)
     errors = []
     for joint in periods:
         try:
-            errors.append(_errors(balances, joint, half, tried))
+            errors.append(_errors(balances, joint, furthest, tried))
         except InputError:
             continue  # too little motion
     if not errors:
-        return balances
-    before = np.array([np.interp(0.0, tried, one) for one in errors])
-    best = int(np.argmin(np.sum(np.log(errors), axis=0)))
-    change = np.array([one[best] for one in errors]) / before
-    if np.any(change > 1.0 + NO_WORSE) or np.mean(np.log(change)) > np.log(1.0 - BETTER):
-        return balances
-    return balances.with_leads(dict.fromkeys(periods, float(tried[best])))
+        return [balances]
+    change = np.log(errors) - np.log([[np.interp(0.0, tried, one)] for one in errors])
+    instant = float(np.median(list(_of_instants(balances).values())))
+    leads = [lead_of_most(tried, change) or 0.0, 0.0, *(share * instant for share in SCATTERED)]
+    return [
+        balances.with_leads(dict.fromkeys(periods, one)) if one else balances for one in dict.fromkeys(leads)
+    ]
+
+
+def lead_of_most(tried: Array, change: Array) -> float | None:
+    """The lead of those `tried` (l,) that most joints fit better with, None where there is none.
+
+    Parameters
+    ----------
+    change : (joints, l) logarithm of each joint's error over that without a lead.
+    """
+    middle = np.median(change, axis=0)
+    best = int(np.argmin(middle))
+    better = np.mean(change[:, best] <= NO_WORSE)
+    if best in (0, len(tried) - 1) or better <= 0.5 or middle[best] > LESS:
+        return None
+    return float(tried[best])
 
 
 def not_told(balances: JointBalances, records: Sequence[JointRecord]) -> Iterator[str]:
