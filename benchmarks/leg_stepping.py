@@ -20,7 +20,8 @@ import numpy as np
 
 import rhythmid
 from rhythmid.body.machine import Machine
-from rhythmid.body.mujoco_body import MujocoBody, mujoco
+from rhythmid.body.mujoco_body import MujocoBody
+from rhythmid.body.robot_file import mujoco
 from rhythmid.body.simulate import run_steps
 from rhythmid.body.write_back import save_machine
 from rhythmid.elements.catalogue import load_catalogue
