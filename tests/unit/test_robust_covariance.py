@@ -100,3 +100,12 @@ def test_a_parameter_whose_variance_is_too_large_to_be_squared_is_widened_as_any
         inverse = np.array([[1.0 / float(np.sum(sensitivity**2)) * scale * scale]])
         factors.append(float(widening(columns, residual, records, inverse, np.sqrt(np.diag(inverse)))[0]))
     assert factors[1] == pytest.approx(factors[0])
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_parameter_of_which_the_records_say_nothing_is_left_alone() -> None:
+    rng = np.random.default_rng(3)
+    columns = np.column_stack([np.sin(np.linspace(0.0, 400.0, ROWS)), np.zeros(ROWS)])
+    inverse = np.diag([1.0 / float(columns[:, 0] @ columns[:, 0]), 0.0])
+    factors = widening(columns, rng.normal(size=ROWS), (slice(0, ROWS),), inverse, np.array([0.02, 1.0]))
+    assert factors[1] == 1.0

@@ -38,10 +38,8 @@ def widening(columns: Array, residual: Array, records: Sequence[slice], inverse:
     inverse : (p, p) inverse of the information, `columns` with themselves and what priors add.
     std : (p,) standard deviations without the blocks.
     """
-    moved, share = (
-        [],
-        [],
-    )  # by each block: of the estimates, and of their variances where the residual is white
+    # by each block: of the estimates, and of their variances where the residual is white
+    moved, share = [], []
     for rows in records:
         count = max(1, round(BLOCKS * (rows.stop - rows.start) / max(len(residual), 1)))
         for part in np.array_split(np.arange(rows.start, rows.stop), count):
@@ -51,9 +49,9 @@ def widening(columns: Array, residual: Array, records: Sequence[slice], inverse:
     if not lost or len(moved) <= lost:
         return np.ones(lost)
     variance = np.sum(np.square(moved), axis=0) * len(moved) / (len(moved) - lost)
-    part_of_most = np.array(share) / np.max(
-        share, axis=0
-    )  # a variance may be larger than what can be squared
+    # a variance may be larger than what can be squared, or nothing where the records say nothing of a parameter
+    most = np.max(share, axis=0)
+    part_of_most = np.divide(share, most, out=np.ones_like(share), where=most > 0.0)
     freedom = np.sum(part_of_most, axis=0) ** 2 / np.sum(np.square(part_of_most), axis=0)
     ratio = variance / std**2
     return np.where(ratio * freedom > chi2.isf(CHANCE, freedom), np.sqrt(np.maximum(ratio, 1.0)), 1.0)
