@@ -27,6 +27,7 @@ from rhythmid.record import compression
 from rhythmid.record.block import Block, Topic
 from rhythmid.record.columns import read_columns
 from rhythmid.record.field import Field
+from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.inventory import inventory
 from rhythmid.record.message_types import stamp_path, type_fields, typestore
 from rhythmid.record.read import read_record
@@ -253,6 +254,28 @@ def test_a_forcing_too_fast_to_be_followed_is_refused(tmp_path, bounded):
         tmp_path / "signals.yaml",
     )
     assert "cannot be followed" in refusal(lambda: read_record(tmp_path / "run.csv", signals))
+
+
+@pytest.mark.parametrize("levels", [1, 5])
+def test_a_stamp_far_in_the_future_is_no_gap_that_is_filled(tmp_path, bounded, levels):
+    """Four thousand million samples are missing before it."""
+    rows = [f"{k / 1000},{k % 7},{k % levels}" for k in range(60)]
+    (tmp_path / "run.csv").write_text("t,y,u\n" + "\n".join([*rows, "4200000.0,1,1"]) + "\n")
+    signals = Signals.from_text(
+        "time: {column: t}\ninput: {column: u}\noutput: {column: y}", tmp_path / "signals.yaml"
+    )
+    whole = cut_at_gaps(read_record(tmp_path / "run.csv", signals)).whole
+    assert whole.input is not None and len(whole.input) < 200
+
+
+def test_measurements_near_the_largest_number_bring_no_warning(tmp_path, recwarn):
+    rows = [f"{k},{k % 7}e300,{k % 5}" for k in range(60) if k % 20]
+    (tmp_path / "run.csv").write_text("t,y,u\n" + "\n".join(rows) + "\n")
+    signals = Signals.from_text(
+        "time: {column: t}\ninput: {column: u}\noutput: {column: y}", tmp_path / "signals.yaml"
+    )
+    cut_at_gaps(read_record(tmp_path / "run.csv", signals))
+    assert not recwarn.list
 
 
 TABLE = "t,y,u\n" + "".join(f"{k},{k % 7},{k % 5}\n" for k in range(50))

@@ -133,10 +133,14 @@ def test_gaps_are_found_where_they_are(seed):
 
 
 def test_a_cubic_is_restored_to_the_last_digit_and_noise_is_not():
-    errors = interpolation_errors((TIME - 3.0) ** 3, 6)
-    assert errors[1:].max() < 1e-8
-    noise = interpolation_errors(np.random.default_rng(0).standard_normal(4000), 6)
-    assert noise[1] == pytest.approx(np.sqrt(1.0 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2), rel=0.05)
+    missing = np.arange(1, 7)
+    assert interpolation_errors((TIME - 3.0) ** 3, missing).max() < 1e-8
+    noise = interpolation_errors(np.random.default_rng(0).standard_normal(4000), missing)
+    assert noise[0] == pytest.approx(np.sqrt(1.0 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2), rel=0.05)
+
+
+def test_of_more_missing_samples_than_there_are_neighbours_tell_nothing():
+    assert interpolation_errors(np.sin(TIME[:50]), np.array([4_000_000_000])) == np.inf
 
 
 def test_a_band_limited_signal_with_a_gap_is_itself_on_either_side():

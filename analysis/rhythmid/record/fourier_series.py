@@ -90,9 +90,10 @@ def _refined(time: Array, value: Array, frequency: float) -> tuple[float, float]
 def _fourier_fit(time: Array, value: Array, frequency: float, harmonics: int) -> tuple[float, float]:
     """Gauss-Newton on the frequency of a Fourier series with so many harmonics; and the rms of what it leaves.
 
-    It ends where a step leaves the line that it began on, as it does where there is none.
+    It ends where a step leaves the line that it began on, as it does where there is none, and where the samples do not tell the harmonics
+    apart, such as of two stretches with a gap of many periods between them.
     """
-    left, begin = 0.0, frequency
+    left, begin = float(np.std(value)), frequency
     near = min(1.0 / (time[-1] - time[0]), 0.5 * begin)
     h = np.arange(1, harmonics + 1)
     columns = np.ones((2 * harmonics + 2, len(time)))
@@ -103,7 +104,10 @@ def _fourier_fit(time: Array, value: Array, frequency: float, harmonics: int) ->
             power = power * turn
             columns[n], columns[harmonics + n] = np.real(power), np.imag(power)
         fourier = columns[:-1]
-        solution = np.linalg.solve(fourier @ fourier.T, fourier @ value)
+        try:
+            solution = np.linalg.solve(fourier @ fourier.T, fourier @ value)
+        except np.linalg.LinAlgError:
+            break
         left = float(np.sqrt(np.mean((value - solution @ fourier) ** 2)))
         a, b = solution[1 : harmonics + 1], solution[harmonics + 1 :]
         columns[-1] = (
@@ -111,7 +115,10 @@ def _fourier_fit(time: Array, value: Array, frequency: float, harmonics: int) ->
         )
         size = np.sqrt(np.sum(columns**2, axis=1))
         scaled = columns / size[:, None]
-        step = float(np.linalg.solve(scaled @ scaled.T, scaled @ value)[-1] / size[-1])
+        try:
+            step = float(np.linalg.solve(scaled @ scaled.T, scaled @ value)[-1] / size[-1])
+        except np.linalg.LinAlgError:
+            break
         if not abs(frequency + step - begin) < near:
             break
         frequency += step

@@ -90,16 +90,17 @@ def _bridged(channel: Channel, output: Channel, held: bool) -> tuple[Channel, in
         return channel, 0, []
     tolerable = tolerable_error(output)
     spread = max(float(np.std(value)), 1e-300)
-    errors = interpolation_errors(value, int(lost.max()))
+    errors = interpolation_errors(value, lost)
     law = None if held else periodic(channel.time, channel.value)
     left = np.inf if law is None else law.left
-    told = np.array([min(errors[n], left) / spread * n * channel.period < tolerable for n in lost])
+    told = np.minimum(errors, left) / spread * lost * channel.period < tolerable
+    told &= lost <= len(value)  # a gap that is longer than what was recorded is none that it tells
     stamps, values = [time], [value]
-    for at, count in zip(first[told], lost[told]):
+    for at, count, error in zip(first[told], lost[told], errors[told]):
         between = time[at] + (time[at + 1] - time[at]) * np.arange(1, count + 1) / (count + 1)
         near = slice(max(at - 1, 0), at + 3)
         stamps.append(between)
-        if law is None or errors[count] <= law.left:
+        if law is None or error <= law.left:
             values.append(cubic(time[near], value[near], between))
         else:
             values.append(law(between))

@@ -6,14 +6,15 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def interpolation_errors(value: Array, longest: int) -> Array:
-    """rms error (longest + 1,) of a cubic through two samples on either side of 0, 1, … missing ones, at their middle.
+def interpolation_errors(value: Array, missing: NDArray[np.int64]) -> Array:
+    """rms error (m,) of a cubic through two samples on either side of so many `missing` ones (m,), at their middle.
 
     Seen on the samples (n,) that there are; infinite where they are too few. Of white noise it is about the noise itself.
     """
-    found = np.full(longest + 1, np.inf)
+    most = min(int(missing.max(initial=0)), len(value) // 4)  # for more there are too few samples
+    found = np.full(most + 2, np.inf)
     found[0] = 0.0
-    for count in range(1, longest + 1):
+    for count in range(1, most + 1):
         reach = count + 3  # from the first to the last of the four
         if len(value) < 4 * reach:
             break
@@ -27,7 +28,7 @@ def interpolation_errors(value: Array, longest: int) -> Array:
         found[count] = float(np.sqrt(np.mean(error**2)))
         if found[count] > np.std(value):
             break  # longer ones are worse
-    return found
+    return found[np.minimum(missing, most + 1)]
 
 
 def _lagrange(nodes: Array, at: float) -> Array:

@@ -343,10 +343,10 @@ def _within_gap(channel: Channel, grid: Array, held: bool) -> tuple[NDArray[np.b
         first, lost = first[changed], lost[changed]
     if len(first) == 0:
         return missing, untold
-    errors = interpolation_errors(channel.value, int(lost.max()))
-    for at, count in zip(first, lost, strict=True):
+    error_of_one, *errors = interpolation_errors(channel.value, np.append(1, lost))
+    for at, error in zip(first, errors, strict=True):
         within = (grid > channel.time[at] + SAME) & (grid < channel.time[at + 1] - SAME)
         missing |= within
-        if errors[count] > AS_GOOD * errors[1]:
+        if error > AS_GOOD * error_of_one:
             untold |= within
     return missing, untold

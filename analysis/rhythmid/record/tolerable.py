@@ -10,6 +10,7 @@ EXACT = (
 )
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of numbers near the largest
 def tolerable_error(output: Channel) -> float:
     """Error of a command, as a share of its size times its duration [s], that moves the machine by less than the noise.
 
@@ -21,4 +22,4 @@ def tolerable_error(output: Channel) -> float:
     speed = float(np.sqrt(np.sum(np.diff(value) ** 2 / np.diff(output.time)) / span))
     if speed == 0.0 or size == 0.0:
         return 0.0
-    return max(interpolation_errors(value, 1)[1] / size, EXACT) * size / speed
+    return max(interpolation_errors(value, np.ones(1, dtype=np.int64))[0] / size, EXACT) * size / speed
