@@ -12,6 +12,7 @@ from foreign import joint_state
 from rhythmid.body.machine import Machine
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
+from rhythmid.record.joint_record import load_joint_records
 from rhythmid.start.robot import RobotStart, start_robot
 from rhythmid.units import ROTATIONAL
 
@@ -95,6 +96,17 @@ def test_joints_are_told_by_their_names_or_else_by_their_numbers(tmp_path, robot
     found = begun(table(tmp_path / "run.csv", run, [*heads, *efforts], "position", "effort"), robot)
     assert joints in found.signals
     assert any("they are numbered" in line for line in found.told) == ("1" in joints)
+
+
+def test_units_of_headings_are_heeded(tmp_path, robot, run):
+    degrees = {**run, "position": np.degrees(run["position"])}
+    heads = ["q shoulder [deg]", "q elbow [deg]", "tau shoulder [Nm]", "tau elbow [Nm]"]
+    found = begun(table(tmp_path / "run.csv", degrees, heads, "position", "effort"), robot)
+    (tmp_path / "signals.yaml").write_text(found.signals)
+    (record,) = load_joint_records([tmp_path / "run.csv"], tmp_path / "signals.yaml")
+    np.testing.assert_allclose(
+        record.joints["elbow_joint"].output.value, run["position"][:, 1], rtol=1e-6, atol=1e-9
+    )
 
 
 def test_entries_of_an_array_are_told_by_their_places(tmp_path, robot, run):

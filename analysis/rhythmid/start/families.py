@@ -16,9 +16,14 @@ GENERIC = frozenset({"joint"})  # words that a robot's file and its recordings a
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Channels that differ in the joint only: `pattern` has a star in its place, `members` are by the recording's name of the joint.
+    """Channels that differ in the joint only.
 
-    `told` says whether joints are told apart by their names and not by numbers, whose order is a guess.
+    Attributes
+    ----------
+    topic : of a message; empty for columns.
+    pattern : the field or the name of the column with a star in the joint's place.
+    members : by the recording's name of the joint, or its number.
+    told : whether joints are told apart by names, and not by numbers, whose order is a guess.
     """
 
     topic: str
@@ -28,14 +33,17 @@ class Family:
 
     @property
     def first(self) -> Recorded:
+        """The first member, which stands for all."""
         return next(iter(self.members.values()))
 
     @property
     def quantity(self) -> Quantity | None:
+        """What its members are, None where nothing says it."""
         return meaning_of(self.first).quantity
 
     @property
     def commanded(self) -> bool:
+        """Whether its members were asked for, not measured."""
         return meaning_of(self.first).commanded is True
 
     def channel(self, bag: bool) -> str:
@@ -45,8 +53,9 @@ class Family:
             if bag
             else f"column: {json.dumps(self.pattern)}"
         )
+        unit = f", unit: {json.dumps(self.first.unit)}" if self.first.unit else ""
         scale = "" if self.first.scale == 1.0 else f", scale: {self.first.scale:.10g}"
-        return named + scale
+        return named + unit + scale
 
 
 def families_of(found: Inventory, joints: Sequence[str]) -> Iterator[Family]:
@@ -69,6 +78,8 @@ def _patterns(one: Recorded, joints: Sequence[str]) -> Iterator[tuple[str, str, 
     if one.topic:
         if one.joint and f"[{one.joint}]" in one.field:
             yield one.topic, one.field.replace(f"[{one.joint}]", "[*]"), one.joint, True
+        return
+    if "*" in one.column:  # which a pattern cannot name
         return
     for joint in joints:
         for name in {joint, _plain(joint)}:

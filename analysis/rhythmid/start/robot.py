@@ -140,17 +140,6 @@ def _signals(
     bag, doubts = found.is_bag, list[str]()
     chosen = {"output": output.first} | ({"input": reference.first} if reference else {})
     clock, reason = header_clock(chosen) if bag else (found.clock, found.clock_reason)
-    same = all(joint == name for joint, name in joints.items())
-    if output.told:
-        names = (
-            ", ".join(joints)
-            if same
-            else ", ".join(f"{joint}: {json.dumps(name)}" for joint, name in joints.items())
-        )
-    elif output.pattern.endswith("[*]"):  # entries of an array are told by their places in the list
-        names, same = ", ".join(joints), True
-    else:
-        names = ", ".join(f"{joint}: {json.dumps(name)}" for joint, name in joints.items())
     if not output.told:
         doubts.append(
             "joints: they are numbered in the recording; their order is taken to be that of the robot's file"
@@ -158,7 +147,7 @@ def _signals(
     lines = [
         *comment(f"Which channels of {found.path.name} are those of the robot's joints. Guessed by `rhythmid init`: look through it and correct what is wrong."),
         "", *(line for doubt in doubts for line in comment(f"CHECK {doubt}.")),
-        f"joints: {'[' if same else '{'}{names}{']' if same else '}'}",
+        f"joints: {_names(joints, output)}",
         "", *comment(f"time: {reason}."), f"time: {time_of(clock)}",
         "", f"output: {{{output.channel(bag)}}}",
     ]  # fmt: skip
@@ -182,6 +171,16 @@ def _signals(
             f"effort: {{{effort.channel(bag)}, taken: before_actuator}}",
         ]  # fmt: skip
     return "\n".join(lines) + "\n", doubts
+
+
+def _names(joints: Mapping[str, str], output: Family) -> str:
+    """The robot's joints, with their names in the recording where these are others."""
+    by_place = (
+        output.pattern.endswith("[*]") and not output.told
+    )  # entries of an array are told by their places in the list
+    if by_place or all(joint == name for joint, name in joints.items()):
+        return f"[{', '.join(joints)}]"
+    return f"{{{', '.join(f'{joint}: {json.dumps(name)}' for joint, name in joints.items())}}}"
 
 
 def _model(
