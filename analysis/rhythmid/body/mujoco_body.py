@@ -18,9 +18,7 @@ from rhythmid.body.robot_file import FIXED, FREE, LEAST_MASS, mujoco, read_robot
 from rhythmid.errors import InputError
 
 HEAVIEST = 1e6  # [kg] a link with a larger mass is a mistake
-WEIGHTLESS = (
-    1e-10  # [kg] links that weigh less together have no mass of their own, but what makes them divisible
-)
+WEIGHTLESS = 1e-10  # [kg] links that weigh less together have no mass but `LEAST_MASS` each
 
 
 @dataclass(frozen=True, eq=False)

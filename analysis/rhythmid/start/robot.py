@@ -20,10 +20,9 @@ from rhythmid.record.inventory import Inventory, header_clock, inventory
 from rhythmid.record.joint_record import JointSignals, load_joint_records
 from rhythmid.start.families import Family, families_of, joints_of
 from rhythmid.start.meaning import Quantity, meaning_of
-from rhythmid.start.written import comment, time_of
+from rhythmid.start.written import GUESSED, comment, time_of
 
 LITTLE = 0.02  # share of the effort that a first guess of the viscous damping takes
-GUESSED = "guessed signals.yaml"  # what messages call the file that is not written yet
 # first guess of a controller whose gains nobody tells: this frequency [Hz] and damping ratio with the inertia of the joint
 STIFF, DAMPED = 3.0, 0.7
 

@@ -15,10 +15,8 @@ from rhythmid.record.signals import Clock, Signals
 from rhythmid.start.meaning import driving_unit_of
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
 from rhythmid.start.roles import Ask, Roles, first_answer, guess_roles
-from rhythmid.start.written import clock_of, model_yaml, signals_yaml
+from rhythmid.start.written import GUESSED, clock_of, model_yaml, signals_yaml
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
-
-GUESSED = "guessed signals.yaml"  # what messages call the file that is not written yet
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from rhythmid.start.roles import Choice, Roles
 from rhythmid.units import Units
 from rhythmid.value import Value
 
+GUESSED = "guessed signals.yaml"  # what messages call the file that is not written yet
 WIDTH = 110
 LISTED = 8  # alternatives that a comment names
 MEANS = {

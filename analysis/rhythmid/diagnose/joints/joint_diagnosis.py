@@ -130,12 +130,13 @@ class _Explained:
     @property
     def causes(self) -> int:
         """How many causes it takes to explain the records: what is stated, and joints that are not consistent though nothing is."""
+        stated = self.stated
         open_ = [
             joint
             for joint, one in self.found.items()
-            if one.result.decision.verdict != "consistent" and not self.stated[joint] and _different(one)
+            if one.result.decision.verdict != "consistent" and not stated[joint] and _different(one)
         ]
-        return len(self.links) + sum(map(len, self.stated.values())) + len(open_)
+        return len(self.links) + sum(map(len, stated.values())) + len(open_)
 
 
 def _explained(
