@@ -120,6 +120,10 @@ def own(definition: str) -> Topic:
     return Topic("/legs", OWN, definition=definition, definition_format="ros2msg")
 
 
+def test_a_type_with_an_infinite_constant_is_refused():
+    assert "cannot be read" in refusal(lambda: typestore(own("float64 FAR=1e999\nfloat64 position\n")))
+
+
 @pytest.mark.parametrize(
     "definition",
     [

@@ -114,7 +114,7 @@ def typestore(topic: Topic) -> Any:
     store = get_typestore(Stores.EMPTY)
     try:
         store.register(dict(type_fields(topic)))
-    except (TypesysError, SyntaxError) as error:
+    except (TypesysError, SyntaxError, NameError) as error:  # NameError: of a constant that is infinite
         raise InputError(f"{topic.name}: its type {topic.type!r} cannot be read: {error}") from None
     return store
 
