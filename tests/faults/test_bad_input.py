@@ -126,6 +126,10 @@ NO_RECORDINGS = {
     "bag": (nothing, "no such file or directory"),
     "bag/": (empty_folder, "holds no recording (no .mcap or .db3 file)"),
     "bag.mcap": (lambda folder: (folder / "bag.mcap").touch(), "is not an MCAP file"),
+    "pointer.mcap": (
+        lambda folder: (folder / "pointer.mcap").write_text("version https://git-lfs.github.com/spec/v1\n"),
+        "is a pointer of Git LFS, not the data",
+    ),
     "bag.db3": (lambda folder: (folder / "bag.db3").touch(), "is not an sqlite3 bag"),
     "noise.mcap": (
         lambda folder: (folder / "noise.mcap").write_bytes(bytes(range(256))),

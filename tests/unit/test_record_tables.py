@@ -2,6 +2,7 @@
 
 import gzip
 import os
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,7 @@ def signals(folder: Path, file: str, content: str = SIGNALS) -> Path:
 
 
 def check(record) -> None:
-    np.testing.assert_allclose(record.output.time, TIME, atol=1e-12)
+    np.testing.assert_allclose(record.output.time - record.output.time[0], TIME, atol=1e-12)
     np.testing.assert_allclose(record.output.value, Y, atol=1e-12)
     np.testing.assert_allclose(record.input.value, U, atol=1e-12)
 
@@ -156,6 +157,23 @@ def test_a_regular_table_with_lost_rows_is_still_band_limited(tmp_path):
     assert read_record(signals(tmp_path, "run.npz")).hold == "band_limited"
 
 
+@pytest.mark.parametrize(
+    "written",
+    [
+        lambda at: (datetime(2026, 11, 25, 23, 59, 59, 800_000) + timedelta(seconds=at)).isoformat(sep=" "),
+        lambda at: (datetime(2026, 11, 25, 23, 59, 59, 800_000, tzinfo=UTC) + timedelta(seconds=at)).isoformat(),
+        lambda at: (datetime(2026, 11, 25, 23, 59, 59, 800_000) + timedelta(seconds=at)).time().isoformat(),
+    ],
+    ids=["date", "date with a zone", "time of day past midnight"],
+)
+def test_dates_and_times_of_day_are_times(tmp_path, written):
+    rows = [f"{written(float(at))},{u},{y}" for at, u, y in zip(TIME, U, Y)]
+    (tmp_path / "run.csv").write_text("\n".join(["t,u,y", *rows]))
+    record = read_record(signals(tmp_path, "run.csv"))
+    np.testing.assert_allclose(record.output.time - record.output.time[0], TIME, atol=2e-6)  # microseconds are written
+    np.testing.assert_array_equal(record.output.value, Y)
+
+
 def test_the_quality_of_a_table_is_reported(tmp_path):
     kept = np.delete(np.arange(N), [50, 51])
     np.savez(tmp_path / "run.npz", t=TIME[kept], u=U[kept], y=Y[kept])
@@ -164,6 +182,7 @@ def test_the_quality_of_a_table_is_reported(tmp_path):
     assert any("1 gaps, 2 samples lost" in line for line in report.lines())
 
 
+POINTER = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n"
 WRONG = {
     "text in a cell": (text().replace("\n0.0", "\nzero", 1), "run.csv: cannot be read as a table"),
     "mostly NaN": (text(rows=zip(TIME, U, np.where(TIME < TIME[120], np.nan, Y))), "run.csv column y: 120 of 200 samples are NaN"),
@@ -197,6 +216,10 @@ def test_a_spoilt_text_table_is_refused_with_one_line(tmp_path, fault):
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
+        *(
+            (name, POINTER, "is a pointer of Git LFS, not the data")
+            for name in ("run.csv", "run.mat", "run.parquet")
+        ),
         ("run.npz", b"", "run.npz: cannot be read as a table"),
         ("run.npz", b"PK\x03\x04 broken", "run.npz: cannot be read as a table"),
         ("run.mat", b"MATLAB 5.0 MAT-file, or not", "run.mat: cannot be read as a table"),

@@ -10,6 +10,7 @@ from rhythmid import document
 from rhythmid.errors import InputError
 from rhythmid.record.block import Block, Topic, Wanted
 from rhythmid.record.compression import decompress_file
+from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.mcap_reader import McapReader
 from rhythmid.record.sqlite_reader import SqliteReader
 
@@ -92,6 +93,7 @@ class Bag:
     def blocks(self, wanted: Wanted = lambda topic: True) -> Iterator[Block]:
         """Messages of the wanted topics, block by block in the order of recording. Raises InputError."""
         for file in self.files:
+            check_content(file)
             if file.suffix != ".zstd":
                 yield from self._read(file, wanted)
                 continue

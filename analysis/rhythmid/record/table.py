@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.record.compression import largest
+from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.own_process import arrays_in_own_process
 from rhythmid.record.text_table import COMPRESSED, TEXT, read_text
 
@@ -50,6 +51,7 @@ class Table:
                 f"{path}: is not a table; .mat, .npz, .parquet and {', '.join(TEXT)} can be read"
             )
         try:
+            check_content(path)
             return cls(path, read(path))
         except FileNotFoundError:
             raise InputError(f"{path}: no such file") from None

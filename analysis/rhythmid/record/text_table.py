@@ -16,6 +16,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from rhythmid.errors import InputError
+from rhythmid.record.clock_time import seconds
 from rhythmid.record.compression import largest
 from rhythmid.record.heading import is_unit
 
@@ -50,7 +51,7 @@ class Dialect:
 
 
 def read_text(path: Path) -> dict[str, Any]:
-    """Columns of a text table by name: float64[n] each, text[n] where a column holds words.
+    """Columns of a text table by name: float64[n] each, dates and times of day in seconds, text[n] where a column holds words.
 
     Raises InputError where the file is empty, its names are not unique or do not belong to the rows; ValueError where a row
     is damaged.
@@ -71,9 +72,7 @@ def read_text(path: Path) -> dict[str, Any]:
         with _opened(path, encoding) as file:
             lines = (line for line in islice(file, dialect.first, None) if _content(line))
             cells = [_cells(line, dialect.separator) for line in lines]
-        found |= {
-            dialect.names[place]: np.array([row[place] for row in cells], dtype=object) for place in words
-        }  # fixed-width text would take the longest cell's size for each
+        found |= {dialect.names[place]: _words([row[place] for row in cells]) for place in words}
     return {name: found[name] for name in dialect.names}
 
 
@@ -178,6 +177,12 @@ def _rows(lines: Iterable[str], dialect: Dialect, columns: tuple[int, ...]) -> n
         except ValueError:
             pass  # an empty cell, say
     return read(held, value)
+
+
+def _words(cells: list[str]) -> np.ndarray:
+    """A column of seconds where its cells are times, of words else."""
+    found = seconds(cells)
+    return np.array(cells, dtype=object) if found is None else found  # fixed-width text would take much more
 
 
 def _content(line: str) -> bool:
