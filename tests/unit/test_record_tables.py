@@ -161,7 +161,9 @@ def test_a_regular_table_with_lost_rows_is_still_band_limited(tmp_path):
     "written",
     [
         lambda at: (datetime(2026, 11, 25, 23, 59, 59, 800_000) + timedelta(seconds=at)).isoformat(sep=" "),
-        lambda at: (datetime(2026, 11, 25, 23, 59, 59, 800_000, tzinfo=UTC) + timedelta(seconds=at)).isoformat(),
+        lambda at: (
+            datetime(2026, 11, 25, 23, 59, 59, 800_000, tzinfo=UTC) + timedelta(seconds=at)
+        ).isoformat(),
         lambda at: (datetime(2026, 11, 25, 23, 59, 59, 800_000) + timedelta(seconds=at)).time().isoformat(),
     ],
     ids=["date", "date with a zone", "time of day past midnight"],
@@ -170,7 +172,9 @@ def test_dates_and_times_of_day_are_times(tmp_path, written):
     rows = [f"{written(float(at))},{u},{y}" for at, u, y in zip(TIME, U, Y)]
     (tmp_path / "run.csv").write_text("\n".join(["t,u,y", *rows]))
     record = read_record(signals(tmp_path, "run.csv"))
-    np.testing.assert_allclose(record.output.time - record.output.time[0], TIME, atol=2e-6)  # microseconds are written
+    np.testing.assert_allclose(
+        record.output.time - record.output.time[0], TIME, atol=2e-6
+    )  # microseconds are written
     np.testing.assert_array_equal(record.output.value, Y)
 
 
@@ -223,12 +227,22 @@ def test_a_spoilt_text_table_is_refused_with_one_line(tmp_path, fault):
         ("run.npz", b"", "run.npz: cannot be read as a table"),
         ("run.npz", b"PK\x03\x04 broken", "run.npz: cannot be read as a table"),
         ("run.mat", b"MATLAB 5.0 MAT-file, or not", "run.mat: cannot be read as a table"),
-        ("run.mat", b"MATLAB 7.3 MAT-file" + bytes(105) + b"\x00\x02IM" + bytes(400), "save it with"),
+        (
+            "run.mat",
+            b"MATLAB 7.3 MAT-file" + bytes(105) + b"\x00\x02IM" + bytes(400),
+            "run.mat: cannot be read as a table",
+        ),
+        ("run.h5", b"", "run.h5: cannot be read as a table"),
+        ("run.h5", b"\x89HDF\r\n\x1a\n" + bytes(range(256)), "run.h5: cannot be read as a table"),
         ("run.csv.gz", b"t,u,y, but not compressed", "run.csv.gz: cannot be read"),
         ("run.csv.gz", gzip.compress(text().encode())[:400], "run.csv.gz: cannot be read as a table"),
         ("run.gz", gzip.compress(text().encode()), "is not a table"),
         ("run.parquet", b"PAR1", "run.parquet: cannot be read"),
-        ("run.xlsx", b"PK", "is not a table; .mat, .npz, .parquet and .csv, .tsv, .txt, .dat can be read"),
+        (
+            "run.xlsx",
+            b"PK",
+            "is not a table; .mat, .h5, .hdf5, .npz, .parquet and .csv, .tsv, .txt, .dat can be read",
+        ),
     ],
 )
 def test_a_spoilt_or_unknown_file_is_refused_with_one_line(tmp_path, name, content, words):

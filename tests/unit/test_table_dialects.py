@@ -2,6 +2,7 @@
 
 import math
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -195,6 +196,56 @@ def test_parquet_is_read_with_its_times_and_lists(tmp_path):
     record = read_record(tmp_path / "run.parquet", Signals.from_text(text))
     np.testing.assert_allclose(record.output.value, Q)
     np.testing.assert_allclose(record.output.time, TIME, atol=1e-6)
+
+
+def hdf5(path: Path, of_matlab: bool = False) -> Path:
+    """A file with a group `robot` of what a robot would record, and much that is no column."""
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512 if of_matlab else 0) as file:
+        group = file.create_group("robot")
+        for name, values in {"t": TIME, "q": np.column_stack([Q, -Q]), "tau": TAU}.items():
+            stored = group.create_dataset(
+                name, data=np.atleast_2d(values) if of_matlab and values.ndim == 1 else values.T
+            )
+            if of_matlab:
+                stored.attrs["MATLAB_class"] = np.bytes_("double")
+        group.create_dataset("who", data="somebody")
+        file.create_dataset("image", data=np.zeros((3, 4, 5)))
+        file["elsewhere"] = h5py.ExternalLink("/nowhere.h5", "/x")
+        file.create_dataset("secret", (8,), "u1", external=[("/etc/hostname", 0, 8)])
+    if of_matlab:
+        path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(512) + path.read_bytes()[512:])
+    return path
+
+
+@pytest.mark.parametrize("name", ["run.h5", "run.hdf5"])
+def test_hdf5_is_read_by_the_paths_of_its_datasets(tmp_path, name):
+    table = Table.load(hdf5(tmp_path / name))
+    assert set(table.columns) == {"robot.t", "robot.q", "robot.tau"}  # nothing of another file
+    np.testing.assert_array_equal(table.columns["robot.q"], np.array([Q, -Q]))
+
+
+def test_a_table_of_matlab_7_3_is_read_as_matlab_shows_it(tmp_path):
+    table = Table.load(hdf5(tmp_path / "run.mat", of_matlab=True))
+    np.testing.assert_array_equal(table.column("robot.t"), TIME)
+    np.testing.assert_array_equal(table.column("robot.q[1]"), -Q)
+
+
+def test_hdf5_that_claims_to_hold_too_much_is_refused(tmp_path):
+    import h5py
+
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file.create_dataset("q", (10**10,), "f8", chunks=(10**6,), compression="gzip")
+    with pytest.raises(InputError, match="claims to hold more than"):
+        Table.load(tmp_path / "run.h5")
+
+
+def test_hdf5_without_its_library_is_refused_with_what_to_install(tmp_path, monkeypatch):
+    hdf5(tmp_path / "run.h5")
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(InputError, match=r"run\.h5: reading HDF5 needs h5py: pip install"):
+        Table.load(tmp_path / "run.h5")
 
 
 def test_parquet_without_its_library_is_refused_with_what_to_install(tmp_path, monkeypatch):

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 
 Arrays = Mapping[str, NDArray[Any]]
-FAILED, UNSUPPORTED = 3, 4  # exit codes: the reader refused the file, or its version
+FAILED = 3  # exit code: the reader refused the file
 
 
 def arrays_in_own_process(read: Callable[[], Arrays], problem: str) -> Arrays:
     """What `read` returns, called in a fork of this process; arrays of objects come back as empty arrays of text.
 
     Nothing but numbers and texts comes back, in NumPy's own format without pickles, so that the reader cannot be made to hand over
-    anything else. Raises InputError, beginning with `problem`, where it raises or the process dies; NotImplementedError where it
-    raises that. Where the system cannot fork, `read` is called here.
+    anything else. Raises InputError, beginning with `problem`, where it raises or the process dies. Where the system cannot fork,
+    `read` is called here.
     """
     if not hasattr(os, "fork"):
         return read()
@@ -35,8 +35,6 @@ def arrays_in_own_process(read: Callable[[], Arrays], problem: str) -> Arrays:
                 os._exit(code)
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         file.seek(0)
-        if code == UNSUPPORTED:
-            raise NotImplementedError
         if code == FAILED:
             raise InputError(f"{problem}: {file.read().decode()}")
         if code != 0:
@@ -55,8 +53,6 @@ def _write(read: Callable[[], Arrays], file: IO[bytes]) -> int:
         arrays = (np.empty(0, dtype=str) if array.dtype.hasobject else array for array in found.values())
         np.savez(file, np.array(list(found), dtype=str), *arrays)
         file.flush()
-    except NotImplementedError:
-        return UNSUPPORTED
     except Exception as error:  # the reader of damaged files raises anything
         file.seek(0)
         file.truncate()

@@ -1,4 +1,4 @@
-"""Tables: columns of numbers in .mat, .npz, .parquet, .csv and other text files, which may be compressed (.csv.gz)."""
+"""Tables: columns of numbers in .mat, .h5, .npz, .parquet, .csv and other text files, which may be compressed (.csv.gz)."""
 
 import re
 from collections.abc import Iterator
@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.record.compression import largest
+from rhythmid.record.hdf5_table import is_hdf5, read_hdf5
 from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.own_process import arrays_in_own_process
 from rhythmid.record.text_table import COMPRESSED, TEXT, read_text
 
-SUFFIXES = (".mat", ".npz", ".parquet", *TEXT)
+HDF5 = (".h5", ".hdf5")
+SUFFIXES = (".mat", *HDF5, ".npz", ".parquet", *TEXT)
 ONE_OF_MANY = re.compile(r"(.+)\[(\d+)\]")  # dof_pos[3]: one column of an array
 
 
@@ -43,20 +45,19 @@ class Table:
     @classmethod
     def load(cls, path: Path) -> "Table":
         """Read a table. Raises InputError when the file is missing, damaged or of an unknown kind."""
-        read = {".mat": _mat, ".npz": _npz, ".parquet": _parquet, **dict.fromkeys(TEXT, read_text)}.get(
-            table_suffix(path)
-        )
+        readers = {
+            ".mat": _mat, ".npz": _npz, ".parquet": _parquet, **dict.fromkeys(HDF5, read_hdf5), **dict.fromkeys(TEXT, read_text),
+        }  # fmt: skip
+        read = readers.get(table_suffix(path))
         if read is None:
             raise InputError(
-                f"{path}: is not a table; .mat, .npz, .parquet and {', '.join(TEXT)} can be read"
+                f"{path}: is not a table; .mat, {', '.join(HDF5)}, .npz, .parquet and {', '.join(TEXT)} can be read"
             )
         try:
             check_content(path)
             return cls(path, read(path))
         except FileNotFoundError:
             raise InputError(f"{path}: no such file") from None
-        except NotImplementedError:
-            raise InputError(f"{path}: is a MATLAB 7.3 file; save it with  save(…, '-v7')") from None
         except InputError:
             raise
         except OSError as error:
@@ -109,14 +110,15 @@ class Table:
 
 
 def _mat(path: Path) -> dict[str, Any]:
+    if is_hdf5(path):  # version 7.3
+        return read_hdf5(path)
     from scipy.io import loadmat
 
     def read() -> dict[str, NDArray[Any]]:
         found = loadmat(path, simplify_cells=True)
         return dict(_flat({name: value for name, value in found.items() if not name.startswith("__")}))
 
-    with path.open("rb"):  # what cannot be opened is told as of any file
-        return dict(arrays_in_own_process(read, f"{path}: cannot be read as a table"))
+    return dict(arrays_in_own_process(read, f"{path}: cannot be read as a table"))
 
 
 def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
