@@ -22,7 +22,8 @@ def evaluate(signal, at):
     knots, coefficients = pieces(signal)
     index = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2)
     local = np.where(np.abs(knots[index]) < FAR / 2, at - knots[index], 0.0)
-    c = coefficients[:, index]
+    c = np.zeros((4, len(index)))
+    c[: len(coefficients)] = coefficients[:, index]
     return c[0] + local * (c[1] + local * (c[2] + local * c[3]))
 
 

@@ -35,12 +35,12 @@ class Inputs:
     @cached_property
     def command(self) -> Pieces:
         """The command, before any delay."""
-        return _contiguous(pieces(self.commanded))
+        return pieces(self.commanded)
 
     @cached_property
     def forcing(self) -> Pieces:
         """The forcing."""
-        return _contiguous(pieces(self.forced))
+        return pieces(self.forced)
 
     @cached_property
     def smooth(self) -> Pieces | None:
@@ -53,8 +53,4 @@ class Inputs:
         usual = nominal_period(step)
         if usual > 2.0 * self.period * (1.0 + 1e-6) or float(np.median(step)) < BURSTS * usual:
             return None
-        return _contiguous(pieces(impulse_preserving(command)))
-
-
-def _contiguous(pair: Pieces) -> Pieces:
-    return np.ascontiguousarray(pair[0]), np.ascontiguousarray(pair[1])
+        return pieces(impulse_preserving(command))

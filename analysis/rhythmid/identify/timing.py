@@ -34,6 +34,10 @@ SMEARS = 3  # widths of command jitter that are tried
 ROLL_OFF_SAMPLES = (
     1_000_000  # samples that tell of a roll-off what there is to be told: further records are not asked
 )
+LEAST_VARIANCE = (
+    0.05  # of the mean square of the residuals, at least expected of each: no single sample decides
+)
+TINY = 1e-300  # in the place of a mean square of zero
 UNEXPLAINED = 1.5  # times the noise floor, beyond which a hold is looked for
 HOLD_GAIN = 25.0  # in chi2 that a hold must bring
 SLOWER = 3.0  # sample periods from which a hold can be told from the commands' own
@@ -149,18 +153,23 @@ def measurement_jitter(fit: Fit) -> Estimate:
         square.append(left[inside] ** 2)
         speed.append(rate[inside] ** 2)
     y, x = np.concatenate(square), np.concatenate(speed)
-    columns = np.column_stack([np.ones(len(x)), x / max(float(x.mean()), 1e-300)])
-    weight = np.full(len(x), 1.0)
-    solution = np.zeros(2)
-    for _ in range(4):
-        solution = np.linalg.lstsq(columns * weight[:, None], y * weight, rcond=1e-12)[0]
-        expected = np.maximum(columns @ np.maximum(solution, 0.0), 0.05 * float(y.mean()) + 1e-300)
-        weight = 1.0 / expected
-    scatter = columns * weight[:, None]
-    left = (y - columns @ solution) * weight
-    covariance = np.linalg.pinv(scatter.T @ scatter) * float(np.mean(left**2))
-    variance = float(solution[1]) / float(x.mean())
-    spread = math.sqrt(covariance[1, 1]) / float(x.mean())
+    del square, speed  # of a long recording there is no room for a second copy
+    per_speed, size = max(float(x.mean()), TINY), max(float(y.mean()), TINY)
+    x /= per_speed
+    y /= size
+    solution, weight = np.zeros(2), np.ones(len(x))
+    inverse = np.eye(2)
+    for again in range(4):
+        if again:
+            weight = np.maximum(solution[0], 0.0) + np.maximum(solution[1], 0.0) * x
+            weight = np.maximum(weight, LEAST_VARIANCE, out=weight) ** -2.0
+        sums = weight.sum(), weight @ x, np.einsum("i,i,i", weight, x, x)
+        inverse = np.linalg.pinv(np.array([sums[:2], sums[1:]]), hermitian=True)
+        solution = inverse @ np.array([weight @ y, np.einsum("i,i,i", weight, x, y)])
+    y -= solution[0] + solution[1] * x
+    covariance = inverse * float(np.einsum("i,i,i", weight, y, y)) / len(y)
+    variance = float(solution[1]) * size / per_speed
+    spread = math.sqrt(covariance[1, 1]) * size / per_speed
     std = math.sqrt(max(variance, 0.0))
     return Estimate(std, spread / (2.0 * max(std, math.sqrt(spread))), "s")
 

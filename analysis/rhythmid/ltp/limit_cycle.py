@@ -116,8 +116,8 @@ class PeriodMap:
     def __init__(self, model: Model, pumping: Pumping, excited: InputKind, max_step: float) -> None:
         self.compiled = compile_model(model, Variant(excited, rational=True))
         self.parameters = self.compiled.layout.vector(model)
-        self.still = tuple(np.ascontiguousarray(part) for part in pieces(None))
-        self.forcing = tuple(np.ascontiguousarray(part) for part in pieces(pumping.signal()))
+        self.still = pieces(None)
+        self.forcing = pieces(pumping.signal())
         self.ends = np.array([0.0, pumping.period])
         self.max_step = max_step
 

@@ -1,6 +1,6 @@
 """Piecewise cubic signals inside a compiled simulation, where their knots are passed in order.
 
-Coefficients stand as in `scipy.interpolate.PPoly`, but the lowest power first. The text of these functions is compiled
+Coefficients stand as in `scipy.interpolate.PPoly`, but the lowest power first: one row for a signal that is held, else four. The text of these functions is compiled
 once into a module of its own, which all generated ones import.
 """
 # pyright: reportMissingParameterType=false, reportUnknownParameterType=false
@@ -15,11 +15,15 @@ def piece_at(knots, i, t):
 
 def value_at(knots, c, i, t):
     """Value of piece i at time t."""
+    if c.shape[0] == 1:
+        return c[0, i]
     x = t - knots[i]
     return ((c[3, i] * x + c[2, i]) * x + c[1, i]) * x + c[0, i]
 
 
 def slope_at(knots, c, i, t):
     """Derivative of piece i at time t."""
+    if c.shape[0] == 1:
+        return 0.0
     x = t - knots[i]
     return (3.0 * c[3, i] * x + 2.0 * c[2, i]) * x + c[1, i]

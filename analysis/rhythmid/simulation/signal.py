@@ -125,21 +125,20 @@ def fast_length(least: int) -> int:
 
 
 def pieces(signal: PPoly | None) -> tuple[Array, Array]:
-    """Knots (K+1,) and cubic coefficients (4, K), lowest power first, extended over all time.
+    """Knots (K+1,) and coefficients, lowest power first, extended over all time: (1, K) of a held signal, else (4, K).
 
     Before the first knot a zero-order-held signal is 0 (no command has arrived yet), a smooth one keeps its first
     value; after the last knot each keeps its last value. None is the zero signal.
     """
     if signal is None:
-        return np.array([-FAR, FAR]), np.zeros((4, 1))
-    degree = signal.c.shape[0] - 1
-    body = np.zeros((4, signal.c.shape[1]))
-    body[: degree + 1] = signal.c[::-1]
-    before = np.zeros((4, 1))
-    if degree > 0:
-        before[0, 0] = body[0, 0]
-    if signal.x[-1] > FOR_EVER:
-        return np.concatenate([[-FAR], signal.x[:-1], [FAR]]), np.hstack([before, body])
-    after = np.zeros((4, 1))
-    after[0, 0] = float(signal(signal.x[-1]))
-    return np.concatenate([[-FAR], signal.x, [FAR]]), np.hstack([before, body, after])
+        return np.array([-FAR, FAR]), np.zeros((1, 1))
+    held, ends = signal.c.shape[0] == 1, signal.x[-1] <= FOR_EVER
+    count = signal.c.shape[1]
+    coefficients = np.zeros((1 if held else 4, 1 + count + ends))
+    coefficients[: len(signal.c), 1 : 1 + count] = signal.c[::-1]
+    if not held:
+        coefficients[0, 0] = coefficients[0, 1]
+    if ends:
+        coefficients[0, -1] = float(signal(signal.x[-1]))
+    knots = signal.x if ends else signal.x[:-1]
+    return np.concatenate([[-FAR], knots, [FAR]]), coefficients

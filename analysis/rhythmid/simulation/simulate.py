@@ -91,7 +91,7 @@ def simulate(
     n = len(compiled.layout.states)
     out = np.empty((len(times), n + 2))
     done = compiled.run(
-        physical, knots_u, np.ascontiguousarray(pieces_u), knots_w, np.ascontiguousarray(pieces_w), *pieces(None),
+        physical, knots_u, pieces_u, knots_w, pieces_w, *pieces(None),
         compiled.layout.vector(model), np.ascontiguousarray(start), max_step, out,
     )  # fmt: skip
     if done < len(times) or not np.isfinite(out[-1]).all():

@@ -85,8 +85,7 @@ class Simulation:
             return pieces(None)
         if self.settings.hold == "zero":
             knots = np.maximum.accumulate(time + self._late(time) + later)
-            coefficients = np.zeros((4, len(time) + 1))
-            coefficients[0, 1:] = value
+            coefficients = np.concatenate([[0.0], value])[None, :]
             return np.concatenate([[-FAR], knots, [FAR]]), coefficients
         if len(time) < 4:
             return pieces(None)
@@ -94,7 +93,7 @@ class Simulation:
         knots, coefficients = pieces(signal)
         knots = knots.copy()
         knots[1:-1] += self._late(knots[1:-1]) + later
-        return knots, np.ascontiguousarray(coefficients)
+        return knots, coefficients
 
     @property
     def longest_delay(self) -> float:
