@@ -20,7 +20,7 @@ from rhythmid.identify.record_scales import REST_LENGTH
 from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
-from rhythmid.simulation.signal import band_limited, first_order_hold
+from rhythmid.simulation.signal import OVERSAMPLING, band_limited, first_order_hold
 from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 from rhythmid.value import Prior
 
@@ -182,7 +182,11 @@ def reconstructed(series: Series) -> Series:
         return series
     time, value = command.x[:-1], command.c[-1]
     even = np.ptp(np.diff(time)) < EVEN * float(np.median(np.diff(time)))
-    return replace(series, command=band_limited(time, value) if even else first_order_hold(time, value))
+    if not even:
+        return replace(series, command=first_order_hold(time, value))
+    # averages hold nothing near the Nyquist frequency, where the samples alone would be too few
+    finer = 1 if series.block > 1 else OVERSAMPLING
+    return replace(series, command=band_limited(time, value, finer))
 
 
 def _hold(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None, tell: Tell) -> Calibration:

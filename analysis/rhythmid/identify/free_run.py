@@ -11,7 +11,6 @@ from scipy.interpolate import PPoly
 from rhythmid.elements.element import STEP
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model
-from rhythmid.identify.inputs import Inputs
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.record.timing import nominal_period
@@ -37,7 +36,6 @@ class FreeRun:
     compiled: Compiled
     stopping: Callable[[], Compiled]
     series: tuple[Series, ...]
-    inputs: tuple[Inputs, ...]
     smooth: bool
     max_step: float
 
@@ -52,12 +50,13 @@ class FreeRun:
         The start is the state at the first centre; what the record declares of the model's parameters replaces the model's own.
         None when the simulation diverges.
         """
-        one, given = self.series[index], self.inputs[index]
+        one = self.series[index]
+        given = one.inputs
         model = own_model(model, one)
         times = np.ascontiguousarray(physical_times(model, one.centres))
         late = command_delay(model, given.stamps)
         varies = late is not None and len(late) > 0 and np.ptp(late) > 0.0
-        smooth = given.smooth if self.smooth else None
+        smooth = one.smooth if self.smooth else None
         compiled = self.compiled if smooth is None or not varies else self.stopping()
         knots, coefficients = given.command if smooth is None or varies else smooth
         if late is not None and len(late):
@@ -122,15 +121,12 @@ def prepare_run(
             f"records that measure different things ({', '.join(sorted(sensors))}) cannot be fitted together"
         )
     measured: OutputKind = sensors.pop() if sensors else "position"
-    smooth = not _sees_steps(model) and all(
-        one.command is None or one.inputs.smooth is not None for one in series
-    )
+    smooth = not _sees_steps(model) and all(one.command is None or one.smooth is not None for one in series)
     variant = Variant(excited, measured, smooth, disturbed)
     return FreeRun(
         compile_model(model, variant),
         lambda: compile_model(model, replace(variant, smooth=False)),
         tuple(series),
-        tuple(one.inputs for one in series),
         smooth,
         max_step or min([*(one.period * one.block for one in series), *([] if smooth else _ticks(series))]),
     )
@@ -155,8 +151,7 @@ def _value(signal: PPoly | None, time: float) -> float:
 def with_series(run: FreeRun, index: int, series: Series) -> FreeRun:
     """The run with one series exchanged, such as for one with another command; its steps end at the command's knots."""
     every = (*run.series[:index], series, *run.series[index + 1 :])
-    inputs = (*run.inputs[:index], series.inputs, *run.inputs[index + 1 :])
-    return replace(run, compiled=run.stopping(), series=every, inputs=inputs, smooth=False)
+    return replace(run, compiled=run.stopping(), series=every, smooth=False)
 
 
 def accurate(

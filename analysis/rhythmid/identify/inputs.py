@@ -1,4 +1,5 @@
-"""What drives a series, as the compiled loop takes it: made when it is asked for, once, and shared by all runs over the series."""
+"""What drives a series, as the compiled loop takes it: made when it is asked for, once, and shared by all series with
+the same signals: of long records they are most of what has to be held in memory."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,14 +16,12 @@ Pieces = tuple[Array, Array]
 SMOOTHED_FROM = 16  # knots of a command that has a smooth surrogate, more than these
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Inputs:
-    """The signals of a series; `period` [s] is that of its samples, `averaged` whether several of them are averaged into one."""
+    """Command and forcing of a series, or of several."""
 
     commanded: PPoly | None
     forced: PPoly | None
-    period: float
-    averaged: bool
 
     @property
     def stamps(self) -> Array:
@@ -43,14 +42,17 @@ class Inputs:
         return pieces(self.forced)
 
     @cached_property
-    def smooth(self) -> Pieces | None:
-        """Smooth surrogate for a held command that changes about as often as the measurement is sampled, or more often, and at even
-        times; None where there is none."""
+    def even_tick(self) -> float:
+        """Usual time [s] between the knots of a held command; infinite where there is none, or where its times are uneven."""
         command = self.commanded
-        if command is None or command.c.shape[0] > 1 or len(command.x) <= SMOOTHED_FROM or not self.averaged:
-            return None
+        if command is None or command.c.shape[0] > 1 or len(command.x) <= SMOOTHED_FROM:
+            return np.inf
         step = np.diff(command.x[:-1])
         usual = nominal_period(step)
-        if usual > 2.0 * self.period * (1.0 + 1e-6) or float(np.median(step)) < BURSTS * usual:
-            return None
-        return pieces(impulse_preserving(command))
+        return np.inf if float(np.median(step)) < BURSTS * usual else usual
+
+    @cached_property
+    def smooth(self) -> Pieces:
+        """Smooth surrogate for the command, which is held at an even tick."""
+        assert self.commanded is not None
+        return pieces(impulse_preserving(self.commanded))

@@ -14,7 +14,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import PPoly
 
 from rhythmid.errors import InputError
-from rhythmid.identify.inputs import Inputs
+from rhythmid.identify.inputs import Inputs, Pieces
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.spread import relative_spreads
 from rhythmid.record.quality import resolution
@@ -47,7 +47,8 @@ class Series:
     where that is known up to its size, as that of what jitter of commands excites.
     `zero` is what was taken off the samples because the output's zero is not that of the first record, as far as that is known; None
     where it is; see `record_zero`. `origin` is where the motion begins that the model integrates, which nothing measures: of a stretch of a
-    record of a speed, the displacement since the record began; see `displacement`.
+    record of a speed, the displacement since the record began; see `displacement`. `inputs` are command and forcing as the compiled loop
+    takes them, made by itself.
     """
 
     name: str
@@ -69,6 +70,12 @@ class Series:
     colour: NoiseModel | None = None
     zero: float | None = None
     origin: float = 0.0
+    inputs: Inputs = field(default=Inputs(None, None), repr=False)
+
+    def __post_init__(self) -> None:
+        """Keep the inputs of the series that this one was made from, where the signals are the same."""
+        if self.inputs.commanded is not self.command or self.inputs.forced is not self.forcing:
+            object.__setattr__(self, "inputs", Inputs(self.command, self.forcing))
 
     @property
     def blocks(self) -> int:
@@ -119,10 +126,12 @@ class Series:
         away = (kept - np.repeat(self.centres, self.block)) / (self.block * self.period)
         return 0.5 * (away**2).reshape(self.blocks, self.block).mean(axis=1)
 
-    @cached_property
-    def inputs(self) -> Inputs:
-        """Command and forcing as the compiled loop takes them."""
-        return Inputs(self.command, self.forcing, self.period, self.block > 1)
+    @property
+    def smooth(self) -> Pieces | None:
+        """Smooth surrogate for a held command that changes about as often as the measurement is sampled, or more often, and at even
+        times, where samples are averaged; None where there is none."""
+        often = self.inputs.even_tick <= 2.0 * self.period * (1.0 + 1e-6)
+        return self.inputs.smooth if often and self.block > 1 else None
 
     @cached_property
     def averaged(self) -> Array:

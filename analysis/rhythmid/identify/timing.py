@@ -214,7 +214,7 @@ def _first_samples(fit: Fit, enough: int) -> Fit:
     count = int(np.searchsorted(ends, enough)) + 1
     if count >= len(ends):
         return fit
-    run = replace(fit.run, series=fit.run.series[:count], inputs=fit.run.inputs[:count])
+    run = replace(fit.run, series=fit.run.series[:count])
     return replace(fit, run=run, starts=fit.starts[:count], residuals=fit.residuals[:count])
 
 

@@ -15,6 +15,7 @@ Hold = Literal["zero", "linear", "band_limited"]
 Array = NDArray[np.float64]
 
 FAR = 1e300  # seconds; stands for "for ever" in the compiled simulator, where inf - inf would be NaN
+OVERSAMPLING = 4  # by which cubic pieces follow a signal up to its Nyquist frequency
 FOR_EVER = FAR / 2  # [s] a knot beyond it is no time: the last value is held for ever
 
 
@@ -38,7 +39,7 @@ def spline(time: Array, value: Array) -> PPoly:
     return PPoly(fitted.c, fitted.x, extrapolate=True)
 
 
-def band_limited(time: Array, value: Array, oversampling: int = 4) -> PPoly:
+def band_limited(time: Array, value: Array, oversampling: int = OVERSAMPLING) -> PPoly:
     """Reconstruct a uniformly sampled band-limited signal (anti-alias filtered measurement); n >= 4.
 
     Where samples are missing, the stretches on either side are reconstructed each by itself and joined by a straight line.
