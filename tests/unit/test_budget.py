@@ -43,6 +43,13 @@ def test_by_motion_a_budget_that_is_spent_at_once_tells_elements_and_other_expla
     assert "coulomb_friction" in elements and "freed values" in others
 
 
+@pytest.mark.parametrize("scored", ["by_motion", "by_effort"])
+def test_a_search_that_a_budget_ends_calls_nothing_unknown_that_it_did_not_try(monkeypatch, scored):
+    spent(monkeypatch, True)
+    found = by_motion() if scored == "by_motion" else by_effort()
+    assert found.verdict == "undecided" and found.summary.startswith("The budget ended the search")
+
+
 def test_by_motion_a_budget_that_is_spent_after_an_effect_tells_that_it_was_not_tried_without(monkeypatch):
     spent(monkeypatch, False, True)
     found = by_motion()

@@ -232,7 +232,9 @@ def _contest(
         return shape_of(trial.model, trial.added, run, sizes)
 
     hypotheses = tuple(hypotheses_of(contenders, rows, shape))
-    return Contest(hypotheses, maps, len(names), rows.size, PRACTICAL, follows=FOLLOWS)
+    return Contest(
+        hypotheses, maps, len(names), rows.size, PRACTICAL, follows=FOLLOWS, cut_short=found.cut_short
+    )
 
 
 def _maps(

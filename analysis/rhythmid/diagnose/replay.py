@@ -38,6 +38,7 @@ def ledger(contest: Contest, detectable: float, size_errors: Mapping[str, float]
         "size": contest.size,
         "practical": contest.practical,
         "follows": contest.follows if math.isfinite(contest.follows) else None,
+        "cut_short": contest.cut_short,
         "detectable": detectable,
         "size_errors": {
             label: error if math.isfinite(error) else None for label, error in size_errors.items()
@@ -83,6 +84,7 @@ def contest_of(data: dict[str, Any]) -> Contest:
         data["practical"],
         hypotheses[competing:],
         data.get("follows") or math.inf,
+        data.get("cut_short", False),
     )
 
 

@@ -38,6 +38,7 @@ class Contest:
         predict is no measure for anything.
     follows : error on held-out data, as a share of `size`, up to which a model follows the machine; infinite for an effort, whose noise
         may be as large.
+    cut_short : whether the budget ended the search before all effects that scored well were tried.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -47,6 +48,7 @@ class Contest:
     practical: float
     ruled_out: tuple[Hypothesis, ...] = ()
     follows: float = math.inf
+    cut_short: bool = False
 
     @property
     def nominal(self) -> Hypothesis:

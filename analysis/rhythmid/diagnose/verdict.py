@@ -204,6 +204,7 @@ def decide(
         size_errors.get(labels[0], 0.0) if labels else 0.0,
         joint_probability([names[label] for label in labels], contest, chosen, weights),
         bool(groups),
+        contest.cut_short,
     )
     rule = rule_for(found)
     named = stated if rule.verdict == "missing_physics" else labels

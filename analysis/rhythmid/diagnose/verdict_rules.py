@@ -29,6 +29,7 @@ class Outcome:
     vague : standard deviation of the size of its effect with the largest share, relative to the size.
     evidence : share of the evidence for hypotheses that hold all of its names.
     alike : whether other names predict as well in the place of one of them.
+    cut_short : whether the budget ended the search before all effects that scored well were tried.
     """
 
     kind: Kind
@@ -43,6 +44,7 @@ class Outcome:
     vague: float
     evidence: float
     alike: bool
+    cut_short: bool = False
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,20 @@ def _is(kind: Kind) -> Callable[[Outcome], float]:
     return lambda found: float(found.kind == kind)
 
 
+def _of_search(statistic: Callable[[Outcome], float], cut_short: bool) -> Callable[[Outcome], float]:
+    """The statistic where the search was cut short, or where it was not, else 0."""
+    return lambda found: statistic(found) if found.cut_short is cut_short else 0.0
+
+
 VERDICT_RULES: tuple[VerdictRule, ...] = (
+    VerdictRule(
+        "none_yet",
+        "no effect is accepted, and the budget ended the search: the statistic of `unnamed_remainder`",
+        1.0,
+        "undecided",
+        "the budget ended the search, and an effect that was not tried may explain the mismatch, which depends on {goes_with}",
+        _of_search(_alone(lambda found: found.remainder), True),
+    ),
     VerdictRule(
         "unnamed_remainder",
         "no effect is accepted: rms that a free function or further effects predict beyond chance, two standard errors below its estimate, divided by "
@@ -119,6 +134,14 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         lambda found: float(found.delay_alone),
     ),
     VerdictRule(
+        "more_to_try",
+        "the budget ended the search: share of the mismatch that the effects leave and something else predicts",
+        1.0 - MAINLY,
+        "undecided",
+        "the budget ended the search, and the effects found so far leave {left:.0f} % of the mismatch, which depends on {goes_with}",
+        _of_search(lambda found: found.left, True),
+    ),
+    VerdictRule(
         "mostly_left",
         "share of the mismatch that the effects leave and something else predicts",
         1.0 - MAINLY,
@@ -160,11 +183,11 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
     ),
     VerdictRule(
         "partly_left",
-        "share of the mismatch that the effects leave and something else predicts",
+        "share of the mismatch that the effects leave and something else predicts, where the budget did not end the search",
         1.0 - EXPLAINED,
         "unknown_physics",
         "this effect is mainly what is missing, but {left:.0f} % of the mismatch is left and depends on {goes_with}",
-        lambda found: found.left,
+        _of_search(lambda found: found.left, False),
     ),
     VerdictRule(
         "rivals",

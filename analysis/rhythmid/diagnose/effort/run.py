@@ -152,6 +152,7 @@ def effort_run(
         size,
         PRACTICAL_EFFORT,
         tuple(claimed(one, ruled_out[one.elements]) for one in found.ruled_out),
+        cut_short=found.cut_short,
     )
     selection = select(contest)
     chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)

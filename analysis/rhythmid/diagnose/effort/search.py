@@ -69,6 +69,7 @@ class EffortSearch:
     condition : of the nominal model's scaled columns.
     not_tried : why candidates of the catalogue took no part, by name; and what the budget cut off.
     candidates : number of effects that were tried.
+    cut_short : whether the budget ended the search.
     """
 
     balance: Balance
@@ -82,6 +83,7 @@ class EffortSearch:
     condition: float
     not_tried: Mapping[str, str]
     candidates: int
+    cut_short: bool = False
 
 
 def kin(first: Element, second: Element) -> bool:
@@ -136,7 +138,7 @@ def search_effort(
         search.reduce(one)
     beyond = reference_of(balance, chosen, search.blocks)
     return EffortSearch(
-        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)) | cut, len(search.tried),
+        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)) | cut, len(search.tried), bool(cut),
     )  # fmt: skip
 
 

@@ -78,7 +78,8 @@ class Search:
 
     `nominal` is the refitted nominal model, `best` the chosen one (the nominal one when nothing is missing) and `fit` its
     full fit, all under the same `noise`. `trials` are all models that were refitted, by information criterion;
-    `excluded` those that could not be simulated, with the reason.
+    `excluded` those that could not be simulated, with the reason. `cut_short` says whether the budget ended the search before all
+    effects that scored well were tried.
     """
 
     nominal: Fit
@@ -88,6 +89,7 @@ class Search:
     trials: tuple[Trial, ...]
     rounds: tuple[Round, ...]
     excluded: tuple[tuple[tuple[str, ...], str], ...]
+    cut_short: bool = False
 
 
 def _proposals(base: Model, now: Round, count: int, chi2: float) -> tuple[list[Proposal], list[float]]:
@@ -177,7 +179,7 @@ def search(
     best = here = base
     rounds, excluded = [first], not_tried(nominal, catalogue, first)
     now = first
-    gained = 0.0
+    gained, cut_short = 0.0, False
     while (
         now.chance < LEVEL
         and _could_pay(now, best, max(WORTH, SHARE * gained), current)
@@ -185,6 +187,7 @@ def search(
     ):
         if budget.spent:
             excluded += [((score.element.name,), SPENT) for score, _ in distinct(now.scores, REFITTED)]
+            cut_short = True
             break
         count = REFITTED if not best.added else REFITTED - 1
         proposals, enough = _proposals(here.model, replace(now, added=here.added), count, here.chi2)
@@ -263,7 +266,14 @@ def search(
         best = next(t for t in ranked if set(t.added) == set(best.added))
     fit = whole_fit(best, series, noise, step, pool=pool)
     return Search(
-        under(nominal, noise, pool), best, fit, noise, tuple(ranked), tuple(rounds), tuple(excluded)
+        under(nominal, noise, pool),
+        best,
+        fit,
+        noise,
+        tuple(ranked),
+        tuple(rounds),
+        tuple(excluded),
+        cut_short,
     )
 
 
