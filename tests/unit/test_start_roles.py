@@ -307,6 +307,17 @@ def test_a_time_is_no_channel_beside_a_rate_that_is_given(tmp_path):
     assert "Left out: 0: goes forward like a time" in text
 
 
+def test_an_effort_that_never_changes_is_a_step_where_nothing_else_drives(tmp_path):
+    after = TIME[::8]
+    speed = 0.6 * (1.0 - np.exp(-after / 0.3))
+    np.savez(tmp_path / "run.npz", t=after, voltage=np.full(len(after), 10.0), speed=speed)
+    found = guess(tmp_path / "run.npz")
+    assert found.roles.choices["input"].recorded.column == "voltage"
+    assert "CHECK: it never changes: taken for a step" in found.signals and "Left out" not in found.signals
+    np.savez(tmp_path / "off.npz", t=after, voltage=np.zeros(len(after)), speed=speed)
+    assert roles_of(tmp_path / "off.npz") == {"output": "speed"}
+
+
 def test_a_unit_that_is_glued_to_a_name_tells_that_the_machine_turns(tmp_path):
     np.savez(tmp_path / "run.npz", t=TIME, u=FORCE, yrad=X)
     found = guess(tmp_path / "run.npz")

@@ -46,12 +46,14 @@ class PaperResult:
 def paper_method(record: Record, model: Model, pumping: Pumping, harmonics: int = HARMONICS) -> PaperResult:
     """Identify `model` and its delays from a record by the paper's method.
 
-    Raises InputError when the record has no input, is too short, or the model has no limit cycle.
+    Raises InputError when the record has no input or one that never changes, is too short, or the model has no limit cycle.
     """
     if record.input is None:
         raise InputError(
             f"{record.name}: has no input channel; identification needs the excitation (`rhythmid diagnose` takes records without)"
         )
+    if np.ptp(record.input.value) == 0.0:
+        raise InputError(f"{record.name}: its input never changes; transfer functions need an excitation")
     ring_down = linearised(model, pumping).cycle.ring_down
     for _ in range(2):  # the smoothing follows the ring-down, which is known once the model is fitted
         measured = spectra(record, pumping, ring_down, harmonics + 1)

@@ -133,7 +133,7 @@ def _on_sample(channel: Channel, time: float) -> float:
 def _input_integral(record: Record, window: Window, period: float, bins: int) -> Complex:
     """∫ u(t) exp(−jω_l t) dt over the window for l = 0 … bins, with t from its start; the hold is integrated exactly."""
     command = record.input
-    if command is None or not np.any(command.value):
+    if command is None or np.ptp(command.value) == 0.0:
         return np.zeros(bins + 1, dtype=complex)
     length = window.periods * period
     highest = 2.0 * np.pi * bins / length
@@ -151,7 +151,7 @@ def _input_integral(record: Record, window: Window, period: float, bins: int) ->
 
 
 def highest_input(record: Record) -> float:
-    """Frequency [Hz] up to which the input has power (1e-6 of its greatest density is neglected); 0 for no input."""
+    """Frequency [Hz] up to which the input has power (1e-6 of its greatest density is neglected); 0 for none, or one that never changes."""
     command = record.input
     if command is None or len(command) < 8 or not np.any(command.value):
         return 0.0

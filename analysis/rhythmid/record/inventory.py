@@ -86,13 +86,15 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Inventory:
-    """All numbers of a source that change, how its times are told and why, and what was left out."""
+    """All numbers of a source that change, how its times are told and why, what was left out, and of that what stands still at
+    another value than zero."""
 
     path: Path
     recorded: tuple[Recorded, ...]
     clock: Clock
     clock_reason: str
     left_out: tuple[str, ...] = ()
+    constant: tuple[Recorded, ...] = ()
 
     @property
     def is_bag(self) -> bool:
@@ -127,7 +129,7 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
     else:
         clock, reason = _table_clock(table.path, columns, unequal)
         time = dict(columns)[str(clock.column)] * clock.scale
-    found, left = [], []
+    found, left, constant = [], [], []
     for name, value in columns:
         heading = heading_of(name)
         if clock.kind == "column" and (name == clock.column or _is_time(name, value)):
@@ -135,19 +137,22 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
         if clock.kind == "rate" and (_is_time(name, value) or (name.isdigit() and _even(value))):
             left.append(f"{name}: goes forward like a time")
             continue
+        one = Recorded(
+            heading.name, time, value * heading.scale, column=name, unit=heading.unit, scale=heading.scale,
+            written_unit=heading.written,
+        )  # fmt: skip
         if COUNTER.fullmatch(heading.name) and np.ptp(np.diff(value)) == 0.0:
             left.append(f"{name}: counts the rows")
         elif not np.isfinite(value).any() or np.nanmax(value) == np.nanmin(value):
             left.append(f"{name}: never changes")
+            constant.append(one)
         else:
-            scaled = value * heading.scale
-            found.append(
-                Recorded(
-                    heading.name, time, scaled, column=name, unit=heading.unit, scale=heading.scale,
-                    written_unit=heading.written,
-                )
-            )  # fmt: skip
-    return Inventory(table.path, tuple(found), clock, reason, tuple(left))
+            found.append(one)
+    return Inventory(table.path, tuple(found), clock, reason, tuple(left), _not_zero(constant))
+
+
+def _not_zero(constant: list[Recorded]) -> tuple[Recorded, ...]:
+    return tuple(one for one in constant if np.isfinite(one.value).all() and one.value[0] != 0.0)
 
 
 def _vectors(table: Table) -> Iterator[tuple[str, Array]]:
@@ -267,12 +272,14 @@ def _of_bag(bag: Bag) -> Inventory:
     begin = min((int(one.log_ns.min()) for one in columns.values() if len(one.log_ns)), default=0)
     found = [one for name, fields in wanted.items() for one in _filled(fields, columns[name], begin)]
     moving = [one for one in found if len(one.value) > 1 and np.ptp(one.value) > 0.0]
-    left += [f"{one}: never changes" for one in found if one not in moving]
+    constant = [one for one in found if one not in moving]
+    left += [f"{one}: never changes" for one in constant]
     if not moving:
         raise InputError(
             f"{bag.path}: no topic holds a number that changes; topics: {', '.join(sorted(bag.topics)) or 'none'}"
         )
-    return Inventory(bag.path, tuple(moving), Clock("receive"), "", tuple(left))
+    still = _not_zero([one for one in constant if len(one.value) > 1])
+    return Inventory(bag.path, tuple(moving), Clock("receive"), "", tuple(left), still)
 
 
 def _filled(fields: list[Recorded], columns: Columns, begin: int) -> Iterator[Recorded]:

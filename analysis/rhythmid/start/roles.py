@@ -95,6 +95,7 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     if carried is not None:
         reason = f"a motion that drives {carried.driven}, and nothing else drives"
         more = {"input": Choice(carried.driver, reason, doubts=(carried.doubt,))}
+    more = more or _switched_on(found.constant, chosen)
     choices |= {role: _doubted(choice, copies) for role, choice in more.items()}
     if not more:
         notes += _idle(rest, output.recorded)
@@ -134,6 +135,20 @@ def _doubted(choice: Choice, copies: Mapping[int, float]) -> Choice:
     if id(choice.recorded) not in copies:
         return choice
     return replace(choice, doubts=(*choice.doubts, doubt_of_copy(copies[id(choice.recorded)])))
+
+
+def _switched_on(constant: Sequence[Recorded], joint: Joint) -> dict[str, Choice]:
+    """An effort that stands still for the whole record, where nothing else drives: a step that was made as the record began."""
+    efforts = [
+        one for one in constant
+        if (meaning := meaning_of(one)).quantity == "effort" and meaning.certain and joint.includes(one, meaning)
+    ]  # fmt: skip
+    if len(efforts) != 1:
+        return {}
+    doubt = (
+        "it never changes: taken for a step that was made as the record began; without it, delete this input"
+    )
+    return {"input": Choice(efforts[0], "the only effort, and nothing else drives", doubts=(doubt,))}
 
 
 def _idle(rest: list[_Known], output: Recorded) -> list[str]:

@@ -66,8 +66,9 @@ def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clo
         lines += ["", *comment(f"CHECK: {note}.")]
     if rest:
         lines += ["", *comment(f"Recorded too, and not used: {_listed(rest, 3 * LISTED)}.")]
-    if found.left_out:
-        lines += ["", *comment(f"Left out: {_listed(found.left_out, LISTED)}.")]
+    left = [why for why in found.left_out if not any(why.startswith(f"{one}: ") for one in taken)]
+    if left:
+        lines += ["", *comment(f"Left out: {_listed(left, LISTED)}.")]
     lines += ["", *comment("Only a part of the record:"), "# use: [0, 60]                            # s"]
     return "\n".join(lines) + "\n"
 
