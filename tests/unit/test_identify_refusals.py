@@ -27,7 +27,7 @@ def test_a_free_decay_is_an_ordinary_record_that_shows_no_delay():
         identify(twin.records[0], model, method="paper")
     found = identify(twin.records[0], model)
     assert found.delays.sum.value is None
-    assert found.delays.assumption == "nothing that is recorded drives the machine, so no delay shows"
+    assert found.delays.assumption == "no recorded input changes, so no delay shows"
 
 
 def test_a_step_that_was_made_as_the_record_began_has_no_transfer_functions():

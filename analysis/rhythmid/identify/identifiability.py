@@ -185,7 +185,7 @@ def _of_paths(
     total = sum_of(fit, INPUT_DELAY, MEASUREMENT_DELAY)
     nothing = Estimate(None, None, "s")
     if not {INPUT_DELAY, MEASUREMENT_DELAY} & set(fit.names) and joint.pumping is None:
-        words = "nothing that is recorded drives the machine, so no delay shows"
+        words = "no recorded input changes, so no delay shows"
         return Delays(nothing, nothing, nothing, False, words, undetermined=directions)
     if joint.pumping is None or not joint.pumping.active:
         words = "no forcing is known, and with it no phase of the cycle: only the sum of the delays is identifiable"

@@ -1,6 +1,6 @@
 """Backward elimination: every chosen effect is tried against being left out, and against others in their place."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from rhythmid.diagnose.search.refit import reach_of, run_trials, under_noise
 from rhythmid.diagnose.search.round import Round, distinct
@@ -22,7 +22,7 @@ def eliminate(
     best: Trial,
     series: Sequence[Series],
     catalogue: Catalogue,
-    trials: dict[tuple[str, ...], Trial],
+    trials: Mapping[tuple[str, ...], Trial],
     noise: NoiseModel,
     step: float,
     rounds: Sequence[Round],
@@ -78,7 +78,7 @@ def _swaps(
     best: Trial,
     series: Sequence[Series],
     catalogue: Catalogue,
-    trials: dict[tuple[str, ...], Trial],
+    trials: Mapping[tuple[str, ...], Trial],
     rounds: Sequence[Round],
 ) -> list[Proposal]:
     """Models with another element in the place of one of the effects."""
@@ -107,7 +107,7 @@ def _swaps(
     return swaps
 
 
-def _alone(trials: dict[tuple[str, ...], Trial]) -> dict[str, Trial]:
+def _alone(trials: Mapping[tuple[str, ...], Trial]) -> dict[str, Trial]:
     """The models with one effect that fit best, by its name."""
     single = sorted((t for t in trials.values() if len(t.added) == 1), key=lambda t: t.bic())
     named = [(t.element(t.added[0]).name, t) for t in single]

@@ -6,7 +6,7 @@ a simpler member of its family, and, where there are several, against the other 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -138,6 +138,65 @@ def _better_of(trials: Sequence[Trial]) -> list[Trial]:
     return list(kept.values())
 
 
+@dataclass(frozen=True)
+class _Task:
+    """What all rounds of a search need; `floor` is the least standard deviation of a noise."""
+
+    series: Sequence[Series]
+    nominal: Fit
+    given: Model
+    catalogue: Catalogue
+    pool: ThreadPoolExecutor | None
+    tell: Tell
+    floor: float
+
+    def noise_left(self, trial: Trial, noise: NoiseModel, step: float) -> NoiseModel:
+        """The noise that a model leaves which is fitted under another one."""
+        fit = whole_fit(trial, self.series, noise, step, pool=self.pool)
+        return noise_of(fit.residuals, self.series, self.floor)
+
+
+@dataclass(frozen=True)
+class _State:
+    """Where a search stands.
+
+    `best` is the chosen model under the `noise` that it leaves, `here` the same under the noise of the last round, out of which the
+    catalogue's guesses are taken, and `current` its fit there. `gained` is what all effects together have improved the criterion by.
+    """
+
+    best: Trial
+    here: Trial
+    current: Fit
+    noise: NoiseModel
+    step: float
+    trials: Mapping[tuple[str, ...], Trial]
+    rounds: tuple[Round, ...]
+    excluded: tuple[tuple[tuple[str, ...], str], ...]
+    gained: float = 0.0
+
+    @property
+    def margin(self) -> float:
+        """What a further effect has to improve the criterion by."""
+        return max(WORTH, SHARE * self.gained)
+
+    def with_trials(self, trials: Sequence[Trial]) -> "_State":
+        """The state that knows these trials, too."""
+        return replace(self, trials={**self.trials, **{tuple(sorted(one.added)): one for one in trials}})
+
+    def without(self, tried: Sequence[tuple[tuple[str, ...], str]]) -> "_State":
+        """The state that knows, too, what was not tried, or could not be simulated."""
+        return replace(self, excluded=(*self.excluded, *tried))
+
+
+@dataclass(frozen=True)
+class _Grant:
+    """A model that explains the records better, by so much of the criterion, and the noise that it leaves."""
+
+    winner: Trial
+    gain: float
+    noise: NoiseModel
+
+
 def search(
     series: Sequence[Series],
     nominal: Fit,
@@ -153,128 +212,143 @@ def search(
     At most `most` effects are found. Once the `budget` is spent no further round begins; what was not tried is told among the excluded.
     """
     budget = budget or Budget()
-    step = nominal.run.max_step
-    floor = 1e-9 * max(float(np.std(one.averaged)) for one in series)
     tell("scoring the catalogue")
     first, nominal = one_round(nominal, (), catalogue, pool)
-    current, noise = nominal, nominal.noise
-    base = Trial(
-        (),
-        nominal.model,
-        nominal.starts,
-        nominal.chi2,
-        nominal.samples,
-        len(nominal.names),
-        nominal.converged,
-        noise,
-        nominal.differences,
-        start_cost(
-            felt_starts(
-                nominal.model, nominal.run, noise, nominal.starts, nominal.residuals, nominal.differences[1]
-            )
-        ),
-    )
-    trials: dict[tuple[str, ...], Trial] = {(): base}
-    # the same model under the noise that it leaves, and under a round's, out of which the catalogue's guesses are taken
-    best = here = base
-    rounds, excluded = [first], not_tried(nominal, catalogue, first)
-    now = first
-    gained, cut_short = 0.0, False
-    while (
-        now.chance < LEVEL
-        and _could_pay(now, best, max(WORTH, SHARE * gained), current)
-        and len(best.added) < most
-    ):
+    floor = 1e-9 * max(float(np.std(one.averaged)) for one in series)
+    task = _Task(series, nominal, given, catalogue, pool, tell, floor)
+    state, cut_short = _begun(task, first), False
+    while len(state.best.added) < most and _could_pay(state):
         if budget.spent:
-            excluded += [((score.element.name,), SPENT) for score, _ in distinct(now.scores, REFITTED)]
-            cut_short = True
+            untried = distinct(state.rounds[-1].scores, REFITTED)
+            state, cut_short = state.without([((one.element.name,), SPENT) for one, _ in untried]), True
             break
-        count = REFITTED if not best.added else REFITTED - 1
-        proposals, enough = _proposals(here.model, replace(now, added=here.added), count, here.chi2)
-        tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
-        begun = series, here.starts, current.run.compiled.layout.states, here.noise, step
-        found, failed = run_trials(proposals, *begun, enough, tell=tell)
-        if not best.added and nominal.nrmse() > FOLLOWS:
-            proposals = _from_given(nominal, given, catalogue, here.chi2, pool)
-            others, failed_too = run_trials(proposals, *begun, tell=tell)
-            found, failed = _better_of([*found, *others]), failed + failed_too
-        excluded += failed
-        found = [t for t in found if t.chi2 < here.chi2]  # a richer model that does worse got lost
-        if not found:
+        state, found = _refitted(task, state)
+        state, grant = _granted(task, state, found)
+        if grant is None:
             break
-        trials |= {tuple(sorted(t.added)): t for t in found}
-        near = [t for t in found if t.bic() - found[0].bic() < NEAR]
-        margin = max(WORTH, SHARE * gained)
-        hopeful = [[t] for t in found[len(near) :] if here.bic() - t.bic() > PLAIN][:SECOND]
-        for group in (near, *hopeful):
-            top = _most_likely(group, series, here.noise, step, floor)
-            fit = whole_fit(top, series, here.noise, step, pool=pool)
-            finer = accurate(fit.run, fit.model, fit.starts, POOR_FIT * fit.noise.variance**0.5, 2)
-            if finer.max_step < 0.45 * fine_enough(top.model, step):
-                step = finer.max_step
-                fit = whole_fit(replace(top, converged=False), series, here.noise, step, pool=pool)
-            sought = top
-            if any(
-                has_clock(top.model, label) for label in top.added[-2:]
-            ):  # and once more beside what came after it
-                fit = ticks_sought(fit, floor, pool)
-                sought = replace(top, model=fit.model, starts=fit.starts, converged=False)
-            others = [trial for trial in group if trial.added != top.added]
-            settled = noise_of(fit.residuals, series, floor)
-            reach = reach_of(fit.chi2, fit.samples)
-            compared = under_noise([sought, *others, best], series, settled, step, reach=reach)
-            trials |= {tuple(sorted(t.added)): t for t in compared}
-            winner = compared[0]
-            before = next((t for t in compared if t.added == best.added), best)
-            gain = before.bic() - winner.bic()
-            if winner.added != best.added and gain >= margin:
-                break
-        else:  # what the noise model of the round saw in them, the noise that they leave does not bear out
-            break
-        noise = settled
-        best = in_best_order(winner, series, noise, step)
-        gained += gain + winner.chi2 - best.chi2
-        trials[tuple(sorted(best.added))] = best
-        tell(f"{best.added[-1]} explains it better by {gain:.0f}; looking for more")
-        current = whole_fit(best, series, noise, step, pool=pool)
-        if len(best.added) >= most:
-            break
-        now, current = one_round(current, best.added, catalogue, pool)
-        here = under_noise([best], series, current.noise, step, 0)[0]
-        rounds.append(now)
-    if best.added and budget.spent:
-        excluded.append((("backward elimination",), SPENT))
-    elif best.added:
-        margin = max(WORTH, SHARE * gained)
-        reduced, more = eliminate(best, series, catalogue, trials, noise, step, rounds, margin, tell)
-        trials |= more
-        if reduced is not best:
-            best = in_best_order(reduced, series, noise, step)
-            trials[tuple(sorted(best.added))] = best
-            noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
-    ranked = _contenders(trials, best)
-    for _ in range(OVERTAKEN):
-        ranked = near_under_noise(ranked, series, noise, step, NEAR)
-        best = next(t for t in ranked if set(t.added) == set(best.added))
-        ahead = max(WORTH, SHARE * gained) if ranked[0].free > best.free else WORTH
-        if ranked[0].bic() >= best.bic() - ahead or not ranked[0].added:
-            break
-        best = ranked[0]  # a model set aside under an earlier noise model has overtaken the chosen one
-        noise = noise_of(whole_fit(best, series, noise, step, pool=pool).residuals, series, floor)
-    else:
-        ranked = near_under_noise(ranked, series, noise, step, NEAR)
-        best = next(t for t in ranked if set(t.added) == set(best.added))
-    fit = whole_fit(best, series, noise, step, pool=pool)
+        state = _with_effect(task, state, grant, last=len(grant.winner.added) >= most)
+    if state.best.added and budget.spent:
+        state = state.without([(("backward elimination",), SPENT)])
+    elif state.best.added:
+        state = _reduced(task, state)
+    best, noise, ranked = _ranked(task, state)
+    fit = whole_fit(best, series, noise, state.step, pool=pool)
     return Search(
-        under(nominal, noise, pool),
-        best,
-        fit,
-        noise,
-        tuple(ranked),
-        tuple(rounds),
-        tuple(excluded),
-        cut_short,
+        under(nominal, noise, pool), best, fit, noise, tuple(ranked), state.rounds, state.excluded, cut_short
     )
+
+
+def _begun(task: _Task, first: Round) -> _State:
+    """The state before any effect, the first round scored."""
+    fit = task.nominal
+    felt = felt_starts(fit.model, fit.run, fit.noise, fit.starts, fit.residuals, fit.differences[1])
+    base = Trial(
+        (), fit.model, fit.starts, fit.chi2, fit.samples, len(fit.names), fit.converged, fit.noise, fit.differences,
+        start_cost(felt),
+    )  # fmt: skip
+    lost = not_tried(fit, task.catalogue, first)
+    return _State(base, base, fit, fit.noise, fit.run.max_step, {(): base}, (first,), tuple(lost))
+
+
+def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
+    """Refits of the models that the last round proposes, those that do better than the best so far, best first."""
+    here, now = state.here, replace(state.rounds[-1], added=state.here.added)
+    count = REFITTED if not state.best.added else REFITTED - 1
+    proposals, enough = _proposals(here.model, now, count, here.chi2)
+    task.tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
+    begun = task.series, here.starts, state.current.run.compiled.layout.states, here.noise, state.step
+    found, failed = run_trials(proposals, *begun, enough, tell=task.tell)
+    if not state.best.added and task.nominal.nrmse() > FOLLOWS:
+        proposals = _from_given(task.nominal, task.given, task.catalogue, here.chi2, task.pool)
+        others, failed_too = run_trials(proposals, *begun, tell=task.tell)
+        found, failed = _better_of([*found, *others]), failed + failed_too
+    found = [one for one in found if one.chi2 < here.chi2]  # a richer model that does worse got lost
+    return state.without(failed).with_trials(found), found
+
+
+def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State, _Grant | None]:
+    """The refit that explains the records best, where it is worth its parameters under the noise that it leaves."""
+    if not found:
+        return state, None
+    best, here = state.best, state.here
+    near = [one for one in found if one.bic() - found[0].bic() < NEAR]
+    hopeful = [[one] for one in found[len(near) :] if here.bic() - one.bic() > PLAIN][:SECOND]
+    for group in (near, *hopeful):
+        top = _most_likely(group, task.series, here.noise, state.step, task.floor)
+        fit, step = _finely_fitted(task, top, here.noise, state.step)
+        sought = top
+        if any(
+            has_clock(top.model, label) for label in top.added[-2:]
+        ):  # and once more beside what came after it
+            fit = ticks_sought(fit, task.floor, task.pool)
+            sought = replace(top, model=fit.model, starts=fit.starts, converged=False)
+        others = [trial for trial in group if trial.added != top.added]
+        settled = noise_of(fit.residuals, task.series, task.floor)
+        reach = reach_of(fit.chi2, fit.samples)
+        compared = under_noise([sought, *others, best], task.series, settled, step, reach=reach)
+        state = replace(state, step=step).with_trials(compared)
+        winner = compared[0]
+        before = next((one for one in compared if one.added == best.added), best)
+        gain = before.bic() - winner.bic()
+        if winner.added != best.added and gain >= state.margin:
+            return state, _Grant(winner, gain, settled)
+    return (
+        state,
+        None,
+    )  # what the noise model of the round saw in them, the noise that they leave does not bear out
+
+
+def _finely_fitted(task: _Task, trial: Trial, noise: NoiseModel, step: float) -> tuple[Fit, float]:
+    """The whole fit of a trial, with the step [s] that it needs."""
+    fit = whole_fit(trial, task.series, noise, step, pool=task.pool)
+    finer = accurate(fit.run, fit.model, fit.starts, POOR_FIT * fit.noise.variance**0.5, 2)
+    if finer.max_step >= 0.45 * fine_enough(trial.model, step):
+        return fit, step
+    step = finer.max_step
+    return whole_fit(replace(trial, converged=False), task.series, noise, step, pool=task.pool), step
+
+
+def _with_effect(task: _Task, state: _State, grant: _Grant, last: bool) -> _State:
+    """The state with one effect more, the next round scored where it is not the last one."""
+    best = in_best_order(grant.winner, task.series, grant.noise, state.step)
+    gained = state.gained + grant.gain + grant.winner.chi2 - best.chi2
+    task.tell(f"{best.added[-1]} explains it better by {grant.gain:.0f}; looking for more")
+    current = whole_fit(best, task.series, grant.noise, state.step, pool=task.pool)
+    state = replace(state.with_trials([best]), best=best, current=current, noise=grant.noise, gained=gained)
+    if last:
+        return state
+    now, current = one_round(current, best.added, task.catalogue, task.pool)
+    here = under_noise([best], task.series, current.noise, state.step, 0)[0]
+    return replace(state, here=here, current=current, rounds=(*state.rounds, now))
+
+
+def _reduced(task: _Task, state: _State) -> _State:
+    """The state after backward elimination."""
+    best, noise = state.best, state.noise
+    reduced, more = eliminate(
+        best, task.series, task.catalogue, state.trials, noise, state.step, state.rounds, state.margin, task.tell
+    )  # fmt: skip
+    state = state.with_trials(list(more.values()))
+    if reduced is best:
+        return state
+    best = in_best_order(reduced, task.series, noise, state.step)
+    return replace(state.with_trials([best]), best=best, noise=task.noise_left(best, noise, state.step))
+
+
+def _ranked(task: _Task, state: _State) -> tuple[Trial, NoiseModel, list[Trial]]:
+    """The best model once all are compared under the noise that it leaves, that noise, and the models, best first."""
+    best, noise, step = state.best, state.noise, state.step
+    ranked = _contenders(state.trials, best)
+    for _ in range(OVERTAKEN):
+        ranked = near_under_noise(ranked, task.series, noise, step, NEAR)
+        best = next(one for one in ranked if set(one.added) == set(best.added))
+        ahead = state.margin if ranked[0].free > best.free else WORTH
+        if ranked[0].bic() >= best.bic() - ahead or not ranked[0].added:
+            return best, noise, ranked
+        best = ranked[0]  # a model set aside under an earlier noise model has overtaken the chosen one
+        noise = task.noise_left(best, noise, step)
+    ranked = near_under_noise(ranked, task.series, noise, step, NEAR)
+    return next(one for one in ranked if set(one.added) == set(best.added)), noise, ranked
 
 
 def _most_likely(
@@ -294,18 +368,19 @@ def _most_likely(
     return near[min(found, key=lambda index: (found[index], index), default=0)]
 
 
-def _could_pay(now: Round, best: Trial, margin: float, current: Fit) -> bool:
-    """Whether the best score, which can understate what a refit gains, is of the order that an element has to earn, and that an
-    effect of practical size has."""
-    series, noise = current.run.series, current.noise
-    if current.nrmse() ** 2 < UNDERSTATED * PRACTICAL**2:
+def _could_pay(state: _State) -> bool:
+    """Whether the best score of the last round, which can understate what a refit gains, is more than chance, of the order that an
+    element has to earn, and that an effect of practical size has."""
+    now, series, noise = state.rounds[-1], state.current.run.series, state.current.noise
+    if now.chance >= LEVEL or state.current.nrmse() ** 2 < UNDERSTATED * PRACTICAL**2:
         return False
     power = sum(one.power(one.used) for one in series)  # the number of samples times the motion's mean square
     practical = PRACTICAL**2 * power / max(noise.variance, noise.long_run_variance)
-    return now.strongest > max(0.5 * (margin + math.log(max(best.samples, 2))), UNDERSTATED * practical)
+    earned = 0.5 * (state.margin + math.log(max(state.best.samples, 2)))
+    return now.strongest > max(earned, UNDERSTATED * practical)
 
 
-def _contenders(trials: dict[tuple[str, ...], Trial], best: Trial) -> list[Trial]:
+def _contenders(trials: Mapping[tuple[str, ...], Trial], best: Trial) -> list[Trial]:
     """The models worth comparing at the end: the nominal one, the best of each number of effects, and the chosen one with all
     that it is without some of its effects: what each of them brings is judged against these."""
     ranked = sorted(trials.values(), key=lambda t: t.bic())
