@@ -15,12 +15,12 @@ from rhythmid.record.block import Topic
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.field import NAMES, Field
 from rhythmid.record.heading import heading_of
+from rhythmid.record.merged_table import is_merged, is_sampled_rarely
 from rhythmid.record.message_types import typestore
 from rhythmid.record.signals import Clock
-from rhythmid.record.table import SUFFIXES, Table, table_suffix
+from rhythmid.record.table import SUFFIXES, WIDEST, Table, table_suffix
 
 Array = NDArray[np.float64]
-WIDEST = 64  # entries of a list beyond which it is an image or a scan, not joints
 DEEPEST = 5  # messages within messages that are looked into
 SKIPPED_PACKAGES = (
     "diagnostic_msgs",
@@ -118,25 +118,28 @@ def inventory(source: str | Path, rate: float | None = None) -> Inventory:
 
 @np.errstate(over="ignore", invalid="ignore")  # of numbers near the largest, and NaN of every kind
 def _of_table(table: Table, rate: float | None) -> Inventory:
-    columns = list(_vectors(table))
+    columns = list(table.vectors())
     if not columns:
         raise InputError(f"{table.path}: holds no column of numbers")
     count = max((len(value) for _, value in columns), key=[len(value) for _, value in columns].count)
     unequal = [(name, value) for name, value in columns if len(value) != count]
     columns = [(name, value) for name, value in columns if len(value) == count]
     if rate is not None:
-        clock, reason, time = Clock("rate", rate=rate), "as given with --rate", np.arange(count) / rate
+        clock, reason, every = Clock("rate", rate=rate), "as given with --rate", np.arange(count) / rate
     else:
         clock, reason = _table_clock(table.path, columns, unequal)
-        time = dict(columns)[str(clock.column)] * clock.scale
+        every = dict(columns)[str(clock.column)] * clock.scale
     found, left, constant = [], [], []
+    merged = is_merged(value for name, value in columns if name != clock.column)
     for name, value in columns:
-        heading = heading_of(name)
+        heading, time = heading_of(name), every
         if clock.kind == "column" and (name == clock.column or _is_time(name, value)):
             continue
         if clock.kind == "rate" and (_is_time(name, value) or (name.isdigit() and _even(value))):
             left.append(f"{name}: goes forward like a time")
             continue
+        if merged or is_sampled_rarely(value):
+            time, value = time[~np.isnan(value)], value[~np.isnan(value)]
         one = Recorded(
             heading.name, time, value * heading.scale, column=name, unit=heading.unit, scale=heading.scale,
             written_unit=heading.written,
@@ -153,22 +156,6 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
 
 def _not_zero(constant: list[Recorded]) -> tuple[Recorded, ...]:
     return tuple(one for one in constant if np.isfinite(one.value).all() and one.value[0] != 0.0)
-
-
-def _vectors(table: Table) -> Iterator[tuple[str, Array]]:
-    """Columns of numbers by name, those of arrays one by one."""
-    for name, values in table.columns.items():
-        array = np.asarray(values)
-        if array.dtype.kind not in "fiub":
-            continue
-        if array.ndim == 2 and min(array.shape) > 1:
-            if array.shape[1] <= WIDEST:
-                yield from (
-                    (f"{name}[{number}]", table.column(f"{name}[{number}]"))
-                    for number in range(array.shape[1])
-                )
-        elif array.size == max(array.shape, default=0) and array.size > 1:
-            yield str(name), table.column(name)
 
 
 def _is_time(name: str, value: Array) -> bool:

@@ -17,6 +17,7 @@ from rhythmid.record.clocks import clock_notes
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.held_back import evened
 from rhythmid.record.judged import judged
+from rhythmid.record.merged_table import is_merged, is_sampled_rarely
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality
 from rhythmid.record.record import SHORTEST, Channel, Record
@@ -139,6 +140,7 @@ def read_tables(signals: Signals) -> Record:
         file: Table.load(file) for source in signals.channels.values() if (file := source.file) is not None
     }
     made: dict[str, Samples] = {}
+    merged = {file: _is_merged(table, signals) for file, table in tables.items()}
     for role, source in signals.channels.items():
         assert source.file is not None
         table = tables[source.file]
@@ -160,7 +162,10 @@ def read_tables(signals: Signals) -> Record:
         with np.errstate(
             over="ignore", invalid="ignore"
         ):  # what is infinite is refused later, with its place
-            made[role] = Samples(source, time, value * source.scale + source.offset)
+            value = value * source.scale + source.offset
+        if merged[source.file] or is_sampled_rarely(value):  # its empty cells are no samples
+            time, value = time[~np.isnan(value)], value[~np.isnan(value)]
+        made[role] = Samples(source, time, value)
     assert signals.path is not None
     name = table_name(signals.path)
     if name == "signals":
@@ -168,6 +173,13 @@ def read_tables(signals: Signals) -> Record:
     quality = Quality({}, notes=unit_notes(signals))
     record = _record(name, _since_start(made), signals, "sort or split the table", quality)
     return _finish(replace(record, hold=signals.hold or _measured_hold(record)), signals)
+
+
+def _is_merged(table: Table, signals: Signals) -> bool:
+    """Whether rows of streams with stamps of their own make up a table; never one without a time."""
+    clocks = [source.clock(signals.time) for source in signals.channels.values() if source.file == table.path]
+    times = {str(clock.column) for clock in clocks if clock.kind == "column"}
+    return bool(times) and is_merged(value for name, value in table.vectors() if name not in times)
 
 
 def _since_start(made: Mapping[str, Samples]) -> dict[str, Samples]:

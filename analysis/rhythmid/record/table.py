@@ -19,6 +19,7 @@ from rhythmid.record.text_table import COMPRESSED, TEXT, read_text
 
 HDF5 = (".h5", ".hdf5")
 SUFFIXES = (".mat", *HDF5, ".npz", ".parquet", *TEXT)
+WIDEST = 64  # columns of an array beyond which it is an image or a scan, not joints
 ONE_OF_MANY = re.compile(r"(.+)\[(\d+)\]")  # dof_pos[3]: one column of an array
 
 
@@ -64,6 +65,19 @@ class Table:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
         except Exception as error:  # the readers of damaged .mat and .npz files raise anything
             raise InputError(f"{path}: cannot be read as a table: {' '.join(str(error).split())}") from None
+
+    def vectors(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
+        """Columns of numbers by name, those of arrays one by one."""
+        for name, values in self.columns.items():
+            array = np.asarray(values)
+            if array.dtype.kind not in "fiub":
+                continue
+            if array.ndim == 2 and min(array.shape) > 1:
+                if array.shape[1] <= WIDEST:
+                    parts = [f"{name}[{number}]" for number in range(array.shape[1])]
+                    yield from ((part, self.column(part)) for part in parts)
+            elif array.size == max(array.shape, default=0) and array.size > 1:
+                yield str(name), self.column(name)
 
     def column(self, name: str | int) -> NDArray[np.float64]:
         """One column, float64[n]; `name` may be its number, or `array[3]` for a column of an array of shape [n, columns].

@@ -58,6 +58,7 @@ LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalo
 # elements of a round that are refitted because they score best along the whole records, and in windows. On 90 cases of all
 # machines of the proof the right one, or its kin, was among the first four or among the first three in windows
 REFITTED, LOCAL = 4, 3
+GROUPS = 3  # of so many elements that are refitted for the first effect, one after the other, while none does better
 # difference of the criterion within which models are compared again under the noise that they leave
 NEAR = 60.0
 # gain in the criterion from which a model is worth a second look where a better one does not hold under the noise that it
@@ -92,12 +93,14 @@ class Search:
     cut_short: bool = False
 
 
-def _proposals(base: Model, now: Round, count: int, chi2: float) -> tuple[list[Proposal], list[float]]:
+def _proposals(
+    base: Model, now: Round, count: int, chi2: float, first: int = 0
+) -> tuple[list[Proposal], list[float]]:
     """Structures worth a refit, with chi2 below which one start of each is enough: the elements that score best along the whole
-    records, and those that do in windows."""
+    records, from the `first` on, and, with these, those that do in windows."""
     made, enough = [], []
-    local = {best.element.name: group for best, group in distinct(now.local, LOCAL)}
-    for best, group in distinct(now.scores, count):
+    local = {best.element.name: group for best, group in distinct(now.local, LOCAL if first == 0 else 0)}
+    for best, group in distinct(now.scores, first + count)[first:]:
         starts = [(one.start, one.own(base)) for one in group[: 3 if len(group) > MANY else 2]]
         if not 0.2 < abs(best.size) < 5.0:  # far from the guess that was scored, the size is an extrapolation
             starts.insert(1, (dict(best.values), best.own(base, 1.0)))
@@ -254,14 +257,20 @@ def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
     """Refits of the models that the last round proposes, those that do better than the best so far, best first."""
     here, now = state.here, replace(state.rounds[-1], added=state.here.added)
     count = REFITTED if not state.best.added else REFITTED - 1
-    proposals, enough = _proposals(here.model, now, count, here.chi2)
-    task.tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
     begun = task.series, here.starts, state.current.run.compiled.layout.states, here.noise, state.step
-    found, failed = run_trials(proposals, *begun, enough, tell=task.tell)
+    found, failed = [], []
+    # where nothing is found yet and none of the best does better, they were kin that the scores, which are linear, promise too much of
+    for first in range(0, count * (1 if state.best.added else GROUPS), count):
+        proposals, enough = _proposals(here.model, now, count, here.chi2, first)
+        if any(one.chi2 < here.chi2 for one in found) or not proposals:
+            break
+        task.tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
+        others, lost = run_trials(proposals, *begun, enough, tell=task.tell)
+        found, failed = _better_of([*found, *others]), failed + lost
     if not state.best.added and task.nominal.nrmse() > FOLLOWS:
         proposals = _from_given(task.nominal, task.given, task.catalogue, here.chi2, task.pool)
-        others, failed_too = run_trials(proposals, *begun, tell=task.tell)
-        found, failed = _better_of([*found, *others]), failed + failed_too
+        others, lost = run_trials(proposals, *begun, tell=task.tell)
+        found, failed = _better_of([*found, *others]), failed + lost
     found = [one for one in found if one.chi2 < here.chi2]  # a richer model that does worse got lost
     return state.without(failed).with_trials(found), found
 

@@ -8,6 +8,8 @@ import math
 
 from rhythmid.elements.element import Element, Parameter
 
+FEWEST_PERIODS = 5  # in the longest record, from which a line tells more than a phase and a trend
+
 
 def kernel(x, v, t, f, amplitude, frequency, phase):
     return amplitude * math.sin(2.0 * math.pi * frequency * t + phase)
@@ -38,8 +40,8 @@ ELEMENT = Element(
     acts="body",
     size="amplitude",
     starts=starts,
-    # with less than one period in a record it is a drift or a constant; beyond half the rate nothing is sampled
-    ranges=lambda s: {"frequency": (1.0 / s.duration, 0.5 / s.period)},
+    # with fewer periods in a record its three parameters follow any slow law of the motion; beyond half the rate nothing is sampled
+    ranges=lambda s: {"frequency": (FEWEST_PERIODS / s.duration, 0.5 / s.period)},
     also_known_as=("hum", "rotating imbalance", "external vibration"),
     family="disturbance",
     confusable={

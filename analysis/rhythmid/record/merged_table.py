@@ -1,0 +1,35 @@
+"""Tables into which streams with stamps of their own were merged, as PlotJuggler and pandas write them.
+
+A row has the stamp of one message, and the cells of all other streams are empty. There an empty cell is no sample that was lost.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+OFTEN = 0.05  # share of rows in which each column of a merged table is empty, at least
+TOGETHER = 0.5  # share of rows with a number in every column, or in a slow one, at most
+LONGEST = (
+    0.05  # of the rows that a column may be empty in one after the other, and still be sampled all along
+)
+
+
+def is_merged(columns: Iterable[Array]) -> bool:
+    """Whether the columns (n,) each, without the time, come from streams whose rows were merged. Empty columns say nothing."""
+    present = [there for value in columns if (there := np.isfinite(value)).any()]
+    if len(present) < 2:
+        return False
+    return all(there.mean() <= 1.0 - OFTEN for there in present) and bool(
+        np.logical_and.reduce(present).mean() <= TOGETHER
+    )
+
+
+def is_sampled_rarely(value: Array) -> bool:
+    """Whether a column (n,) is empty in most rows, but nowhere for long: a stream that is slower than the table's rows."""
+    there = np.flatnonzero(~np.isnan(value))
+    if not 0 < len(there) <= TOGETHER * len(value):
+        return False
+    empty = np.diff(np.concatenate([[-1], there, [len(value)]])) - 1
+    return bool(empty.max() <= LONGEST * len(value))
