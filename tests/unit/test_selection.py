@@ -75,9 +75,19 @@ def test_predictions_that_are_the_same_are_equivalent():
 
 def test_a_rival_is_equivalent_where_the_data_do_not_decide():
     best = supposed("a", predicted(0.1, 100.0, seed=1))
-    near, far = supposed("b", predicted(0.2, 99.0, mood=1.0, seed=2)), supposed("d", predicted(0.101, 50.0))
+    near, far = supposed("b", predicted(0.11, 99.0, mood=1.0, seed=2)), supposed("d", predicted(0.101, 50.0))
     every = contest(NOMINAL, best, near, far)
     assert equivalent(near, best, every) and not equivalent(far, best, every)
+
+
+def test_a_rival_that_leaves_much_more_of_the_mismatch_is_not_equivalent_though_it_predicts_most_blocks_better():
+    best = supposed("stop", predicted(0.1, 100.0, seed=1))
+    density = best.prediction.log_density + 5.0
+    density[:2] -= 500.0  # where the stop is hit
+    error = 0.9 * best.prediction.squared_error
+    error[:20] *= 5.0
+    other = supposed("friction", replace(best.prediction, log_density=density, squared_error=error))
+    assert not equivalent(other, best, contest(NOMINAL, best, other))
 
 
 @pytest.mark.parametrize(

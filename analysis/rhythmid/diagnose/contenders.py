@@ -125,7 +125,8 @@ def _rounding(series: Sequence[Series], noise: NoiseModel) -> float:
 
 
 def linearised(fit: Fit, rows: Rows) -> Linearised:
-    """A fit on the rows: what it leaves of each, and how what it saw depends on its parameters."""
+    """A fit on the rows: what it leaves of each, and how what it saw depends on its parameters; what ends at a bound is taken for fixed
+    there."""
     unseen = [_of_unseen(fit, rows)] if rows.unseen else []
     hidden = [
         rows.noise.whiten(one.levelled(residual[part], part))
@@ -135,6 +136,7 @@ def linearised(fit: Fit, rows: Rows) -> Linearised:
     residual = np.concatenate([fit.linearisation.residual, *hidden, *unseen])
     jacobian = np.zeros((len(residual), len(fit.names)))
     jacobian[: len(fit.linearisation.residual)] = fit.linearisation.jacobian
+    jacobian[:, _at_bound(fit)] = 0.0
     priors = [fit.model.parameters[name].prior for name in fit.names]
     return Linearised(
         residual,
@@ -142,6 +144,12 @@ def linearised(fit: Fit, rows: Rows) -> Linearised:
         np.array([0.0 if one is None else one.std**-2 for one in priors]),
         np.array([0.0 if one is None else v - one.mean for one, v in zip(priors, fit.values)]),
     )
+
+
+def _at_bound(fit: Fit) -> NDArray[np.bool_]:
+    """Parameters (p,) that end at a bound: without a part of the rows they would not go beyond it either."""
+    bounds = [fit.model.parameters[name].bounds for name in fit.names]
+    return np.array([not low < value < high for value, (low, high) in zip(fit.values, bounds)], dtype=bool)
 
 
 def _of_unseen(fit: Fit, rows: Rows) -> Array:

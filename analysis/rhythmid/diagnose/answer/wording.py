@@ -90,10 +90,18 @@ def summary_of(
         return said
     if decision.verdict == "undecided":
         said = f"{decision.reason[:1].upper()}{decision.reason[1:]}."
-        if decision.equivalent and decision.rule == "rivals":
+        of_main = bool(decision.equivalent) and (
+            not missing or decision.equivalent[0][0] == missing[0].element
+        )
+        if of_main and decision.rule == "rivals":
             groups = "; and ".join(listed(group, "or") for group in decision.equivalent)
             return f"{said} They are {groups}."
-        said += f" Best so far: {names}." if names else ""
+        main = (
+            f", of which {in_words(missing[0].element)} explains {missing[0].share:.0%} of the mismatch"
+            if len(missing) > 1
+            else ""
+        )
+        said += f" Best so far: {names}{main}." if names else ""
         return said + (f" {_alike(decision)}" if decision.equivalent else "")
     return f"Something is missing that the catalogue does not know: {decision.reason}." + (
         f" The nearest known {'effect does' if len(missing) == 1 else 'effects do'} not explain it: {names}."

@@ -109,7 +109,7 @@ def diagnose_machine(
     told = () if records[0].sampled else tuple(told_of(best.leads))
     notes = (*machine.body.notes, *said, *of_holdout, *told)
     diagnosis = compose_machine(machine, best.found, answers, best.stated, best.links, best.refused, notes)
-    return MachineAnswer(diagnosis, _augmented(best.machine, best.found, best.stated), best.found)
+    return MachineAnswer(diagnosis, _augmented(best), best.found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,13 +246,12 @@ def _answer(one: JointResult) -> Diagnosis:
     return compose_effort(one.case, one.result, ())
 
 
-def _augmented(
-    machine: Machine, found: Mapping[str, JointResult], stated: Mapping[str, Sequence[str]]
-) -> Machine:
-    """The machine with what was fitted, and with what the answer stands by."""
+def _augmented(best: _Explained) -> Machine:
+    """The machine with what was fitted, and with what the answer stands by; masses that were put right stay as the answer says."""
+    machine, stated = best.machine, best.stated
     inertial: dict[str, float] = {}
     spreads: dict[str, float] = {}
-    for joint, one in found.items():
+    for joint, one in best.found.items():
         fitted = one.result.chosen if stated[joint] else one.result.nominal
         path = machine.paths[joint]
         rotor = fitted.model.mass.value - path.mass.value
@@ -261,7 +260,8 @@ def _augmented(
             inertial[f"{joint}.armature"] = max(before + rotor, 0.0)
         for label, std in fitted.std().items():  # a free mass is as the joint says that tells it best
             link = label.removeprefix(f"{BODY}.")
-            if label.startswith(f"{BODY}.") and std < spreads.get(link, math.inf):
+            free = label.startswith(f"{BODY}.") and link not in best.links
+            if free and std < spreads.get(link, math.inf):
                 inertial[link], spreads[link] = fitted.model.value(label), std
         machine = machine.with_path(joint, _without_body(fitted.model, path))
     return machine.with_inertial(inertial) if inertial else machine
