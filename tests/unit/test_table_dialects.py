@@ -13,6 +13,7 @@ from scipy.io import savemat
 from rhythmid.errors import InputError
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.heading import heading_of
+from rhythmid.record.inventory import inventory
 from rhythmid.record.read import read_record
 from rhythmid.record.signals import Signals
 from rhythmid.record.table import Table
@@ -196,6 +197,25 @@ def test_parquet_is_read_with_its_times_and_lists(tmp_path):
     record = read_record(tmp_path / "run.parquet", Signals.from_text(text))
     np.testing.assert_allclose(record.output.value, Q)
     np.testing.assert_allclose(record.output.time, TIME, atol=1e-6)
+
+
+def test_lines_of_a_table_without_names_are_its_columns_where_it_is_that_wide(tmp_path):
+    np.savetxt(tmp_path / "run.txt", [TIME, Q, TAU])
+    np.testing.assert_allclose(Table.load(tmp_path / "run.txt").column("1"), Q)
+
+
+def test_commas_that_a_spreadsheet_has_appended_are_no_part_of_a_cell(tmp_path):
+    rows = [f"{t:.3f};{q:.6f};{u:.6f},," for t, q, u in zip(TIME, Q, TAU)]
+    (tmp_path / "run.csv").write_text("\n".join(["Bench 3,,", "t [s];q [rad];tau [Nm],,", *rows]))
+    table = Table.load(tmp_path / "run.csv")
+    np.testing.assert_allclose(table.column("tau [Nm]"), TAU, atol=1e-6)
+
+
+def test_a_column_that_a_word_spoils_is_told(tmp_path):
+    rows = [f"{t:.3f},{q:.6f},{u:.6f}" for t, q, u in zip(TIME, Q, TAU)]
+    rows[0] = "0.0,0.1,-1.2 (was -8.9)"
+    (tmp_path / "run.csv").write_text("\n".join(["t,q,tau", *rows]))
+    assert inventory(tmp_path / "run.csv").left_out == ("tau: holds words, such as '-1.2 (was -8.9)'",)
 
 
 def hdf5(path: Path, of_matlab: bool = False) -> Path:

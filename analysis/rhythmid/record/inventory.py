@@ -40,6 +40,7 @@ COUNTER = re.compile(
 )
 NEAR = 0.5  # of the median step of an unnamed column: a step that differs by no more is a usual one
 USUAL = 0.95  # share of usual steps from which such a column is taken for the time; the others are gaps, and may be as long as they like
+MOST_NAMED = 12  # columns that a complaint lists
 FORWARD = 0.99  # share of steps of a time that go forward
 # the longest sample period [s] that is thought of: a time without a unit whose steps are longer is in ms, µs or ns
 LONGEST_STEP = 0.5
@@ -129,7 +130,8 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
     else:
         clock, reason = _table_clock(table.path, columns, unequal)
         every = dict(columns)[str(clock.column)] * clock.scale
-    found, left, constant = [], [], []
+    found, constant = [], []
+    left = [f"{name}: holds words, such as {word!r}" for name, word in table.words()]
     merged = is_merged(value for name, value in columns if name != clock.column)
     for name, value in columns:
         heading, time = heading_of(name), every
@@ -209,7 +211,9 @@ def _table_clock(
                 return Clock(
                     "column", column=name, scale=scale
                 ), f"the first column that goes forward by steps of one size; {why}"
-    names = ", ".join(name for name, _ in columns)
+    names = ", ".join(name for name, _ in columns[:MOST_NAMED])
+    if len(columns) > MOST_NAMED:
+        names += f" and {len(columns) - MOST_NAMED} more"
     others = ", ".join(f"{name} has {len(value)} rows" for name, value in unequal)
     why = f"; of another length than their {len(columns[0][1])} rows: {others}" if others else ""
     raise InputError(

@@ -79,6 +79,14 @@ class Table:
             elif array.size == max(array.shape, default=0) and array.size > 1:
                 yield str(name), self.column(name)
 
+    def words(self) -> Iterator[tuple[str, str]]:
+        """Columns of a text table in which a cell is no number, by name, each with the first such cell."""
+        for name, values in self.columns.items():
+            if isinstance(values, np.ndarray) and values.dtype.kind == "O" and values.ndim == 1:
+                word = next((cell for cell in values if isinstance(cell, str) and not _is_number(cell)), None)
+                if word is not None:
+                    yield name, word
+
     def column(self, name: str | int) -> NDArray[np.float64]:
         """One column, float64[n]; `name` may be its number, or `array[3]` for a column of an array of shape [n, columns].
         Raises InputError when it is not there or no vector."""
@@ -121,6 +129,14 @@ class Table:
     def _check_real(self, name: str, values: NDArray[Any]) -> None:
         if values.dtype.kind not in "fiub":
             raise InputError(f"{self.path}: column {name!r} does not hold real numbers")
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.replace(",", ".") or "nan")
+    except ValueError:
+        return False
+    return True
 
 
 def _mat(path: Path) -> dict[str, Any]:

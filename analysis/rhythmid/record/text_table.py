@@ -26,6 +26,7 @@ COMMENTS = ("#", "%")
 SEPARATORS = ("\t", ";", ",", None)  # None: any number of spaces; in this order where two do equally well
 EMPTY = " \t\r\n;,\"'"  # what a line of empty cells is made of
 LOOKED_AT = 200  # lines from which the dialect is told: more than any head has
+ACROSS = 10  # times as many columns as rows, from which the lines of a table without names are its columns
 SAMPLE = 1 << 16  # bytes from which the encoding is told
 BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 
@@ -65,6 +66,9 @@ def read_text(path: Path) -> dict[str, Any]:
     words = [place for place in range(count) if place not in dialect.numeric]
     with _opened(path, encoding) as file:
         numbers = _rows(islice(file, dialect.first, None), dialect, dialect.numeric)
+    unnamed = dialect.names == tuple(map(str, range(count)))
+    if unnamed and not words and ACROSS * len(numbers) <= count:
+        return {str(place): row for place, row in enumerate(numbers)}
     found: dict[str, Any] = {
         dialect.names[place]: column for place, column in zip(dialect.numeric, numbers.T)
     }
@@ -161,7 +165,7 @@ def _rows(lines: Iterable[str], dialect: Dialect, columns: tuple[int, ...]) -> n
             converters=converters,
         )  # fmt: skip
 
-    held = [line for line in lines if _content(line)]
+    held = [_own(line, dialect.separator) for line in lines if _content(line)]
     if not held or not columns:
         return np.empty((0, len(columns)))
     usual = len(_cells(held[0], dialect.separator))
@@ -179,6 +183,12 @@ def _rows(lines: Iterable[str], dialect: Dialect, columns: tuple[int, ...]) -> n
     return read(held, value)
 
 
+def _own(line: str, separator: str | None) -> str:
+    """A line without what a spreadsheet has appended that took it for one cell: the commas of empty cells."""
+    line = line.strip(" \r\n")
+    return line if separator == "," else line.rstrip(",")
+
+
 def _words(cells: list[str]) -> np.ndarray:
     """A column of seconds where its cells are times, of words else."""
     found = seconds(cells)
@@ -194,7 +204,7 @@ def _cells(line: str, separator: str | None) -> list[str]:
     """Cells of a line, without quotes and the spaces around them."""
     if separator is None:
         return next(csv.reader([" ".join(line.split())], delimiter=" ", skipinitialspace=True), [])
-    row = next(csv.reader([line.strip(" \r\n")], delimiter=separator, skipinitialspace=True), [])
+    row = next(csv.reader([_own(line, separator)], delimiter=separator, skipinitialspace=True), [])
     return [cell.strip().strip("'").strip() for cell in row]
 
 
