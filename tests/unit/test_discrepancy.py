@@ -1,9 +1,13 @@
 """What small effects that a model lacks do to its parameters: standard deviations that hold the truth, and nothing where nothing is lacking."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
+from rhythmid.diagnose import discrepancy
 from rhythmid.diagnose.discrepancy import mean_product
+from rhythmid.identify.least_squares import reduced
 
 ROWS, PARAMETERS, CANDIDATES = 600, 3, 20
 
@@ -31,6 +35,18 @@ def share_held(size, draws=200):
     plain = np.mean([np.abs(error) < 1.96 * std for error, std, _ in made])
     whole = np.mean([np.abs(error) < 1.96 * std for error, _, std in made])
     return plain, whole, np.mean([wide / std for _, std, wide in made])
+
+
+def test_many_rows_give_the_same_in_parts(monkeypatch):
+    rng = np.random.default_rng(5)
+    jacobian, candidates = rng.standard_normal((500, 3)), rng.standard_normal((500, 4))
+    residual = 3.0 * candidates @ rng.standard_normal(4) + rng.standard_normal(500)
+    inverse = np.linalg.inv(jacobian.T @ jacobian)
+    whole = mean_product(jacobian, residual, candidates, inverse)
+    monkeypatch.setattr(discrepancy, "ROWS", 40)
+    monkeypatch.setattr(discrepancy, "reduced", partial(reduced, most=60))
+    np.testing.assert_allclose(mean_product(jacobian, residual, candidates, inverse), whole, rtol=1e-9)
+    assert whole.any()
 
 
 def test_intervals_hold_the_truth_beside_small_effects_that_the_model_lacks():

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi2
 
-from rhythmid.identify.least_squares import orthonormal
+from rhythmid.identify.least_squares import orthonormal, reduced
 
 Array = NDArray[np.float64]
 # chance that noise alone makes a scale other than nothing as likely as that: below it nothing is added
 CHANCE = 0.05
 # decades of the candidates' common scale that are looked through, about the one at which they are as large as the residual
 DECADES = 4.0
+ROWS = 20_000  # that are taken at once
 ROUNDING = 1e-6  # of a candidate, below which what the parameters leave of it is rounding
 
 
@@ -35,12 +36,16 @@ def mean_product(jacobian: Array, residual: Array, candidates: Array, inverse: A
     candidates : (n, m) changes of the prediction by effects that the model may lack, each of any size.
     inverse : (p, p) inverse of the parameters' information, `jacobian` with itself and what priors add.
     """
+    rows, parameters = jacobian.shape
+    parts = (slice(first, first + ROWS) for first in range(0, rows, ROWS))
+    design, residual = reduced((np.hstack([jacobian[s], candidates[s]]), residual[s]) for s in parts)
+    jacobian, candidates = design[:, :parameters], design[:, parameters:]
     size = np.linalg.norm(candidates, axis=0)
     columns = candidates[:, size > 0.0] / size[size > 0.0]
     basis = orthonormal(jacobian)
     left = columns - basis @ (basis.T @ columns)
     rest = residual - basis @ (basis.T @ residual)
-    free = len(rest) - basis.shape[1] - left.shape[1]
+    free = rows - basis.shape[1] - left.shape[1]
     if free <= 0 or not left.shape[1]:
         return np.zeros_like(inverse)
     # in these directions the residual is what is missing and noise, in all others noise

@@ -19,6 +19,7 @@ from rhythmid.diagnose.constants import (
     MISMATCH,
     MOVES,
     OWN_LINE,
+    RECURS,
     REST,
     RICHER,
 )
@@ -127,6 +128,7 @@ SHAPES: Mapping[str, float] = {
     "own_frequency": OWN_LINE,
     "moves_the_machine": MOVES,
     "more_than_gain": MAINLY,
+    "more_than_motion": RECURS,
 }
 
 
@@ -236,6 +238,12 @@ RULES: tuple[Rule, ...] = (
         "mean square of what an actuator's law does to the recorded effort beyond a gain, as a share of what it does to the effort that "
         "the model requires",
         "on the recorded effort it is mainly a gain, which inertia and forces contain already",
+    ),
+    _shape_rule(
+        "more_than_motion",
+        "mean square of what an effect that changes with time does to the effort beyond any free map of the motion, as a share of what it does "
+        "beyond the nominal model's parameters",
+        "the motion comes too few times for a change with time to be told from a law of the motion",
     ),
 )
 

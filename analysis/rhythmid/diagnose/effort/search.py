@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.diagnose.case import SPENT, Budget
 from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.effort.beyond_gain import beyond_gain, recorded_efforts
+from rhythmid.diagnose.effort.beyond_motion import beyond_motion
 from rhythmid.diagnose.effort.candidate import (
     INPUT_DELAY,
     Screened,
@@ -116,10 +117,11 @@ def search_effort(
     _, jacobian = linearise(balance, model, names, 0.0)
     priors = priors_of(balance, model, names, jacobian[:, 1:])
     nominal = Fitted.of((), "nominal", fit_effort(balance, model, names, priors), priors)
+    blocks = Blocks.of(balance.record, GAP)
+    reference = reference_of(balance, nominal, blocks)
     search = _Search(
-        balance, catalogue, Blocks.of(balance.record, GAP), nominal, [nominal], promising, recorded_efforts(records, model)
-    )  # fmt: skip
-    reference = reference_of(balance, nominal, search.blocks)
+        balance, catalogue, blocks, nominal, reference, [nominal], promising, recorded_efforts(records, model)
+    )
     chosen = nominal
     budget = budget or Budget()
     cut: dict[str, str] = {}
@@ -128,7 +130,7 @@ def search_effort(
             cut = search.cut_off(chosen)
             break
         tell(f"looking for effect {number + 1} in the effort")
-        better = search.further(chosen, reference)
+        better = search.further(chosen)
         if better is None:
             break
         chosen = better
@@ -150,6 +152,7 @@ class _Search:
     catalogue: Catalogue
     blocks: Blocks
     nominal: Fitted
+    reference: Linearised  # the nominal model with a free map beside it
     found: list[Fitted]
     promising: float | None = None
     recorded: Array | None = None  # efforts as they were recorded
@@ -170,7 +173,7 @@ class _Search:
         starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
         return {one.name: SPENT for one in starts}
 
-    def further(self, parent: Fitted, reference: Linearised) -> Fitted | None:
+    def further(self, parent: Fitted) -> Fitted | None:
         """The best model with one effect more, or with a kin in the place of one; None where the table rejects that."""
         model = parent.fit.model
         starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
@@ -188,7 +191,7 @@ class _Search:
         if not new:
             return None
         fits = [one.linearised for one in (*new, parent, self.nominal)]
-        *others, before, start, free = predict([*fits, reference], self.blocks, self.balance.record)
+        *others, before, start, free = predict([*fits, self.reference], self.blocks, self.balance.record)
         order = sorted(range(len(new)), key=lambda index: -others[index].score)
         best = order[0]
         claimed = [one.claimed(prediction) for one, prediction in zip(new, others)]
@@ -248,8 +251,8 @@ class _Search:
         shape: dict[str, float] = {}
         for one in rest:  # beside fewer effects it may do what it did not before
             term = made.fit.model.term(one)
-            if term is not None and term.element.slot == "actuator":
-                shape = _worst(shape, self._shape(made, self.without(made, one), one))
+            if term is not None:
+                shape = _worst(shape, self._shape(made, self.without(made, one), one, term.element))
         return replace(made, shape=shape)
 
     def reduce(self, fitted: Fitted) -> None:
@@ -295,13 +298,17 @@ class _Search:
         if any(not math.isfinite(prior.std) or prior.std <= 0.0 for prior in priors.values()):
             return None
         made = self._fit((*base.elements, label), model, priors, aligned, alignment)
-        if start.element is None or start.element.slot != "actuator":
+        if start.element is None:
             return replace(made, shape=base.shape)
-        return replace(made, shape=_worst(base.shape, self._shape(made, base, label)))
+        return replace(made, shape=_worst(base.shape, self._shape(made, base, label, start.element)))
 
-    def _shape(self, made: Fitted, base: Fitted, label: str) -> dict[str, float]:
-        """Statistics of an actuator's effect, by the rule that looks at them; `base` is the hypothesis without it."""
-        shape = {"moves_the_machine": self._left(made, base, label)}
+    def _shape(self, made: Fitted, base: Fitted, label: str, element: Element) -> dict[str, float]:
+        """Statistics of an effect, by the rule that looks at them; `base` is the hypothesis without it."""
+        own = beyond_motion(self.balance, made.fit.model, label, self.nominal.linearised, self.reference)
+        shape = {"more_than_motion": own}
+        if element.slot != "actuator":
+            return shape
+        shape["moves_the_machine"] = self._left(made, base, label)
         if self.recorded is not None:
             model, sizes = made.fit.model, scales_of(self.balance, base.fit.model)
             required = np.concatenate(self.balance.required(model))
