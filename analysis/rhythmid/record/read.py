@@ -33,6 +33,7 @@ RUN_CLOCK = 10.0  # seconds; a clock that reads less at the first sample started
 CALENDAR = (
     1e8  # seconds, three years: a clock that reads more counts from 1970, not from the start of a machine
 )
+SPLIT = "sort the table, or take it apart with  rhythmid split"
 SAMPLES_PER_CYCLE = 100  # of a forcing that is given by formula
 MOST_OF_FORMULA = 50_000_000  # samples of it, 400 MB: an hour at 100 Hz has 36 million
 
@@ -171,7 +172,7 @@ def read_tables(signals: Signals) -> Record:
     if name == "signals":
         name = signals.path.resolve().parent.name  # tells more
     quality = Quality({}, notes=unit_notes(signals))
-    record = _record(name, _since_start(made), signals, "sort or split the table", quality)
+    record = _record(name, _since_start(made), signals, SPLIT, quality)
     return _finish(replace(record, hold=signals.hold or _measured_hold(record)), signals)
 
 

@@ -9,6 +9,7 @@ from rhythmid.errors import InputError
 
 GAP = 1.5  # periods between two samples, beyond which at least one is missing
 LATE = 10.0  # periods by which a message may arrive late and still be put back in order
+DISORDERED = 0.01  # share of stamps that may be earlier than the one before them by jitter
 SAME = 1e-9  # seconds; times that differ by less are one
 OFTEN = 0.1  # share of steps longer than 1.5 periods, beyond which a channel is not periodic
 # samples on either side, beyond twice as many as may be missing, whose stamps tell whether any is
@@ -140,8 +141,8 @@ def put_in_order(time: Times, label: str, mend: str) -> NDArray[np.int64]:
     """Indices that put samples in order of time; of samples with one time, only the first is kept.
 
     Messages may overtake one another on their way to the recorder. Such a message is put back where it belongs: it is
-    at most 10 periods late and fills a hole, so that no two samples come closer than half a period. Any other step
-    backwards means that the clock was set back, and then the recording cannot be trusted.
+    at most 10 periods late and fills a hole, so that no two samples come closer than half a period. Stamps that jitter may change
+    places with their neighbours now and then. Any other step backwards means that the clock was set back, and then the recording cannot be trusted.
 
     Raises InputError, beginning with `label` and ending with `mend`, when time goes backwards or stands still.
     """
@@ -155,6 +156,8 @@ def put_in_order(time: Times, label: str, mend: str) -> NDArray[np.int64]:
     kept = order[np.diff(time[order], prepend=-np.inf) > 0.0]
     step = np.diff(time[kept])
     period = nominal_period(step)
+    if (newest[late] - time[late]).max() < period and len(late) < DISORDERED * len(time):
+        return kept  # no clock but its jitter
     moved = np.flatnonzero(np.isin(kept, late))
     near = np.concatenate([step[moved[moved > 0] - 1], step[moved[moved < len(step)]]])
     fills = len(moved) == len(late) and (near >= 0.5 * period).all()

@@ -1,0 +1,92 @@
+"""A table that holds several recordings, one below the other, as a table for each of them.
+
+Data sets for learning keep their episodes in one table, with a column that numbers them; logs that were appended to one another begin
+their time anew.
+"""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from zipfile import ZipFile
+
+import numpy as np
+from numpy.lib.format import write_array
+from numpy.typing import NDArray
+
+from rhythmid.errors import InputError
+from rhythmid.output import require_writable
+from rhythmid.record.table import Table, table_name
+
+NUMBERED = re.compile(
+    r"(?:.*[._ ])?(?:episode|trial|run|trajectory|segment)(?:[._ ]?(?:index|id|number|nr|no))?", re.IGNORECASE
+)
+TIME = re.compile(r"(?:.*[._ ])?(?:time|timestamp|stamp|t)(?:[._ ]?(?:s|ms|us|ns))?", re.IGNORECASE)
+MOST = 10_000  # recordings that a table may be split into
+Rows = NDArray[np.int64]
+
+
+def recordings(table: Table, column: str | None = None) -> tuple[str, dict[str, Rows]]:
+    """The rows of each recording by its name, and in words what tells them apart: the column that is named, else one that numbers
+    recordings, else a time that goes back.
+
+    Raises InputError where the column is not there, nothing tells recordings apart, or there are far too many.
+    """
+    if column is None:
+        whole = (name for name, value in table.vectors() if NUMBERED.fullmatch(name) and _numbers_rows(value))
+        column = next(whole, None)
+    if column is not None:
+        value = table.column(column)
+        if not np.isfinite(value).all():
+            raise InputError(f"{table.path}: column {column!r} does not number every row")
+        numbers = np.unique(value)
+        found = {f"{number:g}": np.flatnonzero(value == number) for number in numbers[: MOST + 1]}
+        why = f"column {column!r}"
+    else:
+        time = next((name for name, _ in table.vectors() if TIME.fullmatch(name)), None)
+        if time is None:
+            raise InputError(
+                f"{table.path}: neither a column that numbers recordings nor a time is there; name a column with --by"
+            )
+        back = 1 + np.flatnonzero(np.diff(table.column(time)) < 0.0)
+        parts = np.split(np.arange(len(table.column(time))), back[:MOST])
+        found = {str(number): rows for number, rows in enumerate(parts)}
+        why = f"{time!r}, which begins anew"
+    if not 1 < len(found) <= MOST:
+        raise InputError(f"{table.path}: {why} tells {len(found)} recordings apart; 2 to {MOST} are expected")
+    return why, found
+
+
+def _numbers_rows(value: NDArray[np.float64]) -> bool:
+    """Whether a column has whole numbers, each in rows that follow one another."""
+    return bool(np.all(value == np.rint(value))) and len(np.unique(value)) == 1 + np.count_nonzero(
+        np.diff(value)
+    )
+
+
+def split(table: Table, rows: Mapping[str, Rows], folder: Path) -> list[Path]:
+    """Write the rows of each recording as `folder/<table>_<name>.npz`; columns of words are left out.
+
+    Raises InputError where the folder exists or cannot be written.
+    """
+    if folder.exists():
+        raise InputError(f"{folder}: exists already; name another folder or remove it")
+    require_writable(folder)
+    count = sum(map(len, rows.values()))
+    columns: dict[str, NDArray[Any]] = {
+        name: values for name, value in table.columns.items()
+        if (values := np.asarray(value)).dtype.kind in "fiub" and values.shape[:1] == (count,)
+    }  # fmt: skip
+    partial = folder.with_name(f".{folder.name}.partial")
+    made = [f"{table_name(table.path)}_{name}.npz" for name in rows]
+    try:
+        partial.mkdir(parents=True)
+        for name, own in zip(made, rows.values(), strict=True):
+            with ZipFile(partial / name, "w") as archive:  # savez takes no column called `file`
+                for column, values in columns.items():
+                    with archive.open(f"{column}.npy", "w") as file:
+                        write_array(file, values[own], allow_pickle=False)
+        partial.rename(folder)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written: {error.strerror}") from None
+    return [folder / name for name in made]
