@@ -130,3 +130,10 @@ def test_of_several_effects_the_worst_statistics_are_told_and_labels_without_an_
     assert both["acts_within_records"] == 0.0
     assert shape_of(model, ("viscous_damper",), motion(), SIZES)["acts_within_records"] == math.inf
     assert shape_of(model, ("inertia.mass",), motion(), SIZES) == {}
+
+
+@pytest.mark.parametrize(("apart", "same"), [(0.5, True), (-0.5, True), (3.0, False)])
+def test_a_disturbance_at_the_frequency_of_a_free_motion_is_another_damping_or_stiffness(apart, same):
+    free = replace(SIZES, forcing_frequency=0.0, idle=True)
+    values = {"amplitude": 0.1, "frequency": free.frequency + apart / free.duration}
+    assert (shape("periodic_disturbance", values, sizes=free)["own_frequency"] < 1.0) is same

@@ -49,7 +49,7 @@ EQUIVALENT = 2.0
 
 # of a bound, or of an effect, within which a value is taken to be there: rounding of a descent that stopped at it
 EDGE = 1e-3
-# resolved lines between an effect's frequency and a multiple of the forcing's: closer than the width of a line they are one
+# resolved lines between an effect's frequency and a multiple of the forcing's, or that of a free motion: closer than the width of a line they are one
 OWN_LINE = 1.0
 # share of what an effect that changes with time does beyond the nominal model that no free map of the motion does: friction by direction
 # taken for a fading actuator has 0.004 and less where the motion is made once, and any effect 0.13 and more where it comes again

@@ -225,8 +225,8 @@ RULES: tuple[Rule, ...] = (
     ),
     _shape_rule(
         "own_frequency",
-        "distance of the effect's frequency from a multiple of the forcing's, in resolved spectral lines",
-        "at a multiple of the forcing's frequency it is indistinguishable from a change in the forcing's path",
+        "distance of the effect's frequency from a multiple of the forcing's, or from that of a free motion, in resolved spectral lines",
+        "at a multiple of the forcing's frequency, or at that of a free motion, it is indistinguishable from a change in the path of the force",
     ),
     _shape_rule(
         "moves_the_machine",

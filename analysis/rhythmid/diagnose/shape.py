@@ -2,7 +2,8 @@
 
 One that bends only where the motion has never been, such as a gap whose edges it never meets, is but a constant or a
 spring; one at the edge of what its name means is on its way to being another; and a disturbance, or a resonance as
-narrow as one, at a multiple of the forcing's frequency is what any change in the path of the forcing looks like.
+narrow as one, at a multiple of the forcing's frequency is what any change in the path of the forcing looks like, and one at the frequency of a
+free motion what another damping or stiffness does.
 """
 
 import math
@@ -73,14 +74,19 @@ def _within_bounds(term: Term, sizes: Scales) -> float:
 
 def _own_frequency(term: Term, sizes: Scales) -> float:
     """Distance of a vibration, or of a resonance as narrow as one, from the forcing's harmonics, in lines that the records
-    resolve; infinite for other effects."""
+    resolve, or in a free motion from the frequency of that; infinite for other effects."""
     forcing, line = sizes.forcing_frequency, 1.0 / sizes.duration
-    if term.element.kernel is None or forcing <= 0.0:
+    free = forcing <= 0.0 and sizes.idle
+    if term.element.kernel is None or (forcing <= 0.0 and not free):
         return math.inf
     found = [term.values[one.name].value for one in term.element.parameters if one.unit == "Hz"]
     damping = term.values[term.element.width].value if term.element.width else 0.0
-    narrow = [abs(f - round(f / forcing) * forcing) / line for f in found if damping * f < line]
-    return min(narrow, default=math.inf)
+    apart = [
+        abs(f - (sizes.frequency if free else round(f / forcing) * forcing))
+        for f in found
+        if damping * f < line
+    ]
+    return min(apart, default=math.inf) / line
 
 
 def _met(known: Trajectories, element: Element) -> Path:
