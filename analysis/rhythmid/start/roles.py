@@ -14,6 +14,7 @@ from rhythmid.start.copies import correlation_of_copy, doubt_of_copy, note_of_co
 from rhythmid.start.joint import Joint, joint_of
 from rhythmid.start.meaning import Meaning, Quantity, is_ignored, is_lone_v, meaning_of, poses, rotary_of
 from rhythmid.start.relation import coherent, derivative, drives, follows, goes_along
+from rhythmid.start.step_before import BEFORE, step_before
 
 Ask = Callable[
     [str, Sequence[str]], int
@@ -95,7 +96,9 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     if carried is not None:
         reason = f"a motion that drives {carried.driven}, and nothing else drives"
         more = {"input": Choice(carried.driver, reason, doubts=(carried.doubt,))}
-    more = more or _switched_on(found.constant, chosen)
+    step = None if more else step_before(found.constant, chosen)
+    if step is not None:
+        more = {"input": Choice(step, "the only effort, and nothing else drives", doubts=(BEFORE,))}
     choices |= {role: _doubted(choice, copies) for role, choice in more.items()}
     if not more:
         notes += _idle(rest, output.recorded)
@@ -135,20 +138,6 @@ def _doubted(choice: Choice, copies: Mapping[int, float]) -> Choice:
     if id(choice.recorded) not in copies:
         return choice
     return replace(choice, doubts=(*choice.doubts, doubt_of_copy(copies[id(choice.recorded)])))
-
-
-def _switched_on(constant: Sequence[Recorded], joint: Joint) -> dict[str, Choice]:
-    """An effort that stands still for the whole record, where nothing else drives: a step that was made as the record began."""
-    efforts = [
-        one for one in constant
-        if (meaning := meaning_of(one)).quantity == "effort" and meaning.certain and joint.includes(one, meaning)
-    ]  # fmt: skip
-    if len(efforts) != 1:
-        return {}
-    doubt = (
-        "it never changes: taken for a step that was made as the record began; without it, delete this input"
-    )
-    return {"input": Choice(efforts[0], "the only effort, and nothing else drives", doubts=(doubt,))}
 
 
 def _idle(rest: list[_Known], output: Recorded) -> list[str]:

@@ -17,6 +17,7 @@ from rhythmid.diagnose.case import SPENT, Budget
 from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
 from rhythmid.diagnose.search.backward import eliminate
 from rhythmid.diagnose.search.order import in_best_order
+from rhythmid.diagnose.search.proposals import REFITTED, better_of, from_given, proposals
 from rhythmid.diagnose.search.refit import (
     fine_enough,
     near_under_noise,
@@ -27,20 +28,13 @@ from rhythmid.diagnose.search.refit import (
 )
 from rhythmid.diagnose.search.round import Round, distinct, not_tried, one_round
 from rhythmid.diagnose.search.score_tests import (
-    changes_of,
-    guesses,
-    p_value,
-    score,
-    sizes_along,
-    trajectories,
     under,
 )
-from rhythmid.diagnose.search.trial import Proposal, Trial, propose
+from rhythmid.diagnose.search.trial import Trial
 from rhythmid.elements.catalogue import Catalogue
-from rhythmid.errors import InputError
 from rhythmid.identify.free_run import accurate
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.output_error import Fit, minimise, noise_of
+from rhythmid.identify.output_error import Fit, noise_of
 from rhythmid.identify.sample_clock.clock import has_clock
 from rhythmid.identify.sample_clock.tick_likelihood import ticks_sought
 from rhythmid.identify.series import Series
@@ -55,9 +49,6 @@ Array = NDArray[np.float64]
 WORTH = 10.0
 SHARE = 5e-4  # of what is explained already, below which a further effect is an imperfection of the others
 LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
-# elements of a round that are refitted because they score best along the whole records, and in windows. On 90 cases of all
-# machines of the proof the right one, or its kin, was among the first four or among the first three in windows
-REFITTED, LOCAL = 4, 3
 GROUPS = 3  # of so many elements that are refitted for the first effect, one after the other, while none does better
 # difference of the criterion within which models are compared again under the noise that they leave
 NEAR = 60.0
@@ -68,7 +59,6 @@ UNDERSTATED = 0.1  # share of what a refit gains that a score shows at least, wh
 EFFECTS_AT_ONCE = 3  # effects at once
 RIVALS_COMPARED = 4  # models of each number of effects that are compared at the end
 OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
-MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
 # of the noise: integration error of an element with corners beyond which all steps are made finer
 POOR_FIT = 0.1
 
@@ -91,54 +81,6 @@ class Search:
     rounds: tuple[Round, ...]
     excluded: tuple[tuple[tuple[str, ...], str], ...]
     cut_short: bool = False
-
-
-def _proposals(
-    base: Model, now: Round, count: int, chi2: float, first: int = 0
-) -> tuple[list[Proposal], list[float]]:
-    """Structures worth a refit, with chi2 below which one start of each is enough: the elements that score best along the whole
-    records, from the `first` on, and, with these, those that do in windows."""
-    made, enough = [], []
-    local = {best.element.name: group for best, group in distinct(now.local, LOCAL if first == 0 else 0)}
-    for best, group in distinct(now.scores, first + count)[first:]:
-        starts = [(one.start, one.own(base)) for one in group[: 3 if len(group) > MANY else 2]]
-        if not 0.2 < abs(best.size) < 5.0:  # far from the guess that was scored, the size is an extrapolation
-            starts.insert(1, (dict(best.values), best.own(base, 1.0)))
-        starts = [*[(one.start, {}) for one in local.pop(best.element.name, [])[:1]], *starts][:3]
-        values, beside = zip(*starts)
-        made.append(propose(base, best.element, values, now.added, chi2, beside))
-        enough.append(chi2 - 0.8 * best.statistic)
-    for group in local.values():
-        made.append(propose(base, group[0].element, [one.start for one in group[:2]], now.added, chi2))
-        enough.append(-math.inf)
-    return made, enough
-
-
-def _from_given(
-    nominal: Fit, given: Model, catalogue: Catalogue, chi2: float, pool: ThreadPoolExecutor | None
-) -> list[Proposal]:
-    """Structures worth a refit from the values that the nominal model was given with.
-
-    Where it loses the machine all the same, its refit has bent them to stand in for what is missing: the spring of a hopper
-    that leaves the ground comes out far too soft and too long.
-    """
-    values = {name: given.value(name) for name in nominal.names if name in given.parameters}
-    model = nominal.model.with_values(values)
-    try:
-        fit = minimise(model, nominal.run, nominal.names, nominal.noise, nominal.starts, 0, pool)
-        known = trajectories(fit)
-    except InputError:
-        return []
-    scores = score(fit, changes_of(known, guesses(catalogue, model, sizes_along(known)), pool))
-    return _proposals(model, Round(tuple(scores), p_value(scores)), REFITTED, chi2)[0]
-
-
-def _better_of(trials: Sequence[Trial]) -> list[Trial]:
-    """The better one of each two trials of the same structure, best first."""
-    kept: dict[tuple[str, ...], Trial] = {}
-    for trial in sorted(trials, key=lambda t: t.bic()):
-        kept.setdefault(trial.added, trial)
-    return list(kept.values())
 
 
 @dataclass(frozen=True)
@@ -261,16 +203,16 @@ def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
     found, failed = [], []
     # where nothing is found yet and none of the best does better, they were kin that the scores, which are linear, promise too much of
     for first in range(0, count * (1 if state.best.added else GROUPS), count):
-        proposals, enough = _proposals(here.model, now, count, here.chi2, first)
-        if any(one.chi2 < here.chi2 for one in found) or not proposals:
+        proposed, enough = proposals(here.model, now, count, here.chi2, first)
+        if any(one.chi2 < here.chi2 for one in found) or not proposed:
             break
-        task.tell(f"refitting with {', '.join(p.added[-1] for p in proposals)}")
-        others, lost = run_trials(proposals, *begun, enough, tell=task.tell)
-        found, failed = _better_of([*found, *others]), failed + lost
+        task.tell(f"refitting with {', '.join(p.added[-1] for p in proposed)}")
+        others, lost = run_trials(proposed, *begun, enough, tell=task.tell)
+        found, failed = better_of([*found, *others]), failed + lost
     if not state.best.added and task.nominal.nrmse() > FOLLOWS:
-        proposals = _from_given(task.nominal, task.given, task.catalogue, here.chi2, task.pool)
-        others, lost = run_trials(proposals, *begun, tell=task.tell)
-        found, failed = _better_of([*found, *others]), failed + lost
+        proposed = from_given(task.nominal, task.given, task.catalogue, here.chi2, task.pool)
+        others, lost = run_trials(proposed, *begun, tell=task.tell)
+        found, failed = better_of([*found, *others]), failed + lost
     found = [one for one in found if one.chi2 < here.chi2]  # a richer model that does worse got lost
     return state.without(failed).with_trials(found), found
 

@@ -1,0 +1,18 @@
+"""A step of the effort that was made as a record began: it stands still for the whole record."""
+
+from collections.abc import Sequence
+
+from rhythmid.record.inventory import Recorded
+from rhythmid.start.joint import Joint
+from rhythmid.start.meaning import meaning_of
+
+BEFORE = "it never changes: taken for a step that was made as the record began; without it, delete this input"
+
+
+def step_before(constant: Sequence[Recorded], joint: Joint) -> Recorded | None:
+    """The one effort, by its name or unit, among what stands still at another value than zero; None where there is none or several."""
+    efforts = [
+        one for one in constant
+        if (meaning := meaning_of(one)).quantity == "effort" and meaning.certain and joint.includes(one, meaning)
+    ]  # fmt: skip
+    return efforts[0] if len(efforts) == 1 else None
