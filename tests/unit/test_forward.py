@@ -23,10 +23,16 @@ ORDER = ("coulomb_friction", "cubic_stiffness", "quadratic_drag")  # in which th
 VALUES = ({"force": 1.0, "transition": 0.01}, {"coefficient": 10.0}, {"coefficient": 1.0})
 
 
-def found(monkeypatch: pytest.MonkeyPatch, *gains: float, local: bool = False) -> tuple[str, ...]:
+MISLEADING = ("actuator_lag", "sensor_lag", "command_lag", "actuator_rate_limit", "input_delay_drift")
+
+
+def found(
+    monkeypatch: pytest.MonkeyPatch, *gains: float, local: bool = False, misleading: int = 0
+) -> tuple[str, ...]:
     """The effects that a search grants, of which each lowers chi2 by its gain, once the ones before it are there.
 
-    All score along the whole records, or only in windows of them where `local`.
+    All score along the whole records, or only in windows of them where `local`. So many `misleading` elements score better than the first
+    effect, and do worse.
     """
 
     def fitted(trial: Any, *_: Any, **__: Any) -> Any:
@@ -40,6 +46,8 @@ def found(monkeypatch: pytest.MonkeyPatch, *gains: float, local: bool = False) -
     def one_round(fit: Any, added: tuple[str, ...], *_: Any) -> tuple[Round, Any]:
         place = len(added)
         scores = [Score(0, CATALOGUE[ORDER[place]], VALUES[place], 1e3, 1.0)] if place < len(gains) else []
+        kin = [CATALOGUE[name] for name in MISLEADING[: 0 if place else misleading]]
+        scores = [*(Score(1, one, {p.name: 0.01 for p in one.parameters}, 2e3, 1.0) for one in kin), *scores]
         if local:
             return Round((), 1.0, added, tuple(scores)), fit
         return Round(tuple(scores), 0.0 if scores else 1.0, added), fit
@@ -47,7 +55,8 @@ def found(monkeypatch: pytest.MonkeyPatch, *gains: float, local: bool = False) -
     def run_trials(proposals: list[Proposal], *_: Any, **__: Any) -> tuple[list[Trial], list[Any]]:
         made = [
             Trial(
-                one.added, one.model, (), CHI2 - sum(gains[: len(one.added)]), 2000, len(one.model.free), True, QUIET
+                one.added, one.model, (), CHI2 + 1.0 if one.added[-1] in MISLEADING else CHI2 - sum(gains[: len(one.added)]),
+                2000, len(one.model.free), True, QUIET,
             )
             for one in proposals
         ]  # fmt: skip
@@ -88,3 +97,8 @@ def test_a_further_effect_has_to_gain_more_than_a_small_share_of_what_is_explain
 def test_the_first_effect_has_to_gain_more_than_a_difference_that_tells_nothing(monkeypatch, gain, granted):
     # its two parameters cost 15 of the criterion
     assert found(monkeypatch, gain) == ORDER[:granted]
+
+
+@pytest.mark.parametrize("misleading", [0, 3, 4, 5])
+def test_an_effect_is_found_behind_others_that_score_better_and_do_worse(monkeypatch, misleading):
+    assert found(monkeypatch, 2e5, misleading=misleading) == ORDER[:1]

@@ -228,9 +228,8 @@ def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State
         top = _most_likely(group, task.series, here.noise, state.step, task.floor)
         fit, step = _finely_fitted(task, top, here.noise, state.step)
         sought = top
-        if any(
-            has_clock(top.model, label) for label in top.added[-2:]
-        ):  # and once more beside what came after it
+        # a clock is sought once more beside what came after it
+        if any(has_clock(top.model, label) for label in top.added[-2:]):
             fit = ticks_sought(fit, task.floor, task.pool)
             sought = replace(top, model=fit.model, starts=fit.starts, converged=False)
         others = [trial for trial in group if trial.added != top.added]
@@ -243,10 +242,8 @@ def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State
         gain = before.bic() - winner.bic()
         if winner.added != best.added and gain >= state.margin:
             return state, _Grant(winner, gain, settled)
-    return (
-        state,
-        None,
-    )  # what the noise model of the round saw in them, the noise that they leave does not bear out
+    # what the noise model of the round saw in them, the noise that they leave does not bear out
+    return state, None
 
 
 def _finely_fitted(task: _Task, trial: Trial, noise: NoiseModel, step: float) -> tuple[Fit, float]:
