@@ -14,6 +14,7 @@ from scipy.signal import lfilter, lfiltic
 
 Array = NDArray[np.float64]
 TINY = 1e-12  # of a variance that a predictor leaves, at least
+PREDICTED = 25.0  # power of a residual over what its own past leaves of it, beyond which it is no noise
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,11 @@ class NoiseModel:
             return self.std**2
         response = 1.0 - np.fft.rfft(np.concatenate([[0.0], self.coefficients]), 4096)
         return float(self.std**2 * np.mean(1.0 / np.abs(response) ** 2))
+
+    @property
+    def is_structure(self) -> bool:
+        """Whether it is no noise at all, but motion that a model misses: nearly all of it follows from its own past."""
+        return self.variance > PREDICTED * self.std**2
 
     @property
     def long_run_variance(self) -> float:

@@ -52,7 +52,7 @@ def paper_method(record: Record, model: Model, pumping: Pumping, harmonics: int 
         raise InputError(
             f"{record.name}: has no input channel; identification needs the excitation (`rhythmid diagnose` takes records without)"
         )
-    if np.ptp(record.input.value) == 0.0:
+    if np.ptp(record.input.value) == 0.0 and np.any(record.input.value):
         raise InputError(f"{record.name}: its input never changes; transfer functions need an excitation")
     ring_down = linearised(model, pumping).cycle.ring_down
     for _ in range(2):  # the smoothing follows the ring-down, which is known once the model is fitted

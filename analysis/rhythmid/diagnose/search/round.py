@@ -31,9 +31,7 @@ from rhythmid.identify.output_error import Fit, coloured, minimise
 from rhythmid.identify.series import Series
 
 Array = NDArray[np.float64]
-MISFIT = 0.1  # error, as a share of the motion, and
-# power of the residual over what its own past leaves of it, beyond both of which it is no noise
-PREDICTED = 25.0
+MISFIT = 0.1  # error, as a share of the motion, from which a residual that follows from its own past is not whitened away
 # windows in which the catalogue is scored: enough to see every amplitude, few enough to cost less than the records
 WINDOWS = 40
 REMEMBERED = 4  # times what the noise remembers, that a window is longer than at least
@@ -126,8 +124,7 @@ def one_round(
     What is missing, such as a slow drift, would otherwise pass for the colour of the noise, in later rounds as in the first.
     """
     noise = noise_without(fit, _changes(fit, catalogue, pool), _filters(fit, pool))
-    if fit.nrmse() > MISFIT and noise.variance > PREDICTED * noise.std**2:
-        # motion that is missed, not noise: do not whiten it away
+    if fit.nrmse() > MISFIT and noise.is_structure:
         noise = NoiseModel(np.empty(0), noise.variance**0.5)
     fit = under(fit, noise, pool)
     scores = score(fit, _changes(fit, catalogue, pool))
