@@ -161,26 +161,6 @@ def test_a_mass_of_four_times_the_nominal_and_a_damping_at_zero_are_warnings_wit
     assert damping["name"] in ("value_at_zero", "large_shift")
 
 
-def test_a_remainder_that_follows_from_its_own_past_is_a_warning_and_noise_is_none():
-    made, std = [], 1e-4
-    for friction in (0.0, 0.6):
-        rng = np.random.default_rng(4)
-        time, force = 0.01 * np.arange(3000), []
-        x = v = 0.0
-        kept = []
-        for index in range(30_000):
-            if index % 10 == 0:
-                force.append(3.0 * math.sin(0.02 * index / 10) + 2.0 * math.sin(0.061 * index / 10))
-                kept.append(x)
-            v += 1e-3 * (force[-1] - 40.0 * x - 1.5 * v - friction * math.tanh(v / 1e-3))
-            x += 1e-3 * v
-        noisy = np.array(kept) + std * rng.standard_normal(3000)
-        record = Record("slide", Channel(time, noisy, "m"), Channel(time, np.array(force), "N"))
-        found = identify(record, slide(True, mass=1.0, damping=1.5, stiffness=40.0)).to_dict()
-        made.append([one["name"] for one in found["warnings"]])
-    assert "structured_remainder" not in made[0] and made[1][0] == "structured_remainder"
-
-
 def test_a_delay_of_more_than_ten_samples_is_a_warning(sliding):
     output = sliding.output
     late = replace(sliding, output=replace(output, time=output.time + 0.15))

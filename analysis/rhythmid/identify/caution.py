@@ -3,12 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-from rhythmid.identify.noise import NoiseModel
-
-Name = Literal[
-    "not_identified", "structured_remainder", "other_unit", "large_shift", "value_at_zero", "long_delay"
-]
-SLIGHT = 1e-3  # of the motion, below which what a fit leaves is of no matter
+Name = Literal["not_identified", "other_unit", "large_shift", "value_at_zero", "long_delay"]
 
 
 @dataclass(frozen=True)
@@ -36,21 +31,6 @@ def not_identified(motion: float, response: float | None) -> Caution:
         "not_identified",
         f"not identified: the fit leaves {left} unexplained, so none of its values can be used",
         "Are the values that the model is given near the machine's? If so, `rhythmid diagnose` names the physics that it lacks.",
-    )
-
-
-def structured_remainder(motion: float, noise: NoiseModel) -> tuple[Caution, ...]:
-    """A fit that leaves this share of the `motion` (rms), and what it leaves is no noise; nothing where it is, or hardly anything."""
-    if motion < SLIGHT or not noise.is_structure:
-        return ()
-    predicted = 1.0 - noise.std**2 / noise.variance
-    return (
-        Caution(
-            "structured_remainder",
-            f"what the fit leaves, {100.0 * motion:.2g} % of the motion, is no noise: {100.0 * predicted:.0f} % of its power follows from "
-            "its own past. The values, delays above all, may be further off than their standard deviations say",
-            "Which physics does the model lack? `rhythmid diagnose` names it.",
-        ),
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
-from rhythmid.identify.caution import Caution, not_identified, other_unit, structured_remainder
+from rhythmid.identify.caution import Caution, not_identified, other_unit
 from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.discretisation import with_discretisation_error
@@ -22,7 +22,6 @@ from rhythmid.identify.inner_delays import dead_times
 from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit, explained
 from rhythmid.identify.large_shifts import large_shifts
 from rhythmid.identify.natural_size import sizes_of
-from rhythmid.identify.output_error import Fit, noise_of
 from rhythmid.identify.own_zeros import with_own_zeros
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
 from rhythmid.identify.paper_conditions import lacks_paper_method, lacks_transfer_functions
@@ -271,8 +270,6 @@ class _Seen:
         """What should keep a user from believing the estimates. Raises InputError where a channel is in another unit."""
         stuck = joint is not None and not joint.search.arrived
         cautions = large_shifts(self.nominal, parameters, delays, self.records[0].output.period)
-        if joint is not None and nrmse <= POOR_MOTION:
-            cautions = (*_of_remainder(joint.fit, nrmse), *cautions)
         if not stuck and nrmse <= POOR_MOTION and shift(self.nominal, fitted) <= SHIFTED:
             return cautions
         mend = check_plausible(self.nominal, self.records)
@@ -281,14 +278,6 @@ class _Seen:
             return (*told, *cautions)
         response = joint.search.response if joint is not None and nrmse <= POOR_MOTION else None
         return (not_identified(nrmse, response), *told, *cautions)
-
-
-def _of_remainder(fit: Fit, nrmse: float) -> tuple[Caution, ...]:
-    """A caution where what a fit leaves is no noise; none where its colour is known, as that of what jitter of the commands excites."""
-    series = fit.run.series
-    if any(one.colour is not None for one in series):
-        return ()
-    return structured_remainder(nrmse, noise_of(fit.residuals, series))
 
 
 def _by_paper(seen: _Seen, htf: HtfMethod, method: Method) -> Identification:
