@@ -86,3 +86,19 @@ def test_a_column_may_have_any_name(tmp_path):
     whole = Table.load(tmp_path / "log.csv")
     first, *_ = split(whole, recordings(whole)[1], tmp_path / "parts")
     np.testing.assert_array_equal(Table.load(first).column("file"), ANGLE[EPISODE == 0])
+
+
+def test_numbers_of_many_digits_stay_apart(tmp_path):
+    _, rows = recordings(table(tmp_path, run=1_000_000_000 + EPISODE))
+    assert list(rows) == ["1000000000", "1000000001", "1000000002"]
+
+
+def test_a_folder_that_cannot_be_finished_leaves_nothing(tmp_path, monkeypatch):
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    whole = table(tmp_path)
+    monkeypatch.setattr("rhythmid.record.split.write_array", full)
+    with pytest.raises(InputError, match="parts: cannot be written: No space left on device"):
+        split(whole, recordings(whole)[1], tmp_path / "parts")
+    assert [path.name for path in tmp_path.iterdir()] == ["log.npz"]

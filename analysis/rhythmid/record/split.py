@@ -7,6 +7,7 @@ their time anew.
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from shutil import rmtree
 from typing import Any
 from zipfile import ZipFile
 
@@ -40,7 +41,7 @@ def recordings(table: Table, column: str | None = None) -> tuple[str, dict[str, 
         if not np.isfinite(value).all():
             raise InputError(f"{table.path}: column {column!r} does not number every row")
         numbers = np.unique(value)
-        found = {f"{number:g}": np.flatnonzero(value == number) for number in numbers[: MOST + 1]}
+        found = {_name(number): np.flatnonzero(value == number) for number in numbers[: MOST + 1].tolist()}
         why = f"column {column!r}"
     else:
         time = next((name for name, _ in table.vectors() if TIME.fullmatch(name)), None)
@@ -55,6 +56,10 @@ def recordings(table: Table, column: str | None = None) -> tuple[str, dict[str, 
     if not 1 < len(found) <= MOST:
         raise InputError(f"{table.path}: {why} tells {len(found)} recordings apart; 2 to {MOST} are expected")
     return why, found
+
+
+def _name(number: float) -> str:
+    return str(int(number)) if number.is_integer() else repr(number)
 
 
 def _numbers_rows(value: NDArray[np.float64]) -> bool:
@@ -80,7 +85,7 @@ def split(table: Table, rows: Mapping[str, Rows], folder: Path) -> list[Path]:
     partial = folder.with_name(f".{folder.name}.partial")
     made = [f"{table_name(table.path)}_{name}.npz" for name in rows]
     try:
-        partial.mkdir(parents=True)
+        partial.mkdir(parents=True, exist_ok=True)
         for name, own in zip(made, rows.values(), strict=True):
             with ZipFile(partial / name, "w") as archive:  # savez takes no column called `file`
                 for column, values in columns.items():
@@ -89,4 +94,6 @@ def split(table: Table, rows: Mapping[str, Rows], folder: Path) -> list[Path]:
         partial.rename(folder)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error.strerror}") from None
+    finally:
+        rmtree(partial, ignore_errors=True)  # what an interruption or a full disk has left of it
     return [folder / name for name in made]
