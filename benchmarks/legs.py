@@ -16,7 +16,7 @@ import math
 import sys
 import time as clock
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +39,7 @@ SHARE = 0.1  # of the mismatch, above which an effect has to be named
 LASTS = {"leg": 18.0, "arm": 20.0, "quadruped": 16.0}  # [s]
 # sizes as shares of the rms of the joint's effort (N m), or of what they multiply
 EFFECTS = ("coulomb_friction", "actuator_lag", "actuator_gain", "actuator_delay", "constant_force", "linear_spring",
-           "link_mass", "armature", "actuator_deadband", "stribeck_friction")  # fmt: skip
+           "link_mass", "payload", "armature", "actuator_deadband", "stribeck_friction")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -74,6 +74,12 @@ def concealed(machine: Machine, joint: str, effect: str, effort: float, rng: np.
         name = f"{links[-1]}.mass"
         factor = 1.0 + float(rng.choice([-1.0, 1.0]) * rng.uniform(0.25, 0.5))
         return machine.with_inertial({name: factor * machine.body.parameters[name]}), factor
+    if effect == "payload":  # its place is not where the diagnosis takes the link's end to be
+        link = carried_at(machine, joint)[0]
+        place = machine.body.ends[link] * float(rng.uniform(0.8, 1.2))
+        size = float(rng.uniform(0.2, 0.6)) * machine.body.parameters[f"{link}.mass"]
+        beyond = replace(machine, body=replace(machine.body, ends={link: place}))
+        return beyond.with_inertial({f"{link}.payload": size}), size
     if effect == "armature":
         own = f"{joint}.armature"
         factor = float(rng.uniform(1.5, 2.5))
@@ -92,6 +98,11 @@ def concealed(machine: Machine, joint: str, effect: str, effort: float, rng: np.
     }[effect]  # fmt: skip
     element = catalogue[effect]
     return machine.with_element(joint, element, values), next(iter(values.values()))
+
+
+def carried_at(machine: Machine, joint: str) -> list[str]:
+    """The links that may carry a payload and that the joint itself moves."""
+    return [link for link in machine.body.ends if machine.body.joint_of(link) == joint]
 
 
 def asked(body: str, machine: Machine, time, rng: np.random.Generator):
@@ -138,6 +149,8 @@ def run(number: int, seed: int, bodies: Sequence[str]) -> Case:
     joint = str(rng.choice(machine.joints))
     there = {family(term.element.name) for term in machine.paths[joint].terms}
     lacking = [name for name in EFFECTS if family(name) not in there]  # what a path has, a fit takes in
+    if not carried_at(machine, joint):
+        lacking.remove("payload")
     effect = "none" if rng.uniform() < NULLS else str(rng.choice(lacking))
     plain = recorded(machine, given, time, np.random.default_rng(0))
     channel = plain.joints[joint].effort

@@ -44,7 +44,7 @@ class Body(ABC):
     @property
     @abstractmethod
     def parameters(self) -> dict[str, float]:
-        """Inertial parameters by "link.mass" [kg] and "joint.armature" [kg or kg*m^2]."""
+        """Inertial parameters by "link.mass" [kg], "link.payload" [kg] of links at ends, and "joint.armature" [kg or kg*m^2]."""
 
     @abstractmethod
     def with_parameters(self, values: Mapping[str, float]) -> "Body":

@@ -10,7 +10,8 @@
 
 A joint's path is a `Model` whose inertia is the body's: the one that a force along the joint meets at the reference pose. Damping
 and dry friction that the file gives a joint become the elements of that name, where the path has none. `free:` under `body:`
-names inertial parameters that are estimated: `free: {shank.mass: {prior: {mean: 0.4, std: 0.04}}, knee.armature: {}}`.
+names inertial parameters that are estimated: `free: {shank.mass: {prior: {mean: 0.4, std: 0.04}}, shank.payload: {}, knee.armature: {}}`.
+A payload sits at the end of its link, for which `ends: {shank: [0, 0, -0.2]}` may give another place [m] in the link's frame.
 """
 
 import os
@@ -20,16 +21,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import yaml
 from pydantic import ConfigDict, StrictBool, TypeAdapter
 from pydantic import Field as Limits
 
-from rhythmid.body.body import BODY
+from rhythmid.body.body import BODY, Array
+from rhythmid.body.inertial_parameter import PAYLOAD, described, split
 from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.body.robot_file import FIXED, FREE
 from rhythmid.document import Node, parse, read
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
-from rhythmid.elements.element import SLOTS, Element, Parameter
+from rhythmid.elements.element import SLOTS, Element
 from rhythmid.errors import InputError
 from rhythmid.model import INERTIA, Model
 from rhythmid.output import write_text
@@ -52,7 +55,7 @@ class Machine:
     ----------
     body : with the parameters that `inertial` says.
     paths : by joint, in the order of the file; the inertia of each is borrowed from the body and fixed.
-    inertial : inertial parameters that the file mentions, by "link.mass" or "joint.armature".
+    inertial : inertial parameters that the file mentions, by "link.mass", "link.payload" or "joint.armature".
     kind : "mjcf" or "urdf", what the body's file is.
     """
 
@@ -83,7 +86,7 @@ class Machine:
 
     @cached_property
     def parameters(self) -> dict[str, Value]:
-        """All parameters: "joint.element.parameter", and "body.link.mass" and "body.joint.armature" of those that the file
+        """All parameters: "joint.element.parameter", and "body.link.mass", "body.link.payload" and "body.joint.armature" of those that the file
         mentions."""
         found = {f"{BODY}.{name}": value for name, value in self.inertial.items()}
         for joint, model in self.paths.items():
@@ -135,16 +138,26 @@ class Machine:
         return self.with_path(joint, self.paths[joint].with_element(element, values, fixed))
 
     def with_inertial(self, values: Mapping[str, float]) -> "Machine":
-        """A copy with inertial parameters "link.mass" or "joint.armature", which the file need not mention, of these values."""
+        """A copy with inertial parameters "link.mass", "link.payload" or "joint.armature", which the file need not mention, of these values."""
         known = {name: self._inertial(name, value) for name, value in values.items()}
         mentioned = replace(self, inertial={**self.inertial, **known})
         return mentioned.with_values({f"{BODY}.{name}": value for name, value in values.items()})
 
+    def with_payload(self, link: str, mass: float, place: Array) -> "Machine":
+        """A copy whose link carries a point mass [kg] at a place (3,) [m] of its frame. Raises InputError for a link within a chain."""
+        return replace(self, body=self.body.with_ends({link: place})).with_inertial(
+            {f"{link}.{PAYLOAD}": mass}
+        )
+
     def _inertial(self, name: str, value: float) -> Value:
-        parameter = _inertial_parameter(name)
-        units = _units(self.body, name.rpartition(".")[0])
+        parameter = described(name)
+        units = _units(self.body, split(name)[0])
         fixed = self.inertial[name].fixed if name in self.inertial else True
         return Value(value, units.of(parameter.unit), fixed, parameter.bounds)
+
+    def _loaded(self) -> list[str]:
+        """The links whose payload the file mentions."""
+        return [owner for owner, kind in map(split, self.inertial) if kind == PAYLOAD]
 
     def to_yaml(self, beside: Path | None = None) -> str:
         """The machine as YAML text that `load` reads back from a file in the folder `beside`."""
@@ -153,9 +166,11 @@ class Machine:
         body |= {"step": self.body.step, "contacts": self.body.contacts}
         if self.body.hold:
             body["hold"] = dict(self.body.hold)
+        if ends := {link: self.body.ends[link].tolist() for link in self._loaded()}:
+            body["ends"] = ends
         if self.inertial:
             body["free"] = {
-                name: entry_of(value, _inertial_parameter(name)) | {"fixed": value.fixed}
+                name: entry_of(value, described(name)) | {"fixed": value.fixed}
                 for name, value in self.inertial.items()
             }
         content: dict[str, Any] = {"body": body, "joints": {}}
@@ -182,14 +197,8 @@ def _with_inertia(model: Model, inertia: float) -> Model:
     return replace(model, mass=replace(model.mass, value=inertia))
 
 
-def _inertial_parameter(name: str) -> Parameter:
-    kind = name.rpartition(".")[2]
-    said = {"mass": "mass of the link", "armature": "inertia of the rotor, seen at the joint"}
-    return Parameter(kind, "kg", said[kind], bounds=(0.0, float("inf")))
-
-
 def _units(body: MujocoBody, owner: str) -> Units:
-    """Units of what belongs to a joint, or of a link's mass."""
+    """Units of what belongs to a joint, or to a link."""
     return ROTATIONAL if owner in body.joints and body.joints[owner].rotational else TRANSLATIONAL
 
 
@@ -229,6 +238,7 @@ class _Body:
     contacts: StrictBool = True
     hold: list[str] | dict[str, Number] | None = None
     free: dict[str, Any] | None = None
+    ends: dict[str, tuple[Number, Number, Number]] | None = None
 
 
 _BODY: TypeAdapter[_Body] = TypeAdapter(_Body)
@@ -242,7 +252,8 @@ def _body(node: Node, folder: Path) -> tuple[MujocoBody, str]:
     kind, name = next(iter(named.items()))
     try:
         hold = given.hold if isinstance(given.hold, dict) else dict.fromkeys(given.hold or (), 0.0)
-        return MujocoBody.load(folder / name, given.base, given.step, given.contacts, hold), kind
+        body = MujocoBody.load(folder / name, given.base, given.step, given.contacts, hold)
+        return body.with_ends({link: np.array(place) for link, place in (given.ends or {}).items()}), kind
     except InputError as error:
         raise InputError(f"{node.at(kind).place}: {error}") from None
 
@@ -254,9 +265,7 @@ def _free(node: Node, body: MujocoBody) -> dict[str, Value]:
             entry.fail(f"{body.path.name} has no such parameter; it has {', '.join(known)}")
         said = {} if entry.value is None else entry.mapping()
         value = {"value": Node(known[name], entry.place, entry.path), **said}
-        made = value_of(
-            replace(entry, value=value), _inertial_parameter(name), _units(body, name.rpartition(".")[0])
-        )
+        made = value_of(replace(entry, value=value), described(name), _units(body, split(name)[0]))
         found[name] = made
     return found
 

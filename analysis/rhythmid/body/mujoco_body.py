@@ -14,10 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.body.body import Array, Body, Joint, Passive
+from rhythmid.body.inertial_parameter import ARMATURE, MASS, PAYLOAD, split
+from rhythmid.body.link_inertia import Principal, end_links, point_mass
 from rhythmid.body.robot_file import FIXED, FREE, LEAST_MASS, mujoco, read_robot, refused, warnings_told
 from rhythmid.errors import InputError
 
 HEAVIEST = 1e6  # [kg] a link with a larger mass is a mistake
+AS_THE_LINK = np.array([1.0, 0.0, 0.0, 0.0])  # axes that are turned as the link's frame is
 WEIGHTLESS = 1e-10  # [kg] links that weigh less together have no mass but `LEAST_MASS` each
 
 
@@ -33,6 +36,9 @@ class MujocoBody(Body):
     contacts: bool = True
     passive: Mapping[str, Passive] = field(default_factory=dict)
     given: Mapping[str, float] = field(default_factory=dict)
+    ends: Mapping[str, Array] = field(
+        default_factory=dict
+    )  # of links that may carry a payload, its place (3,) in their frames
     notes: tuple[str, ...] = ()  # in words, what of the file was left out or changed
     hold: Mapping[str, float] = field(default_factory=dict)  # positions of the file's joints that are held
 
@@ -75,7 +81,7 @@ class MujocoBody(Body):
         off = mj.mjtDisableBit.mjDSBL_ACTUATION | mj.mjtDisableBit.mjDSBL_AUTORESET
         off = off if contacts else off | mj.mjtDisableBit.mjDSBL_CONTACT
         model.opt.disableflags |= int(off)
-        return cls(
+        made = cls(
             path,
             model,
             joints,
@@ -86,6 +92,7 @@ class MujocoBody(Body):
             notes=(*robot.notes, *told),
             hold=hold or {},
         )
+        return replace(made, ends=end_links(model, made.links))
 
     def with_losses(self, joints: Iterable[str]) -> "MujocoBody":
         """A copy in which these joints, which have no path, lose again what the file says: a rail on which the base slides."""
@@ -127,30 +134,61 @@ class MujocoBody(Body):
 
     @property
     def parameters(self) -> dict[str, float]:
-        masses = {f"{name}.mass": float(self.model.body_mass[i]) for name, i in self.links.items()}
+        masses = {f"{name}.{MASS}": self._own(name).mass for name in self.links}
+        payloads = {f"{name}.{PAYLOAD}": self._payload(name) for name in self.ends}
         armatures = {
-            f"{name}.armature": float(self.model.dof_armature[one.velocity])
+            f"{name}.{ARMATURE}": float(self.model.dof_armature[one.velocity])
             for name, one in self.joints.items()
         }
-        return masses | armatures
+        return masses | payloads | armatures
 
     def with_parameters(self, values: Mapping[str, float]) -> "MujocoBody":
         mj, model = mujoco(), copy.copy(self.model)
         known = self.parameters
+        changed = {}
         for name, value in values.items():
             if name not in known:
                 raise InputError(f"{self.path}: has no parameter {name!r}; it has {', '.join(known)}")
-            owner, _, kind = name.rpartition(".")
-            if kind == "armature":
+            owner, kind = split(name)
+            if kind == ARMATURE:
                 model.dof_armature[self.joints[owner].velocity] = value
-            elif not 0.0 < value < HEAVIEST:
+            elif kind == MASS and not 0.0 < value < HEAVIEST:
                 raise InputError(f"the mass of link {owner!r} must be greater than 0, not {value:g}")
+            elif not 0.0 <= value < HEAVIEST:
+                raise InputError(f"the payload of link {owner!r} must be 0 or greater, not {value:g}")
             else:
-                share = value / known[name]
-                model.body_mass[self.links[owner]] *= share
-                model.body_inertia[self.links[owner]] *= share
+                changed[owner] = self._own(owner), self._payload(owner)
+        given = {**self.given, **values}
+        for link, (own, payload) in changed.items():
+            share = values.get(f"{link}.{MASS}", own.mass) / own.mass
+            own = replace(own, mass=own.mass * share, moments=own.moments * share)
+            payload = values.get(f"{link}.{PAYLOAD}", payload)
+            if payload:
+                own = Principal.from_ten(own.ten + payload * point_mass(self.ends[link]))
+            own.put_into(model, self.links[link])
         mj.mj_setConst(model, mj.MjData(model))
-        return replace(self, model=model, given={**self.given, **values})
+        return replace(self, model=model, given=given)
+
+    def with_ends(self, places: Mapping[str, Array]) -> "MujocoBody":
+        """A copy in which payloads of links sit at these places (3,) of their frames. Raises InputError for a link that carries none."""
+        for link in places:
+            if link not in self.ends:
+                raise InputError(
+                    f"{self.path}: {link!r} is not the last link of a chain; those are {', '.join(self.ends)}"
+                )
+        loads = {f"{link}.{PAYLOAD}": self._payload(link) for link in places}
+        bare = self.with_parameters(dict.fromkeys(loads, 0.0))
+        return replace(bare, ends={**self.ends, **places}).with_parameters(loads)
+
+    def _payload(self, link: str) -> float:
+        return self.given.get(f"{link}.{PAYLOAD}", 0.0)
+
+    def _own(self, link: str) -> Principal:
+        """The inertia of a link without its payload."""
+        whole = Principal.of(self.model, self.links[link])
+        if payload := self._payload(link):
+            return Principal.from_ten(whole.ten - payload * point_mass(self.ends[link]))
+        return whole
 
     def inverse(self, position: Array, velocity: Array, acceleration: Array) -> Array:
         model, data = self.worker()
@@ -158,33 +196,27 @@ class MujocoBody(Body):
 
     def columns(self, names: list[str], position: Array, velocity: Array, acceleration: Array) -> Array:
         made = np.zeros((len(position), self.model.nv, len(names)))
+        motion = position, velocity, acceleration
         for place, name in enumerate(names):
-            owner, _, kind = name.rpartition(".")
-            if kind == "armature":
+            owner, kind = split(name)
+            if kind == ARMATURE:
                 dof = self.joints[owner].velocity
                 made[:, dof, place] = acceleration[:, dof]
-                continue
-            made[:, :, place] = self._alone(self.links[owner], position, velocity, acceleration)
-            made[:, :, place] /= self.parameters[name]
+            elif kind == PAYLOAD:
+                unit = Principal(1.0, np.zeros(3), self.ends[owner], AS_THE_LINK)
+                made[:, :, place] = self._of_one(self.links[owner], unit, motion)
+            else:
+                own = self._own(owner)
+                made[:, :, place] = self._of_one(self.links[owner], own, motion) / own.mass
         return made
 
-    def _alone(self, link: int, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """Forces (n, nv) for the inertia and weight of one link alone."""
-        model = self.model
-        place = model.body_ipos[link], model.body_iquat[link]
-        inertia = float(model.body_mass[link]), model.body_inertia[link]
-        return self._of_one(link, *inertia, *place, (position, velocity, acceleration))
-
-    def _of_one(
-        self, link: int, mass: float, inertia: Any, centre: Any, turn: Any, motion: tuple[Array, Array, Array]
-    ) -> Array:
-        """Forces (n, nv) for one link of this mass, principal moments of inertia, centre and axes, the others without any."""
+    def _of_one(self, link: int, inertia: Principal, motion: tuple[Array, Array, Array]) -> Array:
+        """Forces (n, nv) for one link of this inertia, the others without any."""
         model, data = self.worker()
         for one in (model.body_mass, model.body_inertia, model.jnt_stiffness, model.dof_damping):
             one[:] = 0.0
         model.dof_armature[:] = 1.0  # MuJoCo factors the inertia matrix in any case
-        model.body_mass[link], model.body_inertia[link] = mass, inertia
-        model.body_ipos[link], model.body_iquat[link] = centre, turn
+        inertia.put_into(model, link)
         return self._along(model, data, *motion) - motion[2]
 
     def inertial_columns(self, link: str, position: Array, velocity: Array, acceleration: Array) -> Array:
@@ -193,36 +225,28 @@ class MujocoBody(Body):
         number = self.links[link]
         motion = position, velocity, acceleration
 
-        def made(mass: float, centre: Any, inertia: Any, turn: Any = (1.0, 0.0, 0.0, 0.0)) -> Array:
-            return self._of_one(number, mass, inertia, centre, turn, motion)
+        def made(mass: float, centre: Array, moments: Array, turn: Array = AS_THE_LINK) -> Array:
+            return self._of_one(number, Principal(mass, moments, centre, turn), motion)
 
-        origin = (0.0, 0.0, 0.0)
+        origin = np.zeros(3)
         unit = np.eye(3)
         weight = made(1.0, origin, origin)
-        main = [made(0.0, origin, tuple(unit[axis])) for axis in range(3)]
+        main = [made(0.0, origin, unit[axis]) for axis in range(3)]
         first = []
         for axis in range(3):
             others = [main[other] for other in range(3) if other != axis]
-            first.append(made(1.0, tuple(unit[axis]), origin) - weight - others[0] - others[1])
+            first.append(made(1.0, unit[axis], origin) - weight - others[0] - others[1])
         mixed = []
         eighth = np.pi / 8.0  # half of a turn by 45 degrees, as in a quaternion
         for (one, other), axis, sign in (((0, 1), 2, 1.0), ((0, 2), 1, -1.0), ((1, 2), 0, 1.0)):
             turn = np.concatenate([[np.cos(eighth)], sign * np.sin(eighth) * unit[axis]])
-            turned = made(0.0, origin, tuple(unit[one]), tuple(turn))
+            turned = made(0.0, origin, unit[one], turn)
             mixed.append(2.0 * turned - main[one] - main[other])
         return np.stack([weight, *first, *main, *mixed], axis=2)
 
     def inertial(self, link: str) -> Array:
         """The ten parameters of a link to which `inertial_columns` belong."""
-        from scipy.spatial.transform import Rotation
-
-        number = self.links[link]
-        mass, centre = float(self.model.body_mass[number]), self.model.body_ipos[number]
-        turn = Rotation.from_quat(np.roll(self.model.body_iquat[number], -1)).as_matrix()
-        about = turn @ np.diag(self.model.body_inertia[number]) @ turn.T
-        about = about + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-        sides = about[[0, 0, 1], [1, 2, 2]]
-        return np.concatenate([[mass], mass * centre, np.diag(about), sides])
+        return Principal.of(self.model, self.links[link]).ten
 
     def _along(self, model: Any, data: Any, position: Array, velocity: Array, acceleration: Array) -> Array:
         from rhythmid.body.libmujoco import inverse_along

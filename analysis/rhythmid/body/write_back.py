@@ -7,10 +7,11 @@ MJCF holds the paths themselves, too: `rhythmid.mujoco.apply` makes them act in 
 
 import os
 import xml.etree.ElementTree as tree
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from rhythmid.body.embedded import NAME, text_of
+from rhythmid.body.inertial_parameter import MASS, PAYLOAD
 from rhythmid.body.live_source import generate_live, numbers_of, rows_of
 from rhythmid.body.machine import Machine
 from rhythmid.body.mujoco_body import MujocoBody
@@ -22,6 +23,7 @@ from rhythmid.export.joint import Joint
 from rhythmid.output import write_text
 
 MJCF, URDF = ".xml", ".urdf"
+SMALL = 1e-3  # [m] radius of gyration of a payload in a URDF, which has no inertia of zero
 LOSSES = ("viscous_damper", "coulomb_friction")
 KEPT = (
     "name",
@@ -194,6 +196,20 @@ def _scale(link: tree.Element, share: float) -> None:
             inertia.set(key, repr(share * float(value)))
 
 
+def _attach(root: tree.Element, link: str, mass: float, place: Sequence[float]) -> None:
+    """Fix a ball of this mass to a link of a URDF, at a place of its frame."""
+    own = f"{link}_{PAYLOAD}"
+    ball = tree.SubElement(tree.SubElement(root, "link", name=own), "inertial")
+    tree.SubElement(ball, "mass", value=repr(mass))
+    inertia = repr(mass * SMALL**2)
+    sides = {"ixx": inertia, "iyy": inertia, "izz": inertia, "ixy": "0", "ixz": "0", "iyz": "0"}
+    tree.SubElement(ball, "inertia", sides)
+    joint = tree.SubElement(root, "joint", name=f"{own}_joint", type="fixed")
+    tree.SubElement(joint, "parent", link=link)
+    tree.SubElement(joint, "child", link=own)
+    tree.SubElement(joint, "origin", xyz=" ".join(repr(float(one)) for one in place))
+
+
 def urdf_of(machine: Machine) -> str:
     """The body's URDF with the machine's values. Raises InputError where the body's file is no URDF."""
     if machine.kind != "urdf":
@@ -206,9 +222,12 @@ def urdf_of(machine: Machine) -> str:
     given = MujocoBody.load(body.path, contacts=False, hold=body.hold).parameters
     fixed = _fixed_to(document.getroot(), body.hold)
     for link in document.iter("link"):
-        name = f"{_carrier(str(link.get('name')), fixed, machine.body.links)}.mass"
+        name = f"{_carrier(str(link.get('name')), fixed, machine.body.links)}.{MASS}"
         if name in known:
             _scale(link, known[name] / given[name])
+    for link, place in body.ends.items():
+        if payload := known[f"{link}.{PAYLOAD}"]:
+            _attach(document.getroot(), link, payload, place)
     for joint in document.iter("joint"):
         if (name := str(joint.get("name"))) not in machine.paths:
             continue

@@ -79,10 +79,13 @@ def not_tried(catalogue: Catalogue, model: Model, sizes: Scales) -> dict[str, st
 
 
 def fixed_values(balance: Balance, model: Model) -> list[str]:
-    """Fixed values of the model that the effort could tell of, but for choices of form (an exponent, a side) and for zeros,
-    which the file need not have meant."""
+    """Fixed values of the model that the effort could tell of, but for choices of form (an exponent, a side) and for zeros of
+    elements, which the file need not have meant; that a link carries no payload is meant."""
+    links = balance.motions[0].links
     freed = {
-        n for n, value in model.parameters.items() if value.fixed and value.value != 0.0 and n != INERTIA
+        n
+        for n, value in model.parameters.items()
+        if value.fixed and (value.value != 0.0 or n in links) and n != INERTIA
     }
     forms = {f"{t.label}.{p.name}" for t in model.terms for p in t.element.parameters if p.fixed}
     open_model = with_freed(model, freed - forms)

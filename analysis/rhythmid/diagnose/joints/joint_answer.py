@@ -12,7 +12,7 @@ from rhythmid.diagnose.hypothesis import Verdict
 
 @dataclass(frozen=True)
 class JointEffect:
-    """An effect that the nominal model lacks at a joint; of a link's mass, `link` says which, and the joint is the one that moves it.
+    """An effect that the nominal model lacks at a joint; of a link's mass or payload, `link` says which, and the joint is the one that moves it.
 
     `share` is that of the joint's mismatch. `heldout_gain` is by how much the error at the joint falls on data that no fit has seen,
     as a share of the effort.
@@ -27,6 +27,12 @@ class JointEffect:
     parameters: dict[str, Estimate]
     heldout_gain: float
     link: str | None = None
+
+    @property
+    def of_link(self) -> str:
+        """What is wrong with a link, in words; nothing where the effect acts at the joint."""
+        kind = "mass" if self.element == "link_mass" else self.element
+        return f"{kind} of {self.link}" if self.link else ""
 
 
 @dataclass(frozen=True)

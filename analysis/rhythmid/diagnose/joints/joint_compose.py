@@ -8,6 +8,7 @@ from rhythmid.diagnose.answer.result import Diagnosis, Estimate
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, name_of
+from rhythmid.diagnose.joints.wrong_link import WrongLink
 from rhythmid.elements.places import SENTENCES
 from rhythmid.identify.inverse_dynamics.estimate import size_of
 from rhythmid.model import INERTIA
@@ -17,6 +18,7 @@ from rhythmid.simulation.transport import INPUT_DELAY
 EQUATIONS = {  # of what is no element: its slot and what it says
     "armature": ("body", "M_jj → M_jj + ΔI"),
     "link_mass": ("body", "m → m′, shape kept"),
+    "payload": ("body", "point mass m at the end of the link"),
     "actuator_delay": ("actuator", "f(t) → f(t − τ)"),
 }
 IN_CONTACT = (
@@ -30,18 +32,18 @@ def compose_machine(
     found: Mapping[str, JointResult],
     answers: Mapping[str, Diagnosis],
     stated: Mapping[str, Sequence[str]],
-    links: Mapping[str, JointResult],
+    links: Mapping[str, WrongLink],
     refused: Mapping[str, str],
     notes: Sequence[str] = (),
 ) -> MachineDiagnosis:
-    """The diagnosis; `links` are, by their masses that were put right, what showed these, `stated` the labels by which the answer at each joint stands."""
+    """The diagnosis; `links` are those whose masses or payloads were put right, `stated` the labels by which the answer at each joint stands."""
     missing = [
         _effect(found[joint], answers[joint], label)
         for joint, labels in stated.items()
         for label in labels
         if label.removeprefix(f"{BODY}.") not in links
     ]
-    missing += [_link(machine, link, one) for link, one in links.items()]
+    missing += [_link(machine, one) for one in links.values()]
     missing.sort(key=lambda one: -one.heldout_gain)
     named = {one.joint for one in missing}
     unknown = tuple(j for j, one in answers.items() if one.verdict == "unknown_physics")
@@ -107,7 +109,9 @@ def _effect(one: JointResult, answer: Diagnosis, label: str) -> JointEffect:
 
 def _own(element: str) -> str:
     """Name of the one parameter of what is no element."""
-    return {"armature": "inertia_error", "link_mass": "mass", "actuator_delay": "delay"}[element]
+    return {"armature": "inertia_error", "link_mass": "mass", "payload": "mass", "actuator_delay": "delay"}[
+        element
+    ]
 
 
 def _value(one: JointResult, answer: Diagnosis, label: str) -> Estimate:
@@ -129,20 +133,16 @@ def _gain(one: JointResult) -> float:
     return (before - after) / size
 
 
-def _link(machine: Machine, link: str, one: JointResult) -> JointEffect:
-    """A link's mass, with the evidence of the joint that showed it best."""
-    name, label, decision = link.removesuffix(".mass"), f"{BODY}.{link}", one.result.decision
-    slot, equation = EQUATIONS["link_mass"]
+def _link(machine: Machine, wrong: WrongLink) -> JointEffect:
+    """A link's mass or payload, with the evidence of the joint that showed it best."""
+    one, label = wrong.shown, f"{BODY}.{wrong.parameter}"
+    decision = one.result.decision
+    element, name = name_of(one.joint, label)
+    slot, equation = EQUATIONS[element]
     return JointEffect(
-        machine.body.joint_of(name), "link_mass", slot, equation, decision.shares[label], decision.probability[label],
-        {"mass": estimate_of(one, label)}, _gain(one), name,
+        machine.body.joint_of(name), element, slot, equation, decision.shares[label], decision.probability[label],
+        dict(wrong.values), _gain(one), name,
     )  # fmt: skip
-
-
-def estimate_of(one: JointResult, name: str) -> Estimate:
-    """A parameter of a joint's path as it was fitted."""
-    value = one.result.chosen.model.parameters[name]
-    return Estimate(value.value, one.result.chosen.std().get(name, 0.0), value.unit)
 
 
 def _summary(
@@ -153,7 +153,7 @@ def _summary(
 ) -> str:
     said = []
     for one in missing:
-        what = f"the mass of {one.link}" if one.link else in_words(one.element)
+        what = f"the {one.of_link}" if one.link else in_words(one.element)
         said.append(f"{one.joint}: {what}")
     words = f"The model is wrong at {'; '.join(said)}." if said else ""
     if unknown:

@@ -1,7 +1,7 @@
 """Diagnose a machine of several joints: at joint J, in slot S, element E.
 
 Every joint is searched as the one of a machine of one axis, beside what the rest of the body asks of it, and chance has the candidates of
-all joints. A link whose mass is wrong shows at every joint that carries it: where one is found, it is put right, and the joints that feel
+all joints. A link whose mass is wrong, or that carries a payload, shows at every joint that carries it: where one is found, it is put right, and the joints that feel
 it are searched again.
 """
 
@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rhythmid.body.body import BODY
+from rhythmid.body.inertial_parameter import MASS, PAYLOAD, split
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
@@ -18,7 +19,8 @@ from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import STATED
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
-from rhythmid.diagnose.joints.joint_compose import compose_machine, estimate_of
+from rhythmid.diagnose.joints.joint_compose import compose_machine
+from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.joints.held_reference import balances_of, likely_readings
@@ -36,7 +38,7 @@ from rhythmid.simulation.transport import INPUT_DELAY
 if TYPE_CHECKING:
     from rich.console import Console
 
-MOST_LINKS = 2  # links whose masses are put right, at most
+MOST_LINKS = 2  # masses and payloads of links that are put right, at most
 LIGHTEST = 0.1  # of the mass that the file gives a link, below which another effect has swallowed it
 MATTERS = 0.02  # of a mass or an inertia, below which it is as right as a balance tells
 
@@ -119,7 +121,7 @@ class _Explained:
     machine: Machine
     found: Mapping[str, JointResult]
     refused: Mapping[str, str]
-    links: Mapping[str, JointResult]
+    links: Mapping[str, WrongLink]
     leads: Mapping[str, float]
 
     @property
@@ -144,7 +146,7 @@ def _explained(
     catalogue: Catalogue, tell: Tell, budget: Budget,
 ) -> _Explained:  # fmt: skip
     """Search every joint, put a link's mass right where one is found, and search again what feels it."""
-    links: dict[str, JointResult] = {}
+    links: dict[str, WrongLink] = {}
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
     found, refused = _searched(balances, unseen, machine.joints, catalogue, tell, budget)
     for _ in range(MOST_LINKS):
@@ -152,8 +154,8 @@ def _explained(
         if best is None or budget.spent:
             break
         link, result = best
-        links[link] = result
-        machine = machine.with_inertial({link: estimate_of(result, f"{BODY}.{link}").value})
+        links[link] = wrong_link(balances, records, found, link, result)
+        machine = links[link].put_right(machine)
         balances = JointBalances.of(machine, records, balances)
         unseen = JointBalances.of(machine, holdout, balances) if holdout else None
         again = [joint for joint in machine.joints if link in balances.links(joint)]
@@ -218,13 +220,16 @@ def _held_by_alike(one: JointResult) -> float:
 
 
 def _differs(one: JointResult, label: str) -> bool:
-    """Whether a value of the body has come out other than it was."""
+    """Whether a value of the body has come out other than it was; a payload is measured by the mass of its link."""
     if label == INPUT_DELAY or label not in one.case.nominal.parameters:
         return True
-    before = one.case.nominal.value(label)
-    if one.result.chosen.model.value(label) < LIGHTEST * before:
+    before, after = one.case.nominal.value(label), one.result.chosen.model.value(label)
+    if after < LIGHTEST * before:
         return False  # what takes a link's mass away is something else
-    return abs(one.result.chosen.model.value(label) - before) > MATTERS * abs(before)
+    owner, kind = split(label)
+    known = one.case.nominal.parameters
+    whole = known[f"{owner}.{MASS}"].value if kind == PAYLOAD and f"{owner}.{MASS}" in known else before
+    return abs(after - before) > MATTERS * abs(whole)
 
 
 def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, JointResult] | None:

@@ -25,7 +25,7 @@ def _robot(answer: MachineAnswer, body: MujocoBody) -> list[DrawnJoint]:
     found = answer.diagnosis
     faults: dict[str, str] = {}
     for one in found.missing:
-        name = f"mass of {one.link}" if one.link else pretty_name(one.element)
+        name = one.of_link or pretty_name(one.element)
         faults[one.joint] = f"{faults[one.joint]}, {name}" if one.joint in faults else name
     unnamed = {**dict.fromkeys(found.undecided, "undecided"), **dict.fromkeys(found.unknown, "unknown")}
     parents = parents_of(body)

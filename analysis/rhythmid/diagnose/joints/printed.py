@@ -13,7 +13,7 @@ def show_diagnosis(found: MachineDiagnosis, console: Console) -> None:
     """Print a diagnosis: the verdict, what is missing at which joint, then a row for every joint."""
     console.print(f"[bold]{found.verdict.replace('_', ' ')}[/]: {escape(found.summary)}")
     for one in found.missing:
-        what = f"mass of {one.link}" if one.link else one.element
+        what = one.of_link or one.element
         console.print(
             f"[bold]{escape(one.joint)}: {escape(what)}[/]   {escape(one.equation)}   (probability {one.probability:.2f}, "
             f"{number(100.0 * one.share, 3)} % of the joint's mismatch)"

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rhythmid.body.body import BODY
+from rhythmid.body.inertial_parameter import MASS, PAYLOAD, described, split
 from rhythmid.body.machine import Machine
-from rhythmid.elements.element import Element, Parameter
+from rhythmid.elements.element import Element
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.bandwidth import (
     Bandwidth,
@@ -101,7 +102,9 @@ class JointBalances:
         stretches = joint_stretches(machine, records)
         cut, dominant = (alike.cut, alike.dominant) if alike else _cut(machine, stretches)
         bodies = [_body_motion(machine, one, cut) for one in stretches]
-        names = [f"{name}.mass" for name in machine.body.links]
+        names = [f"{link}.{MASS}" for link in machine.body.links] + [
+            f"{link}.{PAYLOAD}" for link in machine.body.ends
+        ]
         columns = [machine.body.columns(names, one.pose, one.rate, one.acceleration) for one in bodies]
         models: dict[str, Model] = {}
         motions: dict[str, list[Motion]] = {}
@@ -143,7 +146,7 @@ class JointBalances:
         return replace(self, motions=motions, leads={**self.leads, **leads})
 
     def links(self, joint: str) -> tuple[str, ...]:
-        """The links whose masses a joint feels, as "link.mass"."""
+        """The links whose masses a joint feels, as "link.mass", and those whose payloads it would feel, as "link.payload"."""
         return tuple(name.removeprefix(f"{BODY}.") for name in self.motions[joint][0].links)
 
     @property
@@ -187,7 +190,7 @@ def controller_effort(model: Model, joint: str, motion: Motion, body: BodyMotion
 
 
 def joint_model(machine: Machine, joint: str, taken: Taken, links: Sequence[str]) -> Model:
-    """The path of a joint as a model of one axis, with the masses of links as parameters of a term `body`; without its actuator
+    """The path of a joint as a model of one axis, with masses and payloads of links as parameters of a term `body`; without its actuator
     where the effort was recorded behind that."""
     path = machine.paths[joint]
     terms = [t for t in path.terms if not (taken == "after_actuator" and t.element.slot == "actuator")]
@@ -195,7 +198,7 @@ def joint_model(machine: Machine, joint: str, taken: Taken, links: Sequence[str]
     for link in links:
         said = machine.inertial.get(link)
         values[link] = said or Value(known[link], "kg", True, (0.0, np.inf))
-    parameters = tuple(Parameter(link, "kg", f"mass of {link}", (0.0, np.inf), None) for link in links)
+    parameters = tuple(replace(described(link), name=link) for link in links)
     element = Element(
         name=BODY, slot="force", title="Body", equation="coupling", parameters=parameters, reference="", kernel=nothing,
         acts="drive", candidate=False,
@@ -236,11 +239,13 @@ def _body_motion(machine: Machine, stretch: JointStretch, cut: float) -> BodyMot
 def _links(
     machine: Machine, joint: str, names: Sequence[str], columns: Sequence[Array], bodies: Sequence[BodyMotion]
 ) -> tuple[str, ...]:
-    """The links whose masses a joint feels."""
+    """The masses of links that a joint feels, and the payloads that it would feel if they were as heavy as their links."""
     own = machine.body.joints[joint].velocity
     known = machine.body.parameters
     whole = np.concatenate([one.force[:, own] for one in bodies])
-    made = np.concatenate([one[:, own] for one in columns]) * [known[name] for name in names]
+    made = np.concatenate([one[:, own] for one in columns]) * [
+        known[f"{split(name)[0]}.{MASS}"] for name in names
+    ]
     felt = np.sqrt(np.mean(made**2, axis=0)) > FAINT * np.sqrt(np.mean(whole**2))
     return tuple(name for name, one in zip(names, felt, strict=True) if one)
 

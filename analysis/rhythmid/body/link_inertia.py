@@ -1,0 +1,111 @@
+"""The inertia of one link, in numbers that add up, and the place where a link ends.
+
+Ten numbers: the mass, the mass times the centre's place (3), and the inertia about the link's frame (xx, yy, zz, xy, xz, yz). Those of two
+bodies that are fixed to each other are the sum of both.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Principal:
+    """Inertia of a link as MuJoCo has it: mass, principal moments (3,), the centre's place (3,), and the axes as a quaternion (w, x, y, z)."""
+
+    mass: float
+    moments: Array
+    centre: Array
+    turn: Array
+
+    @classmethod
+    def of(cls, model: Any, link: int) -> "Principal":
+        """That of a link of a compiled model."""
+        return cls(
+            float(model.body_mass[link]),
+            model.body_inertia[link].copy(),
+            model.body_ipos[link].copy(),
+            model.body_iquat[link].copy(),
+        )
+
+    @classmethod
+    def from_ten(cls, ten: Array) -> "Principal":
+        """The one that has these ten numbers (10,); the mass is positive."""
+        mass, centre = float(ten[0]), ten[1:4] / ten[0]
+        xx, yy, zz, xy, xz, yz = ten[4:]
+        about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        moments, axes = np.linalg.eigh(about - _of_point(mass, centre))
+        axes[:, 2] *= np.sign(np.linalg.det(axes))  # a turn, not a reflection
+        return cls(mass, moments, centre, np.roll(Rotation.from_matrix(axes).as_quat(), 1))
+
+    @property
+    def ten(self) -> Array:
+        """The ten numbers (10,)."""
+        axes = Rotation.from_quat(np.roll(self.turn, -1)).as_matrix()
+        about = axes @ np.diag(self.moments) @ axes.T + _of_point(self.mass, self.centre)
+        return _joined(self.mass, self.centre, about)
+
+    def put_into(self, model: Any, link: int) -> None:
+        """Give a link of a compiled model this inertia."""
+        model.body_mass[link], model.body_inertia[link] = self.mass, self.moments
+        model.body_ipos[link], model.body_iquat[link] = self.centre, self.turn
+
+
+def point_mass(place: Array) -> Array:
+    """The ten numbers (10,) of 1 kg at a place (3,) of a link's frame."""
+    return _joined(1.0, place, _of_point(1.0, place))
+
+
+def _joined(mass: float, centre: Array, about: Array) -> Array:
+    return np.concatenate([[mass], mass * centre, np.diag(about), about[[0, 0, 1], [1, 2, 2]]])
+
+
+def _of_point(mass: float, place: Array) -> Array:
+    """Inertia (3, 3) about the frame of a mass at a place (3,)."""
+    return mass * (place @ place * np.eye(3) - np.outer(place, place))
+
+
+def end_links(model: Any, links: dict[str, int]) -> dict[str, Array]:
+    """The links at the ends of the chains, and the place (3,) in the frame of each at which it ends.
+
+    That is the farthest from its joint of what the file shows of the link and of what is fixed to it: frames, sites and the middles of the
+    faces of its shapes' boxes. Where the file shows nothing, it is twice as far as the centre of mass, as in a uniform rod.
+    """
+    import mujoco
+
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    group = model.body_weldid
+    carrying = {int(group[model.body_parentid[root]]) for root in set(group.tolist()) - {0}}
+    found: dict[str, Array] = {}
+    for name, link in links.items():
+        root = int(group[link])
+        if root in carrying or any(group[links[one]] == root for one in found):
+            continue
+        shown = _shown(model, data, root)
+        origin, axes = data.xpos[link], data.xmat[link].reshape(3, 3)
+        places = np.array([axes.T @ (one - origin) for one in shown]).reshape(-1, 3)
+        reach = np.linalg.norm(places, axis=1)
+        found[name] = (
+            places[int(np.argmax(reach))] if reach.max(initial=0.0) > 0.0 else 2.0 * model.body_ipos[link]
+        )
+    return found
+
+
+def _shown(model: Any, data: Any, root: int) -> list[Array]:
+    """Places of the world of what a file shows of the links that are fixed to `root`."""
+    group = model.body_weldid
+    own = [body for body in range(1, model.nbody) if group[body] == root]
+    shown = [data.xpos[body] for body in own if body != root]
+    shown += [data.site_xpos[site] for site in range(model.nsite) if group[model.site_bodyid[site]] == root]
+    for shape in (one for one in range(model.ngeom) if group[model.geom_bodyid[one]] == root):
+        axes = data.geom_xmat[shape].reshape(3, 3)
+        middle, half = model.geom_aabb[shape, :3], model.geom_aabb[shape, 3:]
+        faces = [middle + sign * half * np.eye(3)[axis] for axis in range(3) for sign in (-1.0, 1.0)]
+        shown += [data.geom_xpos[shape] + axes @ face for face in faces]
+    return shown

@@ -1,0 +1,115 @@
+"""Where a payload sits: its place in the frame of its link, and its mass, from the efforts of all joints that feel it.
+
+The search takes a payload to be a point mass at the end of its link. A gripper's or a foot's centre is near it and not at it, and what that
+leaves would be taken for a wrong mass or rotor. The force of a point mass is linear in its mass, its first moment and its inertia (M. Gautier,
+W. Khalil, Int. J. Robot. Res. 11 (1992) 362), so that mass and place follow from the columns of these.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from rhythmid.body.body import BODY
+from rhythmid.body.inertial_parameter import PAYLOAD
+from rhythmid.body.link_inertia import point_mass
+from rhythmid.diagnose.joints.joint_case import JointResult
+from rhythmid.identify.inverse_dynamics.estimate import fit_effort
+from rhythmid.identify.joints.joint_motion import JointBalances
+from rhythmid.identify.least_squares import orthonormal
+from rhythmid.identify.student import autocorrelation_time, scale_of, weights_of
+from rhythmid.model import Model
+from rhythmid.record.joint_record import JointRecord
+
+Array = NDArray[np.float64]
+BESIDE = 0.1  # [m] standard deviation of a payload's place about the end of its link: the size of a gripper or of a foot
+ROUNDS = 3  # of fits of the paths and of the payload in turn; the payload settles in two
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedPayload:
+    """Mass [kg] of a payload and its place (3,) [m] in the frame of its link, with standard deviations."""
+
+    mass: float
+    mass_std: float
+    place: Array
+    place_std: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """What one joint says: its residual (n,), the columns (n, 10) of the link's inertia, and those (n, p) of what else is fitted there."""
+
+    residual: Array
+    columns: Array
+    beside: Array
+    record: NDArray[np.int64]
+
+
+def placed_payload(
+    balances: JointBalances,
+    records: Sequence[JointRecord],
+    found: Mapping[str, JointResult],
+    link: str,
+    shown_at: str,
+) -> PlacedPayload:
+    """Mass and place of the payload of a link; `shown_at` is the joint whose search found it.
+
+    The path of that joint is the one that was chosen there, those of the others are the given ones; all are fitted again beside the payload.
+    """
+    machine, parameter = balances.machine, f"{link}.{PAYLOAD}"
+    end, chosen = machine.body.ends[link], found[shown_at].result.chosen.model
+    value = np.concatenate([[chosen.value(f"{BODY}.{parameter}")], end])
+    std = np.zeros(4)
+    for _ in range(ROUNDS):
+        now = JointBalances.of(machine.with_payload(link, float(value[0]), value[1:]), records, balances)
+        rows = []
+        for joint in (one for one in found if parameter in balances.links(one)):
+            model = chosen if joint == shown_at else now.models[joint]
+            held = model.with_parameters(
+                {f"{BODY}.{parameter}": now.models[joint].parameters[f"{BODY}.{parameter}"]}
+            )
+            rows.append(_rows(now, joint, held, found[joint].late, link))
+        value, std = _refined(rows, value, end)
+    return PlacedPayload(float(value[0]), float(std[0]), value[1:], std[1:])
+
+
+def _refined(rows: Sequence[_Rows], value: Array, end: Array) -> tuple[Array, Array]:
+    """Mass and place (4,) that fit better than these values do, and their standard deviations."""
+    weighted = [_weighted(one) for one in rows]
+    before = value[0] * point_mass(value[1:])
+
+    def error(at: Array) -> Array:
+        change = at[0] * point_mass(at[1:]) - before
+        return np.concatenate(
+            [*(left + columns @ change for left, columns in weighted), (at[1:] - end) / BESIDE]
+        )
+
+    low = np.array([0.0, *(3 * [-np.inf])])
+    solved = least_squares(error, value, bounds=(low, np.inf), x_scale="jac")
+    return solved.x, np.sqrt(np.diag(np.linalg.pinv(solved.jac.T @ solved.jac)))
+
+
+def _rows(balances: JointBalances, joint: str, model: Model, late: float, link: str) -> _Rows:
+    body = balances.machine.body
+    own = body.joints[joint].velocity
+    balance = balances.balance(joint, late)
+    fit = fit_effort(balance, model)
+    made = [body.inertial_columns(link, b.pose, b.rate, b.acceleration)[:, own] for b in balances.bodies]
+    columns = balance.rows(made, balance.shift(fit.model) + fit.alignment)
+    return _Rows(fit.residual, columns, fit.jacobian, balance.record)
+
+
+def _weighted(one: _Rows) -> tuple[Array, Array]:
+    """Residual and columns of a joint in units of its noise, without what the other parameters of the joint explain."""
+    scale = scale_of(one.residual)
+    lasts = autocorrelation_time(one.residual, one.record)
+    root = np.sqrt(weights_of(one.residual, scale) / lasts) / scale
+    basis = orthonormal(one.beside * root[:, None])
+
+    def without(signal: Array) -> Array:
+        return signal - basis @ (basis.T @ signal)
+
+    return without(root * one.residual), without(root[:, None] * one.columns)
