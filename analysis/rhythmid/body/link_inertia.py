@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rhythmid.body.robot_file import mujoco
+
 Array = NDArray[np.float64]
 
 
@@ -76,10 +78,10 @@ def end_links(model: Any, links: dict[str, int]) -> dict[str, Array]:
     That is the farthest from its joint of what the file shows of the link and of what is fixed to it: frames, sites and the middles of the
     faces of its shapes' boxes. Where the file shows nothing, it is twice as far as the centre of mass, as in a uniform rod.
     """
-    import mujoco
+    mj = mujoco()
 
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = mj.MjData(model)
+    mj.mj_kinematics(model, data)
     group = model.body_weldid
     carrying = {int(group[model.body_parentid[root]]) for root in set(group.tolist()) - {0}}
     found: dict[str, Array] = {}

@@ -227,7 +227,7 @@ def urdf_of(machine: Machine) -> str:
             _scale(link, known[name] / given[name])
     for link, place in body.ends.items():
         if payload := known[f"{link}.{PAYLOAD}"]:
-            _attach(document.getroot(), link, payload, place)
+            _attach(document.getroot(), link, payload, place.tolist())
     for joint in document.iter("joint"):
         if (name := str(joint.get("name"))) not in machine.paths:
             continue
