@@ -194,6 +194,12 @@ class Model:
         reduced.check_borrowed()
         return reduced
 
+    def pruned(self, label: str) -> "Model":
+        """A copy without the term called `label` and without those that need it."""
+        reduced = replace(self, terms=tuple(term for term in self.terms if term.label != label))
+        idle = next((term.label for term in reduced.terms if reduced.lacking(term) is not None), None)
+        return reduced if idle is None else reduced.pruned(idle)
+
     def term(self, name: str) -> Term | None:
         """The first term whose label is `name`, None where there is none."""
         return next((term for term in self.terms if term.label == name), None)

@@ -59,9 +59,8 @@ def alternatives(
     moved: list[Proposal] = []
     kin: list[Proposal] = []
     for label in chosen.added:
-        rest = tuple(name for name in chosen.added if name != label)
-        beside = _base(chosen, rest)
-        if rest:
+        beside = _base(chosen, tuple(name for name in chosen.added if name != label))
+        if beside.added:
             freed += _freed(beside)
         term = chosen.model.term(label)
         assert term is not None
@@ -95,10 +94,11 @@ def _reduced(chosen: Trial, weighed: Sequence[Trial]) -> Iterator[Proposal]:
         if len(trial.added) < 2 or trial.chi2 >= chosen.chi2:
             continue
         for label in trial.added:
-            rest = tuple(name for name in trial.added if name != label)
-            if tuple(sorted(rest)) not in known:
+            slim = trial.model.pruned(label)
+            rest = tuple(name for name in trial.added if slim.term(name) is not None)
+            if rest and tuple(sorted(rest)) not in known:
                 known.add(tuple(sorted(rest)))
-                yield Proposal(rest, trial.model.without(label), ({},))
+                yield Proposal(rest, slim, ({},))
 
 
 def _kin(base: Trial, term: Term, rounds: Sequence[Round], weighed: Sequence[Trial]) -> Iterator[Proposal]:
@@ -138,12 +138,12 @@ def _renamed(parameter: str, label: str, own: str) -> str:
 
 
 def _base(chosen: Trial, rest: tuple[str, ...]) -> Trial:
-    """The chosen trial with only these of its effects, as a place to start from."""
+    """The chosen trial with only these of its effects, and of them those that need no other one, as a place to start from."""
     model = chosen.model
     for label in chosen.added:
         if label not in rest:
-            model = model.without(label)
-    return replace(chosen, added=rest, model=model)
+            model = model.pruned(label)
+    return replace(chosen, added=tuple(label for label in rest if model.term(label) is not None), model=model)
 
 
 def _freed(base: Trial) -> Iterator[Proposal]:

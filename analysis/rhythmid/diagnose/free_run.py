@@ -45,6 +45,7 @@ from rhythmid.diagnose.shape import shape_of
 from rhythmid.diagnose.size_error import size_errors
 from rhythmid.diagnose.tick_interval import ticks_followed
 from rhythmid.diagnose.verdict import Decision, decide
+from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Scales
 from rhythmid.errors import InputError
@@ -170,12 +171,13 @@ def _step(found: Search) -> float:
 
 def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.float64]:
     """Mean product (p, p) of the errors of the fit's parameters that come from small effects which it lacks: of each element
-    that is not in the model the guess which the last round scored best."""
+    that the model could still lack the guess which the last round scored best."""
     fit = found.fit
     made = np.zeros((len(fit.names), len(fit.names)))
-    there = {term.element.name for term in fit.model.terms}
+    lacking = candidates(catalogue, fit.model.setting, scales(fit.run.series, fit.model)).tried
+    names = {element.name for element, _ in lacking}
     scored = distinct(found.rounds[-1].scores, len(catalogue)) if found.rounds else []
-    tried = [(one.element, dict(one.values)) for one, _ in scored if one.element.name not in there]
+    tried = [(one.element, dict(one.values)) for one, _ in scored if one.element.name in names]
     changes = changes_of(trajectories(fit), tried, case.pool)
     std = np.array([fit.std[name] for name in fit.names])
     known = np.isfinite(std) & (std > 0.0)

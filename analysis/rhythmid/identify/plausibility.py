@@ -6,9 +6,9 @@ what the record as it is declared leaves. Where a free inertia makes up for a sc
 all come out shifted, and go back to the given ones under the right change.
 
 Physics that the model lacks shifts values, too. At one amplitude and speed dry friction looks like more damping, and where the
-damping is all that the motion tells, like more of everything. So no change is believed before the record as it is declared has been
-tried with a dry friction and a constant force beside the model's own: they leave a wrong scale as it is, for they do not
-accelerate a mass.
+damping is all that the motion tells, like more of everything; below its resonance a mass on a spring moves against the sign that it has
+without the spring. So no change is believed before the record as it is declared has been tried with a dry friction, a constant force and
+a spring beside the model's own: they leave a wrong scale as it is, for they do not accelerate a mass.
 """
 
 import math
@@ -125,7 +125,7 @@ def _misfit(
     if not _convinces(best, declared):
         return None
     again = _searched_again(best, record, model, pool)
-    if again is not None:  # the search had only lost its way, or a friction is missing
+    if again is not None:  # the search had only lost its way, or physics is missing
         return _shift(record, again, model, tried, pool) if again.shift > SHIFTED else None
     alike = [one for one in trials if one.unexplained <= EQUAL * best.unexplained + SAME]
     return Mend(alike[0].change, _words(record, model, declared, alike), True)
@@ -149,8 +149,8 @@ def _searched_again(
         again = _tried(AS_DECLARED, record, model.with_values(within), pool, model, periods)
         if again is not None and again.unexplained < POOR_MOTION:
             return again
-    rubbing = _with_friction(record, model, pool)
-    return rubbing if rubbing is not None and rubbing.unexplained < POOR_MOTION else None
+    richer = _with_more(record, model, pool)
+    return richer if richer is not None and richer.unexplained < POOR_MOTION else None
 
 
 def _convinces(trial: Trial, declared: Trial) -> bool:
@@ -165,7 +165,7 @@ def _shift(
     pool: ThreadPoolExecutor | None,
 ) -> Mend | None:
     """The change that leads all values back, where they are shifted as declared and the error is none the larger for it, and no
-    friction does that."""
+    missing physics does that."""
     trials = [one for change in likely_changes(record, model) if (one := tried(change)) is not None]
     back = _back(trials, declared)
     if not back:  # no unit with a name, such as amperes
@@ -174,8 +174,8 @@ def _shift(
         back = [] if one is None else _back([one], declared)
     if not back:
         return None
-    rubbing = _with_friction(record, model, pool)
-    if rubbing is not None and _back([rubbing], declared):
+    richer = _with_more(record, model, pool)
+    if richer is not None and _back([richer], declared):
         return None
     best = min(one.shift for one in back)
     alike = [one for one in back if one.shift <= best + 0.1 * BACK]
@@ -188,27 +188,30 @@ def _back(trials: Sequence[Trial], declared: Trial) -> list[Trial]:
     return [one for one in trials if one.shift < BACK and one.unexplained <= most]
 
 
-def _with_friction(record: Record, model: Model, pool: ThreadPoolExecutor | None) -> Trial | None:
-    """The record as it is declared, by the model with a dry friction and a constant force besides; None where it has them already, or
-    the effort along the motion does not tell how large they are about."""
+def _with_more(record: Record, model: Model, pool: ThreadPoolExecutor | None) -> Trial | None:
+    """The record as it is declared, by the model with a dry friction, a constant force and a spring besides; None where it has them
+    already, or the effort along the motion does not tell how large they are about."""
     own = own_model(model, record)
     try:
         balance = Balance.of([record], own)
     except InputError:
         return None
-    catalogue, speed = load_catalogue(), balance.mechanical[:, 1]
+    position, speed = balance.mechanical[:, 0], balance.mechanical[:, 1]
     missing = balance.measured - balance.predicted(own)
-    friction, offset = np.linalg.lstsq(np.column_stack([np.sign(speed), np.ones(len(speed))]), missing)[0]
-    rubbing = own
-    if own.term("coulomb_friction") is None:
-        transition = TRANSITION * float(np.median(np.abs(speed)))
-        force = max(float(friction), 0.0)
-        rubbing = rubbing.with_element(
-            catalogue["coulomb_friction"], {"force": force, "transition": transition}
-        )
-    if own.term("constant_force") is None:
-        rubbing = rubbing.with_element(catalogue["constant_force"], {"force": float(offset)})
-    return None if rubbing is own else _tried(AS_DECLARED, record, rubbing, pool, model)
+    columns = np.column_stack([np.sign(speed), np.ones(len(speed)), position])
+    friction, offset, stiffness = np.linalg.lstsq(columns, missing)[0]
+    tried = {
+        "coulomb_friction": {"force": friction, "transition": TRANSITION * float(np.median(np.abs(speed)))},
+        "constant_force": {"force": offset},
+        "linear_spring": {"stiffness": stiffness, "rest_length": 0.0},
+    }
+    rich, catalogue = own, load_catalogue()
+    for name, values in tried.items():
+        if own.term(name) is None:
+            bounds = {one.name: one.bounds for one in catalogue[name].parameters}
+            inside = {key: float(np.clip(value, *bounds[key])) for key, value in values.items()}
+            rich = rich.with_element(catalogue[name], inside)
+    return None if rich is own else _tried(AS_DECLARED, record, rich, pool, model)
 
 
 def _common_factor(fit: Fit | None, given: Model) -> float | None:

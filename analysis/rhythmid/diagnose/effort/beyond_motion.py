@@ -37,7 +37,7 @@ def beyond_motion(balance: Balance, model: Model, label: str, plain: Linearised,
         term.element, {n: v.value for n, v in term.values.items()}, model
     ):
         return math.inf
-    effect = balance.predicted(model) - balance.predicted(model.without(label))
+    effect = balance.predicted(model) - balance.predicted(model.pruned(label))
     rest, beyond = (_beyond(effect, one.jacobian) for one in (plain, mapped))
     return beyond / rest if rest > 0.0 else math.inf
 

@@ -233,15 +233,16 @@ class _Search:
 
     def without(self, fitted: Fitted, label: str) -> Fitted:
         """The hypothesis less one of its additions, fitted again; one that was fitted before is taken as it is."""
-        rest = tuple(one for one in fitted.elements if one != label)
+        model = fitted.fit.model
+        if model.term(label) is not None:
+            model = model.pruned(label)
+        elif label in model.parameters:  # a freed value is fixed again
+            model = model.with_parameters({label: self.nominal.fit.model.parameters[label]})
+        gone = {term.label for term in fitted.fit.model.terms} - {term.label for term in model.terms}
+        rest = tuple(one for one in fitted.elements if one != label and one not in gone)
         known = next((f for f in self.found if set(f.elements) == set(rest)), None)
         if known is not None:
             return known
-        model = fitted.fit.model
-        if model.term(label) is not None:
-            model = model.without(label)
-        elif label in model.parameters:  # a freed value is fixed again
-            model = model.with_parameters({label: self.nominal.fit.model.parameters[label]})
         priors = {
             name: prior
             for name, prior in fitted.priors.items()
@@ -319,7 +320,7 @@ class _Search:
         """Share of the effort that an actuator's effect leaves to move the machine."""
         left, before = (
             float(np.linalg.norm(self.balance.predicted(model, 0.0)))
-            for model in (made.fit.model.without(label), base.fit.model)
+            for model in (made.fit.model.pruned(label), base.fit.model)
         )
         return left / before if before > 0.0 else math.inf
 

@@ -65,8 +65,8 @@ def eliminate(
 def _without_idle(best: Trial, run: Callable[[Trial, list[Proposal]], list[Trial]], margin: float) -> Trial:
     """The model without the effects that can be left out."""
     while len(best.added) > 1:
-        slim = [Proposal(_rest(best, label), best.model.without(label), ({},)) for label in best.added]
-        dropped = run(best, slim)
+        slim = [best.model.pruned(label) for label in best.added]
+        dropped = run(best, [Proposal(rest, model, ({},)) for model in slim if (rest := _rest(best, model))])
         kept = [t for t in dropped if t.bic() < best.bic() + margin]
         if not kept:
             break
@@ -91,8 +91,8 @@ def _swaps(
         names = set(family)
         if len(best.added) > 1:
             names |= scored | set(alone)
-        rest = _rest(best, label)
-        slim = best.model.without(label)
+        slim = best.model.pruned(label)
+        rest = _rest(best, slim)
         for name in sorted(names - {best.element(other).name for other in best.added}):
             starts = _starts_for(catalogue, name, series, slim, rounds, 8 if name in family else 1)
             beside: list[dict[str, float]] = []
@@ -134,8 +134,9 @@ def _shared(trial: Trial, label: str, element: Element) -> dict[str, float]:
     }
 
 
-def _rest(trial: Trial, label: str) -> tuple[str, ...]:
-    return tuple(name for name in trial.added if name != label)
+def _rest(trial: Trial, slim: Model) -> tuple[str, ...]:
+    """The effects that are left in a model without some of them."""
+    return tuple(name for name in trial.added if slim.term(name) is not None)
 
 
 def _stands_for(trial: Trial, best: Trial) -> bool:
