@@ -22,10 +22,15 @@ def drifting(rate: float) -> Model:
 def test_a_model_is_pruned_of_an_effect_and_of_what_needs_it():
     machine = drifting(0.01)
     assert [term.label for term in machine.pruned("linear_spring").terms] == ["viscous_damper"]
-    assert [term.label for term in machine.pruned("stiffness_drift").terms] == ["viscous_damper", "linear_spring"]
+    assert [term.label for term in machine.pruned("stiffness_drift").terms] == [
+        "viscous_damper",
+        "linear_spring",
+    ]
 
 
 def test_a_spring_that_drifts_is_found_where_the_model_has_neither():
     runs = records(drifting(0.03), delays=(0.0, 0.0))
-    found = diagnose(runs, Model.from_text(MASS, catalogue=CATALOGUE), catalogue=only("linear_spring", "stiffness_drift"))
+    found = diagnose(
+        runs, Model.from_text(MASS, catalogue=CATALOGUE), catalogue=only("linear_spring", "stiffness_drift")
+    )
     assert {one.element for one in found.diagnosis.missing} == {"linear_spring", "stiffness_drift"}

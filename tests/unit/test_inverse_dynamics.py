@@ -77,6 +77,12 @@ def test_an_effort_that_is_late_is_aligned_by_two_samples_at_most():
         assert least - 1e-9 <= found <= most + 1e-9
 
 
+def test_a_fit_that_begins_beyond_the_bounds_of_its_alignment_ends_within_them():
+    balance = Balance.of([axis()], axis_model())
+    found = fit_effort(balance, with_friction(), alignment=10.0 * balance.period).alignment / balance.period
+    assert abs(found) <= FARTHEST + 1e-9
+
+
 def test_the_delay_that_a_model_states_is_taken_into_account():
     record = axis()
     assert record.input is not None

@@ -117,6 +117,21 @@ def test_an_actuators_law_that_is_mainly_a_gain_on_what_was_recorded_is_no_name(
     assert verdict(contest(NOMINAL, replace(friction(), shape={"more_than_gain": share})))[1] == expected
 
 
+def test_an_effect_is_stated_beside_a_freed_value_that_explains_little():
+    both = supposed("friction inertia.mass", predicted(0.01), "freed_value")
+    mass = supposed("inertia.mass", predicted(0.9), "freed_value")
+    assert verdict(contest(NOMINAL, friction(0.03), mass, both)) == (
+        "missing_physics",
+        ("friction", "inertia.mass"),
+    )
+
+
+def test_a_freed_value_that_explains_most_is_not_hidden_by_an_effect_beside_it():
+    both = supposed("friction inertia.mass", predicted(0.01), "freed_value")
+    mass = supposed("inertia.mass", predicted(0.1), "freed_value")
+    assert verdict(contest(NOMINAL, friction(0.9), mass, both))[0] == "undecided"
+
+
 @pytest.mark.parametrize(
     ("error", "expected"), [(0.29, "missing_physics"), (0.31, "undecided"), (None, "missing_physics")]
 )

@@ -90,5 +90,13 @@ def test_a_model_that_misses_much_is_not_called_consistent_though_nothing_explai
     assert ("misses" in decision.reason) is (expected == "undecided")
 
 
+@pytest.mark.parametrize(("missed", "expected"), [(0.04, "consistent"), (0.06, "undecided")])
+def test_a_mismatch_that_is_no_noise_is_not_called_consistent_though_nothing_explains_it(missed, expected):
+    made = replace(contest(supposed("", predicted((missed * SIZE) ** 2))), structured=True)
+    _, decision = decided(made)
+    assert decision.verdict == expected
+    assert ("no noise" in decision.reason) is (expected == "undecided")
+
+
 def test_records_that_would_not_show_a_small_effect_still_show_a_large_one():
     assert verdict(contest(NOMINAL, friction()), 0.8) == NAMED

@@ -101,7 +101,8 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     contenders = contend(kinds, seen, rows, step, reach, case.tell)
     run = trajectories(found.fit)
     sizes = scales(seen, found.fit.model)
-    chosen = select(_contest(contenders, {}, rows, found, run, sizes)).chosen
+    structured = scoring.kind == "free_run" and calibration.fit.noise.is_structure
+    chosen = select(_contest(contenders, {}, rows, found, run, sizes, structured)).chosen
     trial = _trial_of(chosen, contenders)
     if trial.added != found.best.added:
         run = trajectories(whole_fit(trial, seen, found.noise, step, pool=case.pool))
@@ -125,7 +126,7 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
             nominal = next(one.trial for one in contenders if one.kind == "nominal")
             refitted = refitted_map(nominal, before, nominal_run, seen, rows, step)
     maps = _maps(after, refitted, contenders, rows)
-    contest = _contest(contenders, maps, rows, found, run, sizes)
+    contest = _contest(contenders, maps, rows, found, run, sizes, structured)
     selection = select(contest)
     if selection.chosen.key != trial.added:
         trial = _trial_of(selection.chosen, contenders)
@@ -227,6 +228,7 @@ def _contest(
     found: Search,
     run: Trajectories,
     sizes: Scales,
+    structured: bool,
 ) -> Contest:
     names = {score.element.name for one in found.rounds for score in one.scores}
 
@@ -235,7 +237,14 @@ def _contest(
 
     hypotheses = tuple(hypotheses_of(contenders, rows, shape))
     return Contest(
-        hypotheses, maps, len(names), rows.size, PRACTICAL, follows=FOLLOWS, cut_short=found.cut_short
+        hypotheses,
+        maps,
+        len(names),
+        rows.size,
+        PRACTICAL,
+        follows=FOLLOWS,
+        cut_short=found.cut_short,
+        structured=structured,
     )
 
 

@@ -69,6 +69,11 @@ class Hypothesis:
     values: Mapping[str, float] = field(default_factory=dict)
 
     @property
+    def effects(self) -> tuple[str, ...]:
+        """Labels of effects; a freed value and a delay go by the name of a parameter, "label.parameter"."""
+        return tuple(label for label in self.elements if "." not in label)
+
+    @property
     def key(self) -> tuple[str, ...]:
         """The elements in alphabetical order: the same for the same structure."""
         return tuple(sorted(self.elements))

@@ -39,6 +39,7 @@ def ledger(contest: Contest, detectable: float, size_errors: Mapping[str, float]
         "practical": contest.practical,
         "follows": contest.follows if math.isfinite(contest.follows) else None,
         "cut_short": contest.cut_short,
+        "structured": contest.structured,
         "detectable": detectable,
         "size_errors": {
             label: error if math.isfinite(error) else None for label, error in size_errors.items()
@@ -85,6 +86,7 @@ def contest_of(data: dict[str, Any]) -> Contest:
         hypotheses[competing:],
         data.get("follows") or math.inf,
         data.get("cut_short", False),
+        data.get("structured", False),
     )
 
 

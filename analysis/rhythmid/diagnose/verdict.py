@@ -191,14 +191,17 @@ def decide(
     each = {label: probability([label]) for label in labels}
     stated = _stated(labels, probability)
     groups = _groups(contest, selection)
+    missed = math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300)
     found = Outcome(
         chosen.kind if chosen.elements else "nominal",
         len(stated),
         chosen.kind == "delay" and (not stated or stated == (INPUT_DELAY,)),
+        chosen.kind == "freed_value" and not (stated and stated[0] in chosen.effects),
         left.share,
         left.goes_with,
         math.sqrt(left.least) / max(contest.practical * contest.size, 1e-300),
-        math.sqrt(chosen.prediction.mean_square) / max(contest.size, 1e-300),
+        missed,
+        missed if contest.structured else 0.0,
         (chosen.heldout_nrmse or 0.0) / contest.follows,
         detectable,
         size_errors.get(labels[0], 0.0) if labels else 0.0,
@@ -221,7 +224,7 @@ def decide(
         tuple(group for group in groups if group[0] in told),
         left,
         1.0 - left.share,
-        tuple(names[label] for label in labels if label not in named),
+        tuple(names[label] for label in labels if label not in named and label in chosen.effects),
     )
 
 

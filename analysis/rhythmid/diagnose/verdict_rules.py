@@ -7,7 +7,7 @@ as Markdown.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rhythmid.diagnose.constants import BLIND, EXPLAINED, MAINLY, STATED, VAGUE
+from rhythmid.diagnose.constants import BLIND, EXPLAINED, LEFT, MAINLY, STATED, VAGUE
 from rhythmid.diagnose.hypothesis import Kind, Verdict
 
 
@@ -20,10 +20,12 @@ class Outcome:
     kind : of the chosen hypothesis; that of the nominal model where nothing was added to it.
     stated : number of its effects, those with the largest shares first, that are probable enough together to be stated.
     delay_alone : whether of a longer delay and effects no effect is stated.
+    value_alone : whether a value is set free and it, or no effect that is stated, has the largest share.
     left : share of the mismatch that it leaves and something else predicts.
     goes_with : the quantity that this depends on.
     remainder : rms of what it leaves and something else predicts by more than chance, at least, over the smallest of practical importance.
     missed : rms error of the chosen hypothesis, as a share of what was measured.
+    structured : the same where it follows from its own past, so that it is no noise; else 0.
     astray : its error on held-out data, over that up to which a model follows the machine.
     detectable : smallest effect that the records would show, the same.
     vague : standard deviation of the size of its effect with the largest share, relative to the size.
@@ -35,10 +37,12 @@ class Outcome:
     kind: Kind
     stated: int
     delay_alone: bool
+    value_alone: bool
     left: float
     goes_with: str | None
     remainder: float
     missed: float
+    structured: float
     astray: float
     detectable: float
     vague: float
@@ -109,6 +113,15 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         _alone(lambda found: found.missed),
     ),
     VerdictRule(
+        "structured",
+        "no effect is accepted: error of the refitted nominal model in free run, as a share of what was measured, where it follows from its own past",
+        LEFT,
+        "undecided",
+        "the refitted nominal model misses {missed:.0f} % of what was measured, in a way that follows from its own past and so is no noise, and nothing "
+        "that was tried explains it",
+        _alone(lambda found: found.structured),
+    ),
+    VerdictRule(
         "blind",
         "no effect is accepted: smallest effect that the records would show, as a share of what was measured",
         BLIND,
@@ -119,11 +132,11 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
     VerdictRule("nothing_missing", "no effect is accepted (1)", 0.0, "consistent", "", _alone(lambda _: 1.0)),
     VerdictRule(
         "freed_value",
-        "a value that the file holds fixed is set free in the chosen hypothesis (1)",
+        "a value that the file holds fixed is set free, and no effect that is stated has a larger share (1)",
         0.0,
         "undecided",
         "a value that the nominal model holds fixed explains the records when it is free",
-        _is("freed_value"),
+        lambda found: float(found.value_alone),
     ),
     VerdictRule(
         "longer_delay",

@@ -60,8 +60,9 @@ def summary_of(
     `whole` is what errors are a share of; `freed` tells of the fixed value that the chosen hypothesis frees, if it does.
     """
     names = listed([effect.element for effect in missing])
-    if freed is not None:
-        return freed[:1].upper() + freed[1:]
+    value = "" if freed is None else freed[:1].upper() + freed[1:]
+    if value and decision.verdict != "missing_physics":
+        return value
     if decision.verdict == "consistent":
         said = "Nothing of practical size is missing: with its parameters refitted, the nominal model explains the records"
         left = decision.unexplained
@@ -87,7 +88,7 @@ def summary_of(
             said += (
                 f" {number(100.0 * left.share, 2)} % of the mismatch is left and depends on {left.goes_with}."
             )
-        return said
+        return f"{said} {value}".strip()
     if decision.verdict == "undecided":
         said = f"{decision.reason[:1].upper()}{decision.reason[1:]}."
         of_main = bool(decision.equivalent) and (

@@ -184,10 +184,10 @@ def stated_at(one: JointResult) -> tuple[str, ...]:
     """Labels by which the answer at a joint stands: elements, or a value of the body that is wrong, or a delay."""
     decision, chosen = one.result.decision, one.result.selection.chosen
     own = _own_labels(one)
+    if decision.verdict == "missing_physics":
+        return tuple(label for label in decision.named if _differs(one, label))
     if not _different(one):
         return ()
-    if decision.verdict == "missing_physics":
-        return decision.named
     alike = _held_by_alike(one) >= STATED
     if alike and chosen.kind == "effects" and decision.verdict == "undecided":
         return chosen.elements

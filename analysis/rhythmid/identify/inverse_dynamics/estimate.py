@@ -146,6 +146,7 @@ def fit_effort(
     """
     names = tuple(balance.estimated(model) if names is None else names)
     aligned = aligned or Alignment.of(balance)
+    alignment = min(max(alignment, aligned.low), aligned.high)
     residual, jacobian = linearise(balance, model, names, alignment)
     known = {**priors_of(balance, model, names, jacobian[:, 1:]), **(priors or {})}
     mean = np.array([aligned.mean, *(known[name].mean for name in names)])
