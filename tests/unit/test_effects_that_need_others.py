@@ -1,7 +1,6 @@
 """An effect that needs another one: a drift of a spring of which the model has none."""
 
 from machines import CATALOGUE, only, records
-
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.model import Model
 
