@@ -12,9 +12,10 @@ from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.diagnose.effort import search as module
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.held_out import HeldOut
+from rhythmid.diagnose.effort.kin import kin
 from rhythmid.diagnose.effort.reference import residual_with_map
 from rhythmid.diagnose.effort.remainder import remainder_of
-from rhythmid.diagnose.effort.search import EffortSearch, kin, search_effort
+from rhythmid.diagnose.effort.search import EffortSearch, search_effort
 from rhythmid.diagnose.evidence import predict
 from rhythmid.diagnose.rejections import RULES, SHAPES, Claim, Rejection, rejections_of
 from rhythmid.identify.inverse_dynamics.balance import Balance

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.signal import lfilter
 
+from rhythmid.diagnose.search.response import response
 from rhythmid.diagnose.search.score_tests import Trajectories, residual_line
-from rhythmid.simulation.signal import first_order_hold
 
 Array = NDArray[np.float64]
 SPLINES, SPLINES_OF_TWO = 8, 5  # basis functions of one quantity, and of each of two
@@ -110,23 +110,13 @@ def stretched(values: Array, most: float) -> Array:
 def _simulated(
     known: Trajectories, functions: list[list[Array]], pool: ThreadPoolExecutor | None
 ) -> tuple[tuple[Array, ...], ...]:
-    """Outputs' changes when each function acts as a force; its size is chosen small and scaled back."""
-    run, fit = known.disturbed, known.fit
-    scale = (
-        1e-3 * fit.model.mass.value * max(float(np.std(np.gradient(p.velocity, p.time))) for p in known.paths)
-    )
+    """Outputs' changes when each function acts as a force."""
 
     def one(function: list[Array]) -> tuple[Array, ...]:
-        size = max(float(np.abs(values).max()) for values in function) or 1.0
         changes = []
-        for index, (series, path) in enumerate(zip(run.series, known.paths)):
-            push = first_order_hold(path.time, scale / size * function[index])
-            rows = run.rows(fit.model, index, fit.starts[index], push)
-            if rows is None:
-                changes.append(np.zeros(series.blocks))
-            else:
-                change = series.of_block(rows[:, run.states] - known.outputs[index])
-                changes.append(change * size / scale)
+        for index, series in enumerate(known.disturbed.series):
+            change = response(known, index, function[index])
+            changes.append(np.zeros(series.blocks) if change is None else series.of_block(change))
         return tuple(changes)
 
     return tuple(pool.map(one, functions)) if pool else tuple(one(function) for function in functions)

@@ -28,6 +28,7 @@ from rhythmid.diagnose.effort.candidate import (
     widest,
 )
 from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.effort.kin import at_values_of, kin, shortlist
 from rhythmid.diagnose.effort.reference import reference_of
 from rhythmid.diagnose.effort.scales import scales_of
 from rhythmid.diagnose.evidence import Blocks, Linearised, predict
@@ -51,7 +52,6 @@ from rhythmid.value import Prior
 
 Array = NDArray[np.float64]
 MOST_EFFECTS = 4  # effects that are looked for: a fifth was never real on recordings that were tried
-REFINED = 10  # additions that are fitted in earnest in each round: the right one was among the first five of a score test always
 GAP = 3  # rows between blocks: as far as the filter of effort mixes neighbours (its impulse lasts about 1 / cut-off, 2.5 rows)
 
 
@@ -85,15 +85,6 @@ class EffortSearch:
     not_tried: Mapping[str, str]
     candidates: int
     cut_short: bool = False
-
-
-def kin(first: Element, second: Element) -> bool:
-    """Whether two elements are forms of one thing."""
-    return (
-        (first.family != "" and first.family == second.family)
-        or second.name in first.special_case_of
-        or first.name in second.special_case_of
-    )
 
 
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
@@ -181,15 +172,16 @@ class _Search:
         self.tried.update(one.start.name for one in screened)
         tried = len(screened)
         new: list[Fitted] = []
-        for one in self._promising(_shortlist(screened), parent):
+        for one in self._promising(shortlist(screened), parent):
             for base in self._bases(parent, one.start):
                 fitted = self.fitted(base, one)
                 if fitted is None or self._known(fitted):
                     continue
                 (new if keeps_shape(fitted.shape) else self.ruled_out).append(fitted)
-        self.found.extend(new)
         if not new:
             return None
+        new = self._nearer(new)
+        self.found.extend(new)
         fits = [one.linearised for one in (*new, parent, self.nominal)]
         *others, before, start, free = predict([*fits, self.reference], self.blocks, self.balance.record)
         order = sorted(range(len(new)), key=lambda index: -others[index].score)
@@ -208,6 +200,26 @@ class _Search:
             if special_case(plain, claimed[best]) and not replaces(claim(best, plain, plain)):
                 best = index
         return None if rejections_of(claim(best, parent.claimed(before))) else new[best]
+
+    def _nearer(self, new: Sequence[Fitted]) -> list[Fitted]:
+        """The hypotheses with laws that the best of them contains fitted from its values as well, and the better prediction of the two kept:
+        a simpler law may be in another minimum, as good a fit and a worse prediction."""
+        scores = [
+            one.score for one in predict([one.linearised for one in new], self.blocks, self.balance.record)
+        ]
+        best = new[max(range(len(new)), key=scores.__getitem__)]
+        found = list(new)
+        for place, plain in enumerate(new):
+            model = at_values_of(best, plain)
+            if model is not None:
+                aligned = self._aligned(plain.elements)
+                fit = self._fit(plain.elements, model, plain.priors, aligned, best.fit.alignment)
+                made = replace(fit, shape=plain.shape)
+                *_, again = predict(
+                    [one.linearised for one in (*new, made)], self.blocks, self.balance.record
+                )
+                found[place] = made if again.score > scores[place] else plain
+        return found
 
     def _promising(self, shortlist: Sequence[Screened], parent: Fitted) -> list[Screened]:
         """The additions that are worth a fit; a longer delay is where the alignment has gone further than stamps are rounded."""
@@ -369,14 +381,3 @@ def _kind_of(elements: Sequence[str], model: Model) -> Kind:
     if INPUT_DELAY in elements:
         return "delay"
     return "effects" if all(model.term(label) is not None for label in elements) else "freed_value"
-
-
-def _shortlist(screened: Sequence[Screened]) -> list[Screened]:
-    """The additions that are fitted in earnest: the best of the score test, all kin of the best, freed values and the delay."""
-    best = [one for one in screened if one.start.element is not None and one.gain > 0.0]
-    chosen = best[:REFINED]
-    if best:
-        first = best[0].start.element
-        assert first is not None
-        chosen += [one for one in best[REFINED:] if one.start.element and kin(one.start.element, first)]
-    return chosen + [one for one in screened if one.start.element is None]

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 
+from rhythmid.diagnose.search.response import response
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales
@@ -37,7 +38,6 @@ Array = NDArray[np.float64]
 FULL_PRECISION_ROWS = (
     200_000  # averages in all, beyond which changes are kept to seven digits: a score needs no more
 )
-SMALL = 1e-3  # of the force that shakes the machine: a force that is tried is no larger, so that the answer is in proportion
 
 
 @dataclass(frozen=True)
@@ -207,14 +207,10 @@ def change_of_output(
         force = effect_along(element, values, model, path)
         if not float(np.abs(force).max()) < DIVERGED:  # NaN included
             return None
-        if not np.any(force):
-            changes.append(np.zeros(one.blocks))
-            continue
-        share = min(1.0, SMALL * fit.model.mass.value * known.shaken / float(np.sqrt(np.mean(force**2))))
-        rows = run.rows(fit.model, index, fit.starts[index], first_order_hold(path.time, share * force))
-        if rows is None:
+        change = response(known, index, force)
+        if change is None:
             return None
-        changes.append(one.of_block(rows[:, run.states] - known.outputs[index]) / share)
+        changes.append(one.of_block(change))
     return changes
 
 

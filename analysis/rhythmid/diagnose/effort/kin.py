@@ -1,0 +1,46 @@
+"""Forms of one thing: laws of one family, or of which one is the other's special case."""
+
+from collections.abc import Sequence
+
+from rhythmid.diagnose.effort.candidate import Screened
+from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.elements.element import Element
+from rhythmid.model import Model
+
+REFINED = 10  # additions that are fitted in earnest in each round: the right one was among the first five of a score test always
+
+
+def kin(first: Element, second: Element) -> bool:
+    """Whether two elements are forms of one thing."""
+    return (
+        (first.family != "" and first.family == second.family)
+        or second.name in first.special_case_of
+        or first.name in second.special_case_of
+    )
+
+
+def shortlist(screened: Sequence[Screened]) -> list[Screened]:
+    """The additions that are fitted in earnest: the best of the score test, all kin of the best, freed values and the delay."""
+    best = [one for one in screened if one.start.element is not None and one.gain > 0.0]
+    chosen = best[:REFINED]
+    if best:
+        first = best[0].start.element
+        assert first is not None
+        chosen += [one for one in best[REFINED:] if one.start.element and kin(one.start.element, first)]
+    return chosen + [one for one in screened if one.start.element is None]
+
+
+def at_values_of(rich: Fitted, plain: Fitted) -> Model | None:
+    """The model of a hypothesis with the values that another one has found, whose last law contains its own; None where it does not."""
+    label, other = plain.elements[-1], rich.elements[-1]
+    term, wider = plain.fit.model.term(label), rich.fit.model.term(other)
+    if term is None or wider is None or plain.elements[:-1] != rich.elements[:-1]:
+        return None
+    if wider.element.name not in term.element.special_case_of:
+        return None
+    known = rich.fit.model.parameters
+    ends = {
+        name: name.replace(label, other, 1) if name.startswith(f"{label}.") else name
+        for name in plain.fit.names
+    }
+    return plain.fit.model.with_values({name: known[end].value for name, end in ends.items() if end in known})
