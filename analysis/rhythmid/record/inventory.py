@@ -14,6 +14,7 @@ from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Topic
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.field import NAMES, Field
+from rhythmid.record.grouped_runs import grouped_runs
 from rhythmid.record.heading import heading_of
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
 from rhythmid.record.message_types import typestore
@@ -87,8 +88,8 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Inventory:
-    """All numbers of a source that change, how its times are told and why, what was left out, and of that what stands still at
-    another value than zero."""
+    """All numbers of a source that change, how its times are told and why, what was left out, of that what stands still at
+    another value than zero, and what a user should know."""
 
     path: Path
     recorded: tuple[Recorded, ...]
@@ -96,6 +97,7 @@ class Inventory:
     clock_reason: str
     left_out: tuple[str, ...] = ()
     constant: tuple[Recorded, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def is_bag(self) -> bool:
@@ -109,7 +111,13 @@ def inventory(source: str | Path, rate: float | None = None) -> Inventory:
     if not source.exists():
         raise InputError(f"{source}: no such file or directory")
     if table_suffix(source) in SUFFIXES:
-        return _of_table(Table.load(source), rate)
+        table = Table.load(source)
+        runs = grouped_runs(table)
+        if runs is None:
+            return _of_table(table, rate)
+        found = _of_table(runs.first_of(table), rate)
+        note = f"it holds {runs.note}, and this is the first; each as a table of its own:  rhythmid split {source} --out runs"
+        return replace(found, notes=(note, *found.notes))
     if not is_bag(source):
         raise InputError(
             f"{source}: is neither a bag (directory, .mcap, .db3) nor a table ({', '.join(SUFFIXES)})"

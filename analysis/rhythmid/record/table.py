@@ -159,8 +159,16 @@ def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
         elif isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
             for number, one in enumerate(value):
                 yield from _flat(one, f"{above}{name}[{number}].")
+        elif _is_cell(value):
+            for number, one in enumerate(np.ravel(value)):
+                yield f"{above}{name}[{number}]", np.atleast_1d(np.asarray(one))
         else:
             yield above + name, np.atleast_1d(np.asarray(value))
+
+
+def _is_cell(value: Any) -> bool:
+    """Whether it is a cell of MATLAB that holds arrays."""
+    return isinstance(value, np.ndarray) and value.dtype.hasobject and any(np.ndim(one) for one in value.flat)
 
 
 def _npz(path: Path) -> dict[str, Any]:

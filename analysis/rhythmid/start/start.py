@@ -32,7 +32,7 @@ class Guess:
         choices = self.roles.choices.items()
         found = [f"{role}: {choice.recorded}: {choice.reason}" for role, choice in choices]
         found += [f"CHECK {role}: {doubt}" for role, choice in choices for doubt in choice.doubts]
-        found += [f"CHECK {note}" for note in self.roles.notes]
+        found += [f"CHECK {note}" for note in (*self.inventory.notes, *self.roles.notes)]
         if self.roles.joint.others:
             found.append(f"joint: {self.roles.joint.name} (others: {', '.join(self.roles.joint.others)})")
         return found

@@ -62,7 +62,7 @@ def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clo
                 f"joint: {name}; standard deviation of its motion {own:.3g}. Others (--joint NAME): {moved}."
             ),
         ]
-    for note in roles.notes:
+    for note in (*found.notes, *roles.notes):
         lines += ["", *comment(f"CHECK: {note}.")]
     if rest:
         lines += ["", *comment(f"Recorded too, and not used: {_listed(rest, 3 * LISTED)}.")]
