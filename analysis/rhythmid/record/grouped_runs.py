@@ -31,9 +31,11 @@ class Runs:
         first, *_, last = self.members
         return f"{len(self.members)} runs, {first} to {last}"
 
-    def first_of(self, table: Table) -> Table:
-        """The table without the arrays of all runs but the first."""
-        others = tuple(f"{path}." for path in list(self.members)[1:])
+    def alone(self, table: Table, column: str | None = None) -> Table:
+        """The table without the arrays of all runs but the one that holds the `column`, by default the first."""
+        paths = [f"{path}." for path in self.members]
+        own = next((path for path in paths if column is not None and column.startswith(path)), paths[0])
+        others = tuple(path for path in paths if path != own)
         kept = {name: values for name, values in table.columns.items() if not name.startswith(others)}
         return Table(table.path, kept)
 

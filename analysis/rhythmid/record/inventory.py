@@ -18,6 +18,7 @@ from rhythmid.record.grouped_runs import grouped_runs
 from rhythmid.record.heading import heading_of
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
 from rhythmid.record.message_types import typestore
+from rhythmid.record.other_lengths import length_notes, unequal_arrays
 from rhythmid.record.signals import Clock
 from rhythmid.record.table import SUFFIXES, WIDEST, Table, table_suffix
 
@@ -115,7 +116,7 @@ def inventory(source: str | Path, rate: float | None = None) -> Inventory:
         runs = grouped_runs(table)
         if runs is None:
             return _of_table(table, rate)
-        found = _of_table(runs.first_of(table), rate)
+        found = _of_table(runs.alone(table), rate)
         note = f"it holds {runs.note}, and this is the first; each as a table of its own:  rhythmid split {source} --out runs"
         return replace(found, notes=(note, *found.notes))
     if not is_bag(source):
@@ -130,7 +131,7 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
     columns = list(table.vectors())
     if not columns:
         raise InputError(f"{table.path}: holds no column of numbers")
-    count = max((len(value) for _, value in columns), key=[len(value) for _, value in columns].count)
+    count = _rows_of(columns)
     unequal = [(name, value) for name, value in columns if len(value) != count]
     columns = [(name, value) for name, value in columns if len(value) == count]
     if rate is not None:
@@ -140,6 +141,7 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
         every = dict(columns)[str(clock.column)] * clock.scale
     found, constant = [], []
     left = [f"{name}: holds words, such as {word!r}" for name, word in table.words()]
+    left += map(str, unequal_arrays(table, count))
     merged = is_merged(value for name, value in columns if name != clock.column)
     for name, value in columns:
         heading, time = heading_of(name), every
@@ -161,7 +163,15 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
             constant.append(one)
         else:
             found.append(one)
-    return Inventory(table.path, tuple(found), clock, reason, tuple(left), _not_zero(constant))
+    notes = length_notes(table, count)
+    return Inventory(table.path, tuple(found), clock, reason, tuple(left), _not_zero(constant), notes)
+
+
+def _rows_of(columns: list[tuple[str, Array]]) -> int:
+    """The number of rows that most columns have, of those among which one is called a time before those without."""
+    lengths = [len(value) for _, value in columns]
+    timed = {len(value) for name, value in columns if _is_time(name, value)}
+    return max(lengths, key=lambda count: (count in timed and lengths.count(count) > 1, lengths.count(count)))
 
 
 def _not_zero(constant: list[Recorded]) -> tuple[Recorded, ...]:
