@@ -58,6 +58,7 @@ class Recorded:
     topic, type, field : of a message; empty for a column.
     column : name of the column; empty for a message's field.
     joint : the joint whose number it is, where a name stands beside it.
+    side : `left` or `right` where another column differs from it in that only; empty else.
     said : what names it within its message or table, such as `position` or the heading without its unit.
     unit, scale : SI unit, empty where not told, and how much of it one recorded unit is.
     time, value : float64[n], s and as recorded times `scale`; a message's time is that of its receipt.
@@ -76,6 +77,7 @@ class Recorded:
     scale: float = 1.0
     written_unit: str = ""
     stamped: bool = False
+    side: str = ""
 
     def __str__(self) -> str:
         return f"{self.topic} {self.field}" if self.topic else self.column

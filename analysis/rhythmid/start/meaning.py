@@ -36,11 +36,19 @@ COMMANDED = frozenset(
     "request requested".split()
 )
 COMMANDED_LETTERS = frozenset("u r".split())
-MEASURED = frozenset("meas measured act actual state states feedback fb est estimated present real".split())
+MEASURED = frozenset(
+    "meas measured act actual state states feedback fb est estimated present real raw filt filtered smoothed response".split()
+)
 FORCING = frozenset("forcing pump pumping disturbance perturbation external".split())
-BASE = frozenset("base table ground shaker platform floor".split())
+BASE = frozenset(
+    "base table ground shaker platform floor road terrain foundation seismic earthquake quake".split()
+)
+SHAKEN = frozenset(
+    "excitation exc shaking vibration".split()
+)  # a motion that is called so is one of the base
+DRIVING = frozenset("input in stimulus ctrl control drive".split())  # what drives, where no quantity is said
 GENERIC = frozenset(
-    "dof joint joints motor data robot array value values actuator axis trajectory controller controllers".split()
+    "dof joint joints motor data robot array value values actuator axis trajectory controller controllers in out input output".split()
 )
 ROTARY = frozenset(
     "angle angles theta phi alpha torque torques tau q rotation rotary omega revolute hinge encoder moment trq dof joint joints "
@@ -92,10 +100,15 @@ def meaning_of(one: Recorded) -> Meaning:
     ):
         commanded = False
     forcing = bool(every & FORCING)
+    base = bool(every & BASE)
+    if (
+        every & SHAKEN
+        and quantity in ("position", "acceleration")
+        and not (one.unit or "m").startswith("rad")
+    ):
+        base, commanded = True, None
     joint = one.joint or _joint_of_column(one)
-    return Meaning(
-        quantity, commanded, forcing, bool(every & BASE), joint, reason.removeprefix("; "), certain
-    )
+    return Meaning(quantity, commanded, forcing, base, joint, reason.removeprefix("; "), certain)
 
 
 def is_ignored(one: Recorded) -> bool:
@@ -138,8 +151,35 @@ def driving_unit_of(one: Recorded) -> str:
 
 
 def poses(one: Recorded) -> bool:
-    """Whether its name says that it is what a motion is to become: a target, a set point."""
-    return bool({*words_of(one.said), *words_of(one.topic)} & POSED)
+    """Whether its name says that it is what a motion is to become: a target, a set point, an `r` that is no side."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & POSED) or words_of(one.said) == ["r"]
+
+
+def says_that_it_drives(one: Recorded) -> bool:
+    """Whether its name says that it drives, of whatever quantity."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & DRIVING)
+
+
+def says_base(one: Recorded) -> bool:
+    """Whether a word of its name says that it is of the base."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & BASE)
+
+
+def letter_of(one: Recorded) -> str:
+    """The one letter that stands for a quantity in its name; empty where there is none, or several."""
+    letters = [word for word in words_of(one.said) if word in LETTERS]
+    return letters[0] if letters else ""
+
+
+def differ_in_number(one: Recorded, other: Recorded) -> bool:
+    """Whether two names differ in a number only, as those of two joints or sensors do."""
+    first, second = ([word for word in words_of(each.said) if not word.isdigit()] for each in (one, other))
+    return first == second and one.said != other.said
+
+
+def says_who_asks(one: Recorded) -> bool:
+    """Whether a word of its name says that it was asked for, or that it was measured."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & (COMMANDED | MEASURED))
 
 
 def _quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity | None, str, bool]:
@@ -167,7 +207,15 @@ def _joint_of_column(one: Recorded) -> str:
     """What tells a column from others of the same quantity: `3` of dof_pos[3], `knee` of knee_pos; empty for messages."""
     if one.topic:
         return ""
-    known = COMMANDED | MEASURED | GENERIC | FORCING | BASE | frozenset().union(*WORDS.values(), DEVICES)
-    left = [word for word in words_of(one.column.replace(one.written_unit, "") if one.written_unit else one.column)
-            if word not in known and word not in LETTERS]  # fmt: skip
-    return "_".join(left)
+    known = (
+        COMMANDED
+        | MEASURED
+        | GENERIC
+        | FORCING
+        | BASE
+        | SHAKEN
+        | DRIVING
+        | frozenset().union(*WORDS.values(), DEVICES)
+    )
+    left = [word for word in words_of(one.said) if word not in known and word not in LETTERS]
+    return "_".join([*([one.side] if one.side else []), *left])

@@ -8,9 +8,10 @@ from rhythmid.elements.element import SLOTS
 from rhythmid.model import INERTIA, Term
 from rhythmid.record.inventory import Inventory, Recorded, header_clock
 from rhythmid.record.signals import ROLES, Clock
+from rhythmid.start.known import Choice
 from rhythmid.start.meaning import driving_unit_of, meaning_of
 from rhythmid.start.nominal import Nominal
-from rhythmid.start.roles import Choice, Roles
+from rhythmid.start.roles import Roles
 from rhythmid.units import Units
 from rhythmid.value import Value
 
