@@ -14,6 +14,7 @@ from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Topic
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.field import NAMES, Field
+from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.grouped_runs import grouped_runs
 from rhythmid.record.heading import heading_of
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
@@ -113,6 +114,7 @@ def inventory(source: str | Path, rate: float | None = None) -> Inventory:
     source = Path(source)
     if not source.exists():
         raise InputError(f"{source}: no such file or directory")
+    refuse_foreign(source)
     if table_suffix(source) in SUFFIXES:
         table = Table.load(source)
         runs = grouped_runs(table)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.record.compression import largest
+from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.hdf5_table import is_hdf5, read_hdf5
 from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.own_process import arrays_in_own_process
@@ -51,6 +52,7 @@ class Table:
         }  # fmt: skip
         read = readers.get(table_suffix(path))
         if read is None:
+            refuse_foreign(path)
             raise InputError(
                 f"{path}: is not a table; .mat, {', '.join(HDF5)}, .npz, .parquet and {', '.join(TEXT)} can be read"
             )
