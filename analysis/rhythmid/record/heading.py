@@ -19,7 +19,7 @@ SI = ("s", "m", "rad", "N", "N*m", "m/s", "rad/s", "m/s^2", "rad/s^2", "A", "V",
 SPELLINGS = {
     "°": "deg", "degree": "deg", "degrees": "deg", "degs": "deg", "dps": "deg/s", "sec": "s", "secs": "s", "seconds": "s",
     "second": "s", "msec": "ms", "millis": "ms", "usec": "us", "micros": "us", "µs": "us", "nsec": "ns", "nanos": "ns",
-    "nanoseconds": "ns", "milliseconds": "ms", "microseconds": "us", "radians": "rad", "radian": "rad", "meter": "m",
+    "nanoseconds": "ns", "milliseconds": "ms", "microseconds": "us", "radians": "rad", "radian": "rad", "newtons": "N", "newtonmeters": "Nm", "newtonmeter": "Nm", "meter": "m",
     "meters": "m", "metre": "m", "metres": "m", "newton": "N", "amp": "A", "amps": "A", "volt": "V", "volts": "V",
     "rads": "rad/s", "mps": "m/s", "radps": "rad/s", "degps": "deg/s", "r/min": "rpm", "1/min": "rpm",
 }  # fmt: skip
@@ -101,8 +101,13 @@ def _glued(column: str) -> str:
 
 def is_unit(text: str) -> bool:
     """Whether a cell below a column's name can be its unit: one that is known, a dash or nothing."""
-    bare = text.strip().strip("[](){}").strip()
+    bare = bare_unit(text)
     return bare in ("", "-", "1", "%") or _unit(bare) is not None
+
+
+def bare_unit(text: str) -> str:
+    """A unit without the brackets around it."""
+    return text.strip().strip("[](){}").strip()
 
 
 def _unit(text: str) -> tuple[str, float] | None:

@@ -18,7 +18,7 @@ import numpy as np
 from rhythmid.errors import InputError
 from rhythmid.record.clock_time import seconds
 from rhythmid.record.compression import largest
-from rhythmid.record.heading import is_unit
+from rhythmid.record.text_head import names_of
 
 TEXT = (".csv", ".tsv", ".txt", ".dat")
 COMPRESSED = ".gz"
@@ -90,10 +90,11 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
         separator = max(SEPARATORS, key=lambda one: len(_cells(used[-1][1], one)))
         head = _cells(used[-1][1], separator)
         return Dialect(separator, decimal, len(lines), tuple(head), tuple(range(len(head))))
-    place = next(index for index, row in enumerate(rows) if row)
-    cells = _cells(used[place][1], separator)
+    split = [_cells(line, separator) for _, line in used]
+    place = _first_row(split, rows, decimal)
+    cells = split[place]
     numeric = tuple(index for index, cell in enumerate(cells) if _number(cell, decimal) is not None)
-    head = _head([line for _, line in used[:place]], separator)
+    head = names_of(split[:place], len(cells))
     if head is None:
         head = _remark(lines[: used[place][0]], separator, len(cells)) or [str(n) for n in range(len(cells))]
     if not head[-1] and not cells[-1]:
@@ -128,28 +129,40 @@ def _worth(rows: list[int]) -> tuple[int, int]:
     return sum(rows), sum(1 for row in rows if row)
 
 
-def _head(above: list[str], separator: str | None) -> list[str] | None:
-    """Names of the columns from the lines above the first row, with a line of units below them where there is one."""
-    if not above:
-        return None
-    names = _cells(above[-1], separator)
-    if len(above) > 1 and all(is_unit(cell) for cell in names):
-        titles = _cells(above[-2], separator)
-        if len(titles) == len(names):
-            return [
-                f"{title} [{unit.strip('[]()')}]" if unit else title for title, unit in zip(titles, names)
-            ]
-    return names
-
-
 def _remark(lines: list[str], separator: str | None, count: int) -> list[str] | None:
-    """Names in the last comment line that has as many entries as there are columns."""
-    for line in reversed(lines):
-        text = line.strip().lstrip("#% ")
-        cells = _cells(text, separator)
-        if text and len(cells) == count:
-            return cells
-    return None
+    """Names, and units, in the last comment lines that have as many entries as there are columns."""
+    told = [_cells(line.strip().lstrip("#% "), separator) for line in lines if line.strip().lstrip("#% ")]
+    while told and len(told[-1]) != count:
+        told.pop()
+    return names_of(told, count)
+
+
+def _first_row(rows: list[list[str]], numbers: list[int], decimal: str) -> int:
+    """Which line is the first of numbers: not one of a title or of units that holds a number, too.
+
+    Such a line begins with a word where most rows have a number, and has no more numbers than words.
+    """
+    begin = next(place for place, count in enumerate(numbers) if count)
+    usual = Counter(count for count in numbers if count).most_common(1)[0][0]
+    for place in range(begin, len(rows)):
+        if not numbers[place]:
+            continue
+        if 2 * numbers[place] > usual or not _begins_with_word(rows[place], rows[place + 1 :], decimal):
+            return place
+    return begin
+
+
+def _begins_with_word(row: list[str], below: list[list[str]], decimal: str) -> bool:
+    """Whether the first cell that is filled is no number where most of the rows below have one."""
+    place = next((place for place, cell in enumerate(row) if cell), 0)
+    if _number(row[place], decimal) is not None:
+        return False
+    there = [
+        bool(cells[place]) and _number(cells[place], decimal) is not None
+        for cells in below
+        if len(cells) == len(row)
+    ]
+    return 2 * sum(there) > len(there)
 
 
 def _rows(lines: Iterable[str], dialect: Dialect, columns: tuple[int, ...]) -> np.ndarray:
