@@ -62,6 +62,7 @@ POSED = frozenset(
     "des desired ref reference target targets goal setpoint sp".split()
 )  # of a motion, where nothing else is said
 ELECTRICAL = {"V": "voltage volt volts", "A": "current currents cur iq amp amps i", "1": "pwm duty"}
+IN_SI = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/", "trajectory_msgs/", "control_msgs/")
 IGNORED = frozenset("temp temperature battery power error err status mode".split())
 
 
@@ -138,6 +139,11 @@ def force_unit_of(one: Recorded) -> str:
         return one.unit
     words = {*words_of(one.said), *words_of(one.topic)}
     return next((unit for unit, names in ELECTRICAL.items() if words & set(names.split())), "")
+
+
+def tells_unit(one: Recorded) -> bool:
+    """Whether a heading or the type of a ROS message, which is in SI units by REP 103, tells its unit."""
+    return bool(one.unit) or one.type.startswith(IN_SI)
 
 
 def is_lone_v(one: Recorded) -> bool:
