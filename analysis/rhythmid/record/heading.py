@@ -29,6 +29,7 @@ SUFFIXES = (
     "radians", "rads", "radps", "degps", "dps", "rpm", "mps", "mm", "cm", "mrad", "nm", "mnm", "n", "m", "ma", "a", "v", "mv", "msec",
     "ms", "usec", "us", "nsec", "ns", "nanoseconds", "milliseconds", "seconds", "secs", "sec", "s",
 )  # fmt: skip
+COUNTERS = ("millis", "micros", "nanos")  # of Arduino's clock: names that are units
 LETTERS = {  # a single letter is a unit only behind a word that it suits: pos_a is no current
     "s": "t time timestamp stamp elapsed", "m": "pos position x y z height displacement disp length travel stroke",
     "n": "f force load thrust", "a": "i iq current cur", "v": "u voltage volt supply",
@@ -74,6 +75,8 @@ def heading_of(column: str) -> Heading:
     """The heading `column` taken apart: a unit in brackets, behind a slash, as a suffix after an underscore or with a capital, or
     glued to a name that it suits."""
     column = column.strip()
+    if column.lower() in COUNTERS and (known := _unit(column)) is not None:
+        return Heading(column, *known, column)
     for pattern in (_BRACKETS, _SLASH):
         if (match := pattern.match(column)) and (known := _unit(match[2])) is not None:
             return Heading(match[1].strip() or column, *known, match[2])

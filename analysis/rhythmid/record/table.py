@@ -14,6 +14,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.compression import largest
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.hdf5_table import is_hdf5, read_hdf5
+from rhythmid.record.joined_stamps import with_joined_stamps
 from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.own_process import arrays_in_own_process
 from rhythmid.record.text_table import COMPRESSED, TEXT, read_text
@@ -58,7 +59,7 @@ class Table:
             )
         try:
             check_content(path)
-            return cls(path, read(path))
+            return cls(path, with_joined_stamps(read(path)))
         except FileNotFoundError:
             raise InputError(f"{path}: no such file") from None
         except InputError:
