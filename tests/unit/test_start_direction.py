@@ -118,3 +118,22 @@ def test_a_motion_of_the_base_is_no_force(tmp_path, base, output, doubted):
     assert (
         any("CHECK input: taken for a displacement of the base" in line for line in found.lines()) == doubted
     )
+
+
+def test_a_motor_that_leads_its_load_is_no_reference_and_the_loads_angle_no_effort(tmp_path):
+    found = roles_of(write(tmp_path, theta_motor=REFERENCE, theta_load=ANSWER + NOISE, tau=EFFORT))
+    assert "reference" not in found and found["input"] == "tau" and found["output"].startswith("theta")
+
+
+def test_two_sensors_that_are_a_sample_apart_are_none_the_others_reference(tmp_path):
+    found = roles_of(write(tmp_path, theta=X, theta_b=np.roll(X, 1) + NOISE, tau=FORCE))
+    assert "reference" not in found and found["input"] == "tau"
+
+
+def test_a_base_that_moves_beside_a_force_is_told(tmp_path):
+    found = guess(write(tmp_path, **{"road [mm]": 10.0 * OTHER_X, "x [m]": X, "F [N]": FORCE}))
+    assert str(found.roles.choices["input"].recorded) == "F [N]"
+    assert any(
+        line.startswith("CHECK input: a motion of the base was recorded, too (road [mm])")
+        for line in found.lines()
+    )

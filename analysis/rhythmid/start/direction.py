@@ -4,10 +4,11 @@ from dataclasses import replace
 
 from rhythmid.record.inventory import Recorded
 from rhythmid.start.known import Choice, Known
-from rhythmid.start.meaning import words_of
+from rhythmid.start.meaning import names_a_place, words_of
 from rhythmid.start.relation import Follows, follows, predicts
 
 COPY = 0.9  # correlation with its command from which an answer is the same quantity
+LEAST_LAG = 2.5  # samples: two sensors of one motion may be that far apart by their filters and buses
 AGAINST = (
     4.0  # times the evidence for the one direction, from which that for the other one contradicts the lag
 )
@@ -17,7 +18,7 @@ AXES = frozenset("x y z".split())  # motions of one body in several directions, 
 def leads(first: Recorded, second: Recorded) -> Follows | None:
     """How the second follows the first, where it is a later copy of it and its past does not tell more of the first; None else."""
     told = follows(first, second)
-    if told.correlation < COPY or not told.is_copy or told.lag <= 0.0:
+    if told.correlation < COPY or not told.is_copy or told.lag * min(first.rate, second.rate) < LEAST_LAG:
         return None
     return None if predicts(second, first) > AGAINST * max(predicts(first, second), 1.0) else told
 
@@ -25,8 +26,8 @@ def leads(first: Recorded, second: Recorded) -> Follows | None:
 def by_direction(output: Choice, known: list[Known]) -> tuple[Choice, list[Known], list[str]]:
     """The output, what is known, and what a user should know, where another channel of its quantity leads or follows it as a copy.
 
-    The earlier one was asked for, the later one was measured, unless a name says otherwise. Motions of other joints, which may lead as
-    a motor leads its load, and axes of one body are left as they are.
+    The earlier one was asked for, the later one was measured, unless a name says otherwise. Motions of other joints or of places, which
+    may lead as a motor leads its load, and axes of one body are left as they are.
     """
     own = next(one for one in known if one.one is output.recorded)
     able = [one for one in known if one is not own and _is_alike(own, one)]
@@ -51,6 +52,8 @@ def _is_alike(own: Known, other: Known) -> bool:
     """Whether no name tells which of the two was asked for, and they may be one motion."""
     meaning = other.meaning
     if other.quantity != own.quantity or meaning.commanded is not None or meaning.forcing or meaning.base:
+        return False
+    if names_a_place(own.one) or names_a_place(other.one):
         return False
     axes = {words_of(one.one.said)[-1:] == [axis] for one in (own, other) for axis in AXES}
     joints = {meaning.joint, own.meaning.joint} - {""}

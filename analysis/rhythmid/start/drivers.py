@@ -43,6 +43,10 @@ def drivers(
     elif base:
         found["input"], kind = _moving_base(base)
         return found, kind, of
+    for role in ("input", "effort"):
+        if base and role in found:
+            found[role] = _beside_base(found[role], base)
+            break
     if reference is not None and ("effort" in found or "input" not in found):
         if "input" in found or "effort" in found:
             found["reference"] = reference
@@ -50,6 +54,13 @@ def drivers(
             found["input"] = reference
             return found, "reference", of
     return found, "force", of
+
+
+def _beside_base(choice: Choice, base: list[Known]) -> Choice:
+    """The choice with a doubt where a motion of the base was recorded, too, which is left unused."""
+    listed = ", ".join(str(one.one) for one in base)
+    doubt = f"a motion of the base was recorded, too ({listed}), and is not used: where it is what drives, make it the input, with its kind"
+    return replace(choice, doubts=(*choice.doubts, doubt))
 
 
 def _moving_base(base: list[Known]) -> tuple[Choice, InputKind]:

@@ -19,13 +19,14 @@ WORDS: dict[Quantity, frozenset[str]] = {
     "velocity": frozenset("velocity velocities vel speed rate omega twist dq qd qdot thetadot dtheta xdot dx angvel".split()),
     "acceleration": frozenset("acceleration accelerations accel acc ddq qdd xddot ddx".split()),
     "effort": frozenset(
-        "effort efforts torque torques tau force forces wrench current currents cur voltage volt volts pwm duty load trq "
+        "effort efforts torque torques tau force forces wrench current currents cur voltage volt volts pwm duty trq "
         "moment iq".split()
     ),
 }  # fmt: skip
 DEVICES: dict[str, Quantity] = {
     "encoder": "position",
     "enc": "position",
+    "load": "effort",  # a load cell's; the angle of a load is no effort
 }  # what a device measures, where no word says what it is of
 LETTERS: dict[str, Quantity] = {  # what one letter stands for by custom, where nothing else is said
     "q": "position", "x": "position", "y": "position", "z": "position", "v": "velocity", "w": "velocity", "a": "acceleration",
@@ -39,6 +40,7 @@ COMMANDED_LETTERS = frozenset("u r".split())
 MEASURED = frozenset(
     "meas measured act actual state states feedback fb est estimated present real raw filt filtered smoothed response".split()
 )
+PLACES = frozenset("motor link gear rotor shaft sensor imu camera vicon mocap optitrack laser lidar".split())
 FORCING = frozenset("forcing pump pumping disturbance perturbation external".split())
 BASE = frozenset(
     "base table ground shaker platform floor road terrain foundation seismic earthquake quake".split()
@@ -169,6 +171,11 @@ def says_that_it_drives(one: Recorded) -> bool:
 def says_base(one: Recorded) -> bool:
     """Whether a word of its name says that it is of the base."""
     return bool({*words_of(one.said), *words_of(one.topic)} & BASE)
+
+
+def names_a_place(one: Recorded) -> bool:
+    """Whether its name says where or by what it was measured."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & (PLACES | DEVICES.keys()))
 
 
 def letter_of(one: Recorded) -> str:
