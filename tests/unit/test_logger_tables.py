@@ -113,6 +113,16 @@ def test_a_measurement_file_of_labview_is_read_with_its_units(tmp_path):
     np.testing.assert_allclose(found.recorded[0].time, TIME)
 
 
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_rows_of_labview_without_times_have_those_of_its_head(tmp_path, decimal):
+    head = LVM.replace("X_Columns\tOne", "X_Columns\tNo").replace("0.01\t0.01", f"0{decimal}01\t0{decimal}01")
+    rows = ["\t" + "\t".join(row.split(",")[1:]).replace(".", decimal) for row in ROWS]
+    found = inventory(write(tmp_path, rows, head, name="run.lvm"))
+    assert [str(one) for one in found.recorded] == ["Position [Volts]", "Force [Newtons]"]
+    np.testing.assert_allclose(found.recorded[0].time, TIME)
+    np.testing.assert_allclose(found.recorded[0].value, Q)
+
+
 def test_a_head_that_stands_in_the_middle_again_is_no_row(tmp_path):
     table = Table.load(write(tmp_path, [*ROWS[:50], "t,q,tau", *ROWS[50:]]))
     np.testing.assert_allclose(table.column("q"), Q)

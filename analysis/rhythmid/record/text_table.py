@@ -19,7 +19,7 @@ from rhythmid.record.clock_time import seconds
 from rhythmid.record.compression import largest
 from rhythmid.record.lvm_head import lvm_head
 from rhythmid.record.text_cells import COMMENTS, cells_of, content, is_number, number_of
-from rhythmid.record.text_head import names_of, with_units
+from rhythmid.record.text_head import names_of
 from rhythmid.record.text_rows import numbers_of, rows_in
 
 TEXT = (".csv", ".tsv", ".txt", ".dat", ".lvm", ".log")
@@ -63,7 +63,8 @@ def read_text(path: Path) -> dict[str, Any]:
     if path.suffix.lower() == COMPRESSED:
         _check_size(path)
     with _opened(path, encoding) as file:
-        dialect = dialect_of(list(islice(file, LOOKED_AT)), str(path))
+        begin = list(islice(file, LOOKED_AT))
+    dialect, lvm = dialect_of(begin, str(path)), lvm_head(begin)
     with _opened(path, encoding) as file:
         lines = islice(file, dialect.first, None)
         rows = rows_in(lines, dialect.first, dialect.separator, dialect.head)
@@ -79,6 +80,8 @@ def read_text(path: Path) -> dict[str, Any]:
     if words:
         cells = [cells_of(text, dialect.separator) for text in rows.texts]
         found |= {dialect.names[place]: _words([row[place] for row in cells]) for place in words}
+    if lvm is not None and lvm.step > 0.0:
+        found[dialect.names[0]] = lvm.times(len(rows))
     return {name: found[name] for name in dialect.names}
 
 
@@ -101,10 +104,8 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
     numeric = tuple(index for index, cell in enumerate(cells) if number_of(cell, decimal) is not None)
     above = _names_above(split[:place], used[place - 1][1] if place else "", len(cells))
     head = names_of(above, len(cells))
-    if head is not None and lvm is not None and len(head) > len(lvm.units) > 0:
-        head = with_units(
-            head, ["s" if head[0] == "X_Value" else "", *lvm.units, *[""] * (len(head) - len(lvm.units) - 1)]
-        )
+    if head is not None and lvm is not None:
+        head = lvm.names(head, len(cells))
     if head is None:
         head = _remark(lines[: used[place][0]], separator, len(cells)) or [str(n) for n in range(len(cells))]
     if not head[-1] and not cells[-1]:
