@@ -48,3 +48,15 @@ def test_messages_with_units_of_their_own_are_not_marked(tmp_path):
 def test_a_unit_of_time_that_only_the_steps_tell_is_marked(tmp_path, scale, marked):
     np.savez(tmp_path / "run.npz", t=scale * TIME, x=X, f=FORCE)
     assert ("no heading tells the unit of the times" in guess(tmp_path / "run.npz").signals) == marked
+
+
+def test_volts_of_a_position_sensor_are_no_effort_and_its_scale_is_asked_for(tmp_path):
+    np.savez(tmp_path / "run.npz", t=TIME, **{"Position [V]": X, "Force [N]": FORCE})
+    found = guess(tmp_path / "run.npz")
+    assert {role: str(one.recorded) for role, one in found.roles.choices.items()} == {
+        "output": "Position [V]",
+        "input": "Force [N]",
+    }
+    assert "CHECK: its heading says V, and m is needed: scale:" in found.signals
+    np.savez(tmp_path / "fed.npz", t=TIME, position=X, **{"motor voltage [V]": FORCE})
+    assert str(guess(tmp_path / "fed.npz").roles.choices["input"].recorded) == "motor voltage [V]"

@@ -125,7 +125,7 @@ def rotary_of(one: Recorded) -> tuple[bool | None, str]:
         return True, f"its unit is {one.written_unit}"
     if one.unit in ("m", "m/s", "m/s^2", "N"):
         return False, f"its unit is {one.written_unit}"
-    if force_unit_of(one) in ("V", "A", "1"):
+    if force_unit_of(one) in ELECTRICAL and meaning_of(one).quantity == "effort":
         return True, "it feeds a motor"
     for word in [*words_of(one.said), *words_of(one.joint), *words_of(one.topic)]:
         if word in LINEAR:
@@ -196,6 +196,8 @@ def says_who_asks(one: Recorded) -> bool:
 
 
 def _quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity | None, str, bool]:
+    if one.unit in ELECTRICAL and (motion := _motion_word(near)):
+        return motion[1], f"its name says {motion[0]!r}, and a sensor's volts or amperes are no effort", True
     if one.unit in BY_UNIT:
         return BY_UNIT[one.unit], f"its heading says {one.written_unit}", True
     for words, where in ((near, "name"), (far, "topic")):
@@ -210,6 +212,15 @@ def _quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity 
         if word in LETTERS:
             return LETTERS[word], f"{word!r} usually stands for that", False
     return None, "", False
+
+
+def _motion_word(near: list[str]) -> tuple[str, Quantity] | None:
+    """The word of a name that says a motion, and which; None where the last one that says a quantity says an effort."""
+    for word in reversed(near):
+        for quantity, known in WORDS.items():
+            if word in known:
+                return None if quantity == "effort" else (word, quantity)
+    return None
 
 
 def _one(words: list[str], known: frozenset[str]) -> str:

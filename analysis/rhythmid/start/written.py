@@ -182,6 +182,10 @@ def _unit(role: str, one: Recorded, roles: Roles, units: Units) -> str:
 
 def _unit_doubt(one: Recorded, unit: str) -> list[str]:
     """A comment on a unit that neither a heading nor the type of a message tells."""
+    if one.unit and one.unit != unit:
+        return comment(
+            f"  CHECK: its heading says {one.written_unit}, and {unit} is needed: scale: how many {unit} one {one.unit} is."
+        )
     if tells_unit(one):
         return []
     return comment(
