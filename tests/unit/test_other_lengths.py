@@ -37,6 +37,8 @@ def test_an_array_that_does_not_go_with_the_time_is_told_with_the_reason(tmp_pat
     assert f"CHECK {told}" in found.lines() and "CHECK: left out, because" in found.signals
     report = quality_report(tmp_path / "run.npz", Signals.from_text(SIGNALS))
     assert f"  note: {told}" in report.lines()
+    (tmp_path / "signals.yaml").write_text(f"tables: {{file: run.npz}}\n{SIGNALS}")
+    assert f"  note: {told}" in quality_report(tmp_path / "signals.yaml").lines()
 
 
 def test_a_few_parameters_are_no_recording(tmp_path):

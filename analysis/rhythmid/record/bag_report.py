@@ -183,7 +183,8 @@ def quality_report(
         else:
             record = read_record(source, signals)
             parts = {"": record}
-            notes += [] if signals is None else read_length_notes(source, signals)
+            named = Signals.load(source) if source.suffix in (".yaml", ".yml") else signals
+            notes += [] if named is None else read_length_notes(source, named)
         for begin, one in parts.items():
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             notes += [note for note in one.quality.notes if note not in notes]

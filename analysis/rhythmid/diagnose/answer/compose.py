@@ -117,7 +117,10 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         ),
         excluded=tuple(Untried(" + ".join(added), why) for added, why in found.excluded),
         heldout=held,
-        notes=(*notes, *held_out_zero_notes(fit, result.unseen if case.holdout else ())),
+        notes=(
+            *notes,
+            *held_out_zero_notes(fit, result.unseen if case.holdout and not case.budget.spent else ()),
+        ),
         assumptions=(ONE_CLOCK,) if any(one.command is not None for one in series) else (),
     )
 
