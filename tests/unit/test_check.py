@@ -137,6 +137,16 @@ def test_the_size_and_the_columns_of_a_table_are_told(tmp_path):
     assert quality_report(tmp_path / "named.yaml").size == size
 
 
+def test_a_recording_whose_position_lies_elsewhere_is_noted(tmp_path, command):
+    checked(tmp_path)
+    (tmp_path / "moved").mkdir()
+    table(tmp_path / "moved", U, Y + 50.0).rename(tmp_path / "moved.csv")
+    answer = command("check", "run.csv", "moved.csv", "--signals", "signals.yaml")
+    assert answer.code == 0 and answer.out.splitlines()[-1].startswith(
+        "note: the output of moved is between "
+    )
+
+
 def test_a_model_is_told_in_one_line_with_the_records(tmp_path, command):
     checked(tmp_path)
     (tmp_path / "model.yaml").write_text(MODEL)

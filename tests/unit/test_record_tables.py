@@ -239,9 +239,9 @@ def test_a_spoilt_text_table_is_refused_with_one_line(tmp_path, fault):
         ("run.gz", gzip.compress(text().encode()), "is not a table"),
         ("run.parquet", b"PAR1", "run.parquet: cannot be read"),
         (
-            "run.xlsx",
+            "run.doc",
             b"PK",
-            "is not a table; .mat, .h5, .hdf5, .npz, .parquet and .csv, .tsv, .txt, .dat can be read",
+            "is not a table; .mat, .h5, .hdf5, .npz, .parquet and .csv, .tsv, .txt, .dat, .lvm, .log can be read",
         ),
     ],
 )

@@ -16,6 +16,7 @@ from rhythmid.identify.record_zero import RECORD_ZERO
 from rhythmid.identify.series import hold_out_tail, prepare
 from rhythmid.identify.zero_estimates import zeros_told
 from rhythmid.model import Model
+from rhythmid.record.elsewhere import elsewhere_notes
 from rhythmid.record.record import Channel, Record
 from rhythmid.simulation.simulate import simulate
 
@@ -127,3 +128,36 @@ def test_a_mean_that_shifts_with_the_amplitude_is_physics_and_no_zero():
     assert found is plain
     alone = best_fit(records(machine, protocol), hopper())
     assert with_own_zeros(alone) == (alone, ())
+
+
+PENDULUM = """
+units: {force: rad/s^2, position: rad}
+inertia: {mass: {value: 1.0, fixed: true}}
+force:
+  - pendulum_gravity: {moment: {value: 20.0}, reference: {value: 0.0}}
+  - viscous_damper: {damping: {value: 0.3}}
+"""
+
+
+@pytest.mark.parametrize("text", [NOMINAL, PENDULUM], ids=["spring", "pendulum"])
+@pytest.mark.parametrize("zero", [0.0, 0.2, 3.1])
+def test_a_held_out_record_that_was_zeroed_elsewhere_is_told(text, zero):
+    machine = Model.from_text(text, catalogue=CATALOGUE)
+    answer = diagnose(decays(machine, {"first": 0.0}), machine, decays(machine, {"held": zero}), FRICTION)
+    told = [note for note in answer.diagnosis.notes if "zero of the held-out held" in note]
+    assert len(told) == (zero != 0.0)
+    for note in told:
+        value = float(note.split(" is ")[1].split()[0])
+        assert value == pytest.approx(zero, abs=0.01) and f"offset: {-value:.3g}" in note
+
+
+def test_a_held_out_record_that_the_model_does_not_explain_has_no_zero_to_be_told():
+    held = decays(nominal().with_values({"linear_spring.stiffness": 40.0}), {"held": 0.0})
+    answer = diagnose(decays(nominal(), {"first": 0.0}), nominal(), held, FRICTION)
+    assert not any("zero of the held-out" in note for note in answer.diagnosis.notes)
+
+
+def test_positions_that_lie_far_apart_are_told_and_others_are_not():
+    first, near, far = decays(nominal(), {"first": 0.0, "near": 0.4, "far": 9.0})
+    (note,) = elsewhere_notes([first, near, far])
+    assert note.startswith("the output of far is between ") and "offset:" in note

@@ -44,6 +44,7 @@ def check(
     from rhythmid.errors import InputError
     from rhythmid.progress_bar import progress
     from rhythmid.record.bag_report import BagReport, quality_report
+    from rhythmid.record.elsewhere import elsewhere_notes
 
     require_new(json, report)
     if report is not None and len(bags) > 1:
@@ -65,11 +66,13 @@ def check(
         refused += found.problems
         for line in found.lines():
             terminal.say(line)
+    records = [found.record for found in made if found.usable and found.record is not None]
+    for line in elsewhere_notes(records):
+        terminal.say(f"note: {line}")
     try:
         if model is not None:
             from rhythmid.commands.model_line import model_lines
 
-            records = [found.record for found in made if found.usable and found.record is not None]
             for line in model_lines(model, records, elements or ()):
                 terminal.say(line)
     except InputError as error:

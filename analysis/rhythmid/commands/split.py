@@ -11,6 +11,7 @@ from rhythmid.commands.terminal import Terminal
 EXAMPLES = (
     "rhythmid split episodes.parquet --out episodes",
     "rhythmid split log.csv --by run --out runs",
+    "rhythmid split runs.mat --out runs",
 )
 
 
@@ -23,17 +24,23 @@ def split(
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Write each recording of a table that holds several, one below the other, as a table of its own (.npz).
+    """Write each recording of a table that holds several, one below the other or in a struct array, as a table of its own (.npz).
 
-    Without --by they are told apart by a column such as episode_index, else by where the time begins anew.
+    Without --by they are told apart by the struct that holds each, else by a column such as episode_index, else by where the time
+    begins anew.
     """
-    from rhythmid.record.split import recordings
+    from rhythmid.record.grouped_runs import grouped_runs
+    from rhythmid.record.split import recordings, split_runs
     from rhythmid.record.split import split as write
     from rhythmid.record.table import Table
 
     found = Table.load(table)
-    why, rows = recordings(found, by)
-    made = write(found, rows, out)
+    runs = grouped_runs(found) if by is None else None
+    if runs is not None:
+        why, made = "the struct that holds each", split_runs(found, runs, out)
+    else:
+        why, rows = recordings(found, by)
+        made = write(found, rows, out)
     terminal = Terminal(quiet)
     terminal.say(f"{out}: {len(made)} recordings by {why}; go on with")
     terminal.say(f"  rhythmid init {made[0]}")

@@ -10,6 +10,7 @@ from rhythmid import document
 from rhythmid.errors import InputError
 from rhythmid.record.block import Block, Topic, Wanted
 from rhythmid.record.compression import decompress_file
+from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.mcap_reader import McapReader
 from rhythmid.record.sqlite_reader import SqliteReader
@@ -44,6 +45,8 @@ class Bag:
         self.topics: dict[str, Topic] = {}
         self.truncated = False
         self.notes: list[str] = []
+        if self.path.exists():
+            refuse_foreign(self.path)
         if self.path.is_dir():
             self.files = self._files_of_directory()
         elif not self.path.exists():

@@ -16,6 +16,7 @@ from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.gaps import Cut, cut_at_gaps
 from rhythmid.record.joint_record import JointSignals, names_joints, read_joint_record
 from rhythmid.record.message_types import stamp_path
+from rhythmid.record.other_lengths import read_length_notes
 from rhythmid.record.quality import ChannelQuality
 from rhythmid.record.read import read_record
 from rhythmid.record.record import Record
@@ -182,6 +183,8 @@ def quality_report(
         else:
             record = read_record(source, signals)
             parts = {"": record}
+            named = Signals.load(source) if source.suffix in (".yaml", ".yml") else signals
+            notes += [] if named is None else read_length_notes(source, named)
         for begin, one in parts.items():
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             notes += [note for note in one.quality.notes if note not in notes]

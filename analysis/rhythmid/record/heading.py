@@ -19,7 +19,7 @@ SI = ("s", "m", "rad", "N", "N*m", "m/s", "rad/s", "m/s^2", "rad/s^2", "A", "V",
 SPELLINGS = {
     "°": "deg", "degree": "deg", "degrees": "deg", "degs": "deg", "dps": "deg/s", "sec": "s", "secs": "s", "seconds": "s",
     "second": "s", "msec": "ms", "millis": "ms", "usec": "us", "micros": "us", "µs": "us", "nsec": "ns", "nanos": "ns",
-    "nanoseconds": "ns", "milliseconds": "ms", "microseconds": "us", "radians": "rad", "radian": "rad", "meter": "m",
+    "nanoseconds": "ns", "milliseconds": "ms", "microseconds": "us", "radians": "rad", "radian": "rad", "newtons": "N", "newtonmeters": "Nm", "newtonmeter": "Nm", "meter": "m",
     "meters": "m", "metre": "m", "metres": "m", "newton": "N", "amp": "A", "amps": "A", "volt": "V", "volts": "V",
     "rads": "rad/s", "mps": "m/s", "radps": "rad/s", "degps": "deg/s", "r/min": "rpm", "1/min": "rpm",
 }  # fmt: skip
@@ -29,6 +29,7 @@ SUFFIXES = (
     "radians", "rads", "radps", "degps", "dps", "rpm", "mps", "mm", "cm", "mrad", "nm", "mnm", "n", "m", "ma", "a", "v", "mv", "msec",
     "ms", "usec", "us", "nsec", "ns", "nanoseconds", "milliseconds", "seconds", "secs", "sec", "s",
 )  # fmt: skip
+COUNTERS = ("millis", "micros", "nanos")  # of Arduino's clock: names that are units
 LETTERS = {  # a single letter is a unit only behind a word that it suits: pos_a is no current
     "s": "t time timestamp stamp elapsed", "m": "pos position x y z height displacement disp length travel stroke",
     "n": "f force load thrust", "a": "i iq current cur", "v": "u voltage volt supply",
@@ -74,6 +75,8 @@ def heading_of(column: str) -> Heading:
     """The heading `column` taken apart: a unit in brackets, behind a slash, as a suffix after an underscore or with a capital, or
     glued to a name that it suits."""
     column = column.strip()
+    if column.lower() in COUNTERS and (known := _unit(column)) is not None:
+        return Heading(column, *known, column)
     for pattern in (_BRACKETS, _SLASH):
         if (match := pattern.match(column)) and (known := _unit(match[2])) is not None:
             return Heading(match[1].strip() or column, *known, match[2])
@@ -101,8 +104,13 @@ def _glued(column: str) -> str:
 
 def is_unit(text: str) -> bool:
     """Whether a cell below a column's name can be its unit: one that is known, a dash or nothing."""
-    bare = text.strip().strip("[](){}").strip()
+    bare = bare_unit(text)
     return bare in ("", "-", "1", "%") or _unit(bare) is not None
+
+
+def bare_unit(text: str) -> str:
+    """A unit without the brackets around it."""
+    return text.strip().strip("[](){}").strip()
 
 
 def _unit(text: str) -> tuple[str, float] | None:

@@ -14,13 +14,21 @@ from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Topic
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.field import NAMES, Field
+from rhythmid.record.foreign_file import refuse_foreign
+from rhythmid.record.grouped_runs import grouped_runs
 from rhythmid.record.heading import heading_of
+from rhythmid.record.joined_stamps import stamp_pairs
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
 from rhythmid.record.message_types import typestore
+from rhythmid.record.other_lengths import length_notes, unequal_arrays
 from rhythmid.record.signals import Clock
 from rhythmid.record.table import SUFFIXES, WIDEST, Table, table_suffix
+from rhythmid.record.table_clock import COUNTER, is_even, is_time, table_clock
 
 Array = NDArray[np.float64]
+OBJECTS = (
+    "a table or timetable of MATLAB is an object that others cannot read: there  writetimetable(T, 'run.csv')"
+)
 DEEPEST = 5  # messages within messages that are looked into
 SKIPPED_PACKAGES = (
     "diagnostic_msgs",
@@ -31,20 +39,6 @@ SKIPPED_PACKAGES = (
     "nav_msgs",
 )
 SKIPPED_FIELDS = re.compile(r"header|stamp|.*covariance|orientation|layout|points|time_from_start")
-TIME = re.compile(
-    r"(?:elapsed_?|time_?|wall_?|ros_?)*(?:t|time|timestamp|stamp|seconds|secs?|clock)", re.IGNORECASE
-)
-KIND_OF_TIME = re.compile(r".*_(?:time|timestamp|stamp|clock)", re.IGNORECASE)  # pi_time, cpu_time
-COUNTER = re.compile(
-    r"|index|idx|i|n|k|id|no|nr|frame|sample|step|row|count|counter|seq|unnamed: 0", re.IGNORECASE
-)
-NEAR = 0.5  # of the median step of an unnamed column: a step that differs by no more is a usual one
-USUAL = 0.95  # share of usual steps from which such a column is taken for the time; the others are gaps, and may be as long as they like
-MOST_NAMED = 12  # columns that a complaint lists
-FORWARD = 0.99  # share of steps of a time that go forward
-# the longest sample period [s] that is thought of: a time without a unit whose steps are longer is in ms, µs or ns
-LONGEST_STEP = 0.5
-NANOSECOND = 1e-9  # s, the smallest unit in which times are written
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +50,7 @@ class Recorded:
     topic, type, field : of a message; empty for a column.
     column : name of the column; empty for a message's field.
     joint : the joint whose number it is, where a name stands beside it.
+    side : `left` or `right` where another column differs from it in that only; empty else.
     said : what names it within its message or table, such as `position` or the heading without its unit.
     unit, scale : SI unit, empty where not told, and how much of it one recorded unit is.
     time, value : float64[n], s and as recorded times `scale`; a message's time is that of its receipt.
@@ -74,6 +69,7 @@ class Recorded:
     scale: float = 1.0
     written_unit: str = ""
     stamped: bool = False
+    side: str = ""
 
     def __str__(self) -> str:
         return f"{self.topic} {self.field}" if self.topic else self.column
@@ -87,8 +83,8 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Inventory:
-    """All numbers of a source that change, how its times are told and why, what was left out, and of that what stands still at
-    another value than zero."""
+    """All numbers of a source that change, how its times are told and why, what was left out, of that what stands still at
+    another value than zero, and what a user should know."""
 
     path: Path
     recorded: tuple[Recorded, ...]
@@ -96,6 +92,7 @@ class Inventory:
     clock_reason: str
     left_out: tuple[str, ...] = ()
     constant: tuple[Recorded, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def is_bag(self) -> bool:
@@ -108,8 +105,15 @@ def inventory(source: str | Path, rate: float | None = None) -> Inventory:
     source = Path(source)
     if not source.exists():
         raise InputError(f"{source}: no such file or directory")
+    refuse_foreign(source)
     if table_suffix(source) in SUFFIXES:
-        return _of_table(Table.load(source), rate)
+        table = Table.load(source)
+        runs = grouped_runs(table)
+        if runs is None:
+            return _of_table(table, rate)
+        found = _of_table(runs.alone(table), rate)
+        note = f"it holds {runs.note}, and this is the first; each as a table of its own:  rhythmid split {source} --out runs"
+        return replace(found, notes=(note, *found.notes))
     if not is_bag(source):
         raise InputError(
             f"{source}: is neither a bag (directory, .mcap, .db3) nor a table ({', '.join(SUFFIXES)})"
@@ -121,23 +125,28 @@ def inventory(source: str | Path, rate: float | None = None) -> Inventory:
 def _of_table(table: Table, rate: float | None) -> Inventory:
     columns = list(table.vectors())
     if not columns:
-        raise InputError(f"{table.path}: holds no column of numbers")
-    count = max((len(value) for _, value in columns), key=[len(value) for _, value in columns].count)
+        of_matlab = f"; {OBJECTS}" if table_suffix(table.path) == ".mat" else ""
+        raise InputError(f"{table.path}: holds no column of numbers{of_matlab}")
+    count = _rows_of(columns)
     unequal = [(name, value) for name, value in columns if len(value) != count]
     columns = [(name, value) for name, value in columns if len(value) == count]
     if rate is not None:
         clock, reason, every = Clock("rate", rate=rate), "as given with --rate", np.arange(count) / rate
     else:
-        clock, reason = _table_clock(table.path, columns, unequal)
+        clock, reason = table_clock(table.path, columns, unequal)
         every = dict(columns)[str(clock.column)] * clock.scale
     found, constant = [], []
     left = [f"{name}: holds words, such as {word!r}" for name, word in table.words()]
+    left += map(str, unequal_arrays(table, count))
     merged = is_merged(value for name, value in columns if name != clock.column)
+    parts = {part for pair in stamp_pairs(table.columns).values() for part in pair}
     for name, value in columns:
         heading, time = heading_of(name), every
-        if clock.kind == "column" and (name == clock.column or _is_time(name, value)):
+        if name in parts:
             continue
-        if clock.kind == "rate" and (_is_time(name, value) or (name.isdigit() and _even(value))):
+        if clock.kind == "column" and (name == clock.column or is_time(name, value)):
+            continue
+        if clock.kind == "rate" and (is_time(name, value) or (name.isdigit() and is_even(value))):
             left.append(f"{name}: goes forward like a time")
             continue
         if merged or is_sampled_rarely(value):
@@ -153,81 +162,19 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
             constant.append(one)
         else:
             found.append(one)
-    return Inventory(table.path, tuple(found), clock, reason, tuple(left), _not_zero(constant))
+    notes = length_notes(table, count)
+    return Inventory(table.path, tuple(found), clock, reason, tuple(left), _not_zero(constant), notes)
+
+
+def _rows_of(columns: list[tuple[str, Array]]) -> int:
+    """The number of rows that most columns have, of those among which one is called a time before those without."""
+    lengths = [len(value) for _, value in columns]
+    timed = {len(value) for name, value in columns if is_time(name, value)}
+    return max(lengths, key=lambda count: (count in timed and lengths.count(count) > 1, lengths.count(count)))
 
 
 def _not_zero(constant: list[Recorded]) -> tuple[Recorded, ...]:
     return tuple(one for one in constant if np.isfinite(one.value).all() and one.value[0] != 0.0)
-
-
-def _is_time(name: str, value: Array) -> bool:
-    """Whether a column is called a time, or a kind of time, and goes forward as one."""
-    called = _called(name)
-    return (_is_plain_time(name) or KIND_OF_TIME.fullmatch(called) is not None) and _forward(value)
-
-
-def _is_plain_time(name: str) -> bool:
-    """Whether a column is called a time and nothing else, or its unit is one of time."""
-    return TIME.fullmatch(_called(name)) is not None or heading_of(name).unit == "s"
-
-
-def _called(name: str) -> str:
-    return heading_of(name).name.rsplit(".", 1)[-1].replace(" ", "_")
-
-
-def _forward(value: Array) -> bool:
-    step = np.diff(value)
-    if not len(step) or not np.isfinite(value).all():
-        return False
-    return bool(value[-1] > value[0]) and float(np.mean(step >= 0.0)) >= FORWARD
-
-
-def _even(value: Array) -> bool:
-    """Whether a column goes forward by steps that are mostly of one size, as a time does that has gaps, too."""
-    if not _forward(value):
-        return False
-    step = np.diff(value)
-    usual = float(np.median(step))
-    in_any_unit = 0.0 < usual <= LONGEST_STEP / NANOSECOND
-    return in_any_unit and float(np.mean(np.abs(step - usual) <= NEAR * usual)) >= USUAL
-
-
-def _table_clock(
-    path: Path, columns: list[tuple[str, Array]], unequal: list[tuple[str, Array]]
-) -> tuple[Clock, str]:
-    """The column that holds the time. Raises InputError where there is none among those of equal length; `unequal` are the others."""
-    for name, value in sorted(columns, key=lambda column: not _is_plain_time(column[0])):
-        if _is_time(name, value):
-            heading = heading_of(name)
-            scale, why = heading.scale, f"its heading says {heading.written}" if heading.unit else ""
-            if not why:
-                scale, why = _guessed_scale(value)
-            return Clock("column", column=name, scale=scale), f"called a time, and goes forward; {why}"
-    for name, value in columns:
-        untold = COUNTER.fullmatch(name) is None and not heading_of(name).unit
-        if untold and _even(value):
-            if name.isdigit() or not (np.diff(value) == 1.0).all():
-                scale, why = _guessed_scale(value)
-                return Clock(
-                    "column", column=name, scale=scale
-                ), f"the first column that goes forward by steps of one size; {why}"
-    names = ", ".join(name for name, _ in columns[:MOST_NAMED])
-    if len(columns) > MOST_NAMED:
-        names += f" and {len(columns) - MOST_NAMED} more"
-    others = ", ".join(f"{name} has {len(value)} rows" for name, value in unequal)
-    why = f"; of another length than their {len(columns[0][1])} rows: {others}" if others else ""
-    raise InputError(
-        f"{path}: no column goes forward like a time ({names}){why}; give the rows' rate with --rate HZ"
-    )
-
-
-def _guessed_scale(value: Array) -> tuple[float, str]:
-    """Seconds in one unit of a time whose unit is not told, by the size of its steps."""
-    step = float(np.median(np.diff(value)))
-    for scale, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
-        if step * scale < LONGEST_STEP:
-            return scale, f"steps of {step:.4g} are taken to be {unit}"
-    return NANOSECOND, f"steps of {step:.4g} are taken to be ns"
 
 
 def _of_bag(bag: Bag) -> Inventory:

@@ -15,6 +15,7 @@ from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block, Topic
 from rhythmid.record.clocks import clock_notes
 from rhythmid.record.columns import Columns, read_columns
+from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.held_back import evened
 from rhythmid.record.judged import judged
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
@@ -91,6 +92,7 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
         raise InputError(f"{source}: {error.strerror}") from None
     if not there:
         raise InputError(f"{source}: no such file or directory")
+    refuse_foreign(source)
     if signals is not None and table_suffix(source) in SUFFIXES:
         return read_tables(signals.of_table(source))
     if not is_bag(source):

@@ -1,11 +1,11 @@
-"""A table that holds several recordings, one below the other, as a table for each of them.
+"""A table that holds several recordings, one below the other or each in a struct of its own, as a table for each of them.
 
 Data sets for learning keep their episodes in one table, with a column that numbers them; logs that were appended to one another begin
-their time anew.
+their time anew; MATLAB's struct arrays hold a run in each element.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from shutil import rmtree
 from typing import Any
@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.output import require_writable
+from rhythmid.record.grouped_runs import TIME, Runs
 from rhythmid.record.table import Table, table_name
 
 NUMBERED = re.compile(
     r"(?:.*[._ ])?(?:episode|trial|run|trajectory|segment)(?:[._ ]?(?:index|id|number|nr|no))?", re.IGNORECASE
 )
-TIME = re.compile(r"(?:.*[._ ])?(?:time|timestamp|stamp|t)(?:[._ ]?(?:s|ms|us|ns))?", re.IGNORECASE)
 MOST = 10_000  # recordings that a table may be split into
 Rows = NDArray[np.int64]
 
@@ -74,23 +74,45 @@ def split(table: Table, rows: Mapping[str, Rows], folder: Path) -> list[Path]:
 
     Raises InputError where the folder exists or cannot be written.
     """
+    count = sum(map(len, rows.values()))
+    columns = {
+        name: values for name, values in _numbers(table.columns).items() if values.shape[:1] == (count,)
+    }
+    parts = ({name: values[own] for name, values in columns.items()} for own in rows.values())
+    return _written(table, list(rows), parts, folder)
+
+
+def split_runs(table: Table, runs: Runs, folder: Path) -> list[Path]:
+    """Write the arrays of each run as `folder/<table>_<number>.npz`; texts are left out.
+
+    Raises InputError where the folder exists or cannot be written.
+    """
+    numbered = runs.numbered()
+    return _written(table, list(numbered), map(_numbers, numbered.values()), folder)
+
+
+def _numbers(columns: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """Those of the columns that hold numbers."""
+    arrays = {name: np.asarray(values) for name, values in columns.items()}
+    return {name: values for name, values in arrays.items() if values.dtype.kind in "fiub"}
+
+
+def _written(
+    table: Table, names: list[str], parts: Iterable[Mapping[str, NDArray[Any]]], folder: Path
+) -> list[Path]:
+    """The files that hold the parts, all of them or none."""
     if folder.exists():
         raise InputError(f"{folder}: exists already; name another folder or remove it")
     require_writable(folder)
-    count = sum(map(len, rows.values()))
-    columns: dict[str, NDArray[Any]] = {
-        name: values for name, value in table.columns.items()
-        if (values := np.asarray(value)).dtype.kind in "fiub" and values.shape[:1] == (count,)
-    }  # fmt: skip
     partial = folder.with_name(f".{folder.name}.partial")
-    made = [f"{table_name(table.path)}_{name}.npz" for name in rows]
+    made = [f"{table_name(table.path)}_{name}.npz" for name in names]
     try:
         partial.mkdir(parents=True, exist_ok=True)
-        for name, own in zip(made, rows.values(), strict=True):
+        for name, columns in zip(made, parts, strict=True):
             with ZipFile(partial / name, "w") as archive:  # savez takes no column called `file`
                 for column, values in columns.items():
                     with archive.open(f"{column}.npy", "w") as file:
-                        write_array(file, values[own], allow_pickle=False)
+                        write_array(file, values, allow_pickle=False)
         partial.rename(folder)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error.strerror}") from None

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.record.compression import largest
+from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.hdf5_table import is_hdf5, read_hdf5
+from rhythmid.record.joined_stamps import with_joined_stamps
 from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.own_process import arrays_in_own_process
 from rhythmid.record.text_table import COMPRESSED, TEXT, read_text
@@ -51,12 +53,13 @@ class Table:
         }  # fmt: skip
         read = readers.get(table_suffix(path))
         if read is None:
+            refuse_foreign(path)
             raise InputError(
                 f"{path}: is not a table; .mat, {', '.join(HDF5)}, .npz, .parquet and {', '.join(TEXT)} can be read"
             )
         try:
             check_content(path)
-            return cls(path, read(path))
+            return cls(path, with_joined_stamps(read(path)))
         except FileNotFoundError:
             raise InputError(f"{path}: no such file") from None
         except InputError:
@@ -159,8 +162,16 @@ def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
         elif isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
             for number, one in enumerate(value):
                 yield from _flat(one, f"{above}{name}[{number}].")
+        elif _is_cell(value):
+            for number, one in enumerate(np.ravel(value)):
+                yield f"{above}{name}[{number}]", np.atleast_1d(np.asarray(one))
         else:
             yield above + name, np.atleast_1d(np.asarray(value))
+
+
+def _is_cell(value: Any) -> bool:
+    """Whether it is a cell of MATLAB that holds arrays."""
+    return isinstance(value, np.ndarray) and value.dtype.hasobject and any(np.ndim(one) for one in value.flat)
 
 
 def _npz(path: Path) -> dict[str, Any]:

@@ -4,10 +4,9 @@ spaces between the columns; decimal points or commas; cells in quotes.
 Nothing has to be said of a file: the separator is the one by which most lines are rows of numbers of one length.
 """
 
-import csv
 import gzip
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -18,13 +17,14 @@ import numpy as np
 from rhythmid.errors import InputError
 from rhythmid.record.clock_time import seconds
 from rhythmid.record.compression import largest
-from rhythmid.record.heading import is_unit
+from rhythmid.record.lvm_head import lvm_head
+from rhythmid.record.text_cells import COMMENTS, cells_of, content, is_number, number_of
+from rhythmid.record.text_head import names_of
+from rhythmid.record.text_rows import numbers_of, rows_in
 
-TEXT = (".csv", ".tsv", ".txt", ".dat")
+TEXT = (".csv", ".tsv", ".txt", ".dat", ".lvm", ".log")
 COMPRESSED = ".gz"
-COMMENTS = ("#", "%")
 SEPARATORS = ("\t", ";", ",", None)  # None: any number of spaces; in this order where two do equally well
-EMPTY = " \t\r\n;,\"'"  # what a line of empty cells is made of
 LOOKED_AT = 200  # lines from which the dialect is told: more than any head has
 ACROSS = 10  # times as many columns as rows, from which the lines of a table without names are its columns
 SAMPLE = 1 << 16  # bytes from which the encoding is told
@@ -42,6 +42,7 @@ class Dialect:
     first : number of the line, counted from 0, that holds the first row of numbers; the number of lines where none does.
     names : of the columns, with their units where the file tells them.
     numeric : positions of the columns that hold numbers.
+    head : cells of the line above the rows.
     """
 
     separator: str | None
@@ -49,6 +50,7 @@ class Dialect:
     first: int
     names: tuple[str, ...]
     numeric: tuple[int, ...]
+    head: tuple[str, ...] = ()
 
 
 def read_text(path: Path) -> dict[str, Any]:
@@ -61,11 +63,14 @@ def read_text(path: Path) -> dict[str, Any]:
     if path.suffix.lower() == COMPRESSED:
         _check_size(path)
     with _opened(path, encoding) as file:
-        dialect = dialect_of(list(islice(file, LOOKED_AT)), str(path))
+        begin = list(islice(file, LOOKED_AT))
+    dialect, lvm = dialect_of(begin, str(path)), lvm_head(begin)
+    with _opened(path, encoding) as file:
+        lines = islice(file, dialect.first, None)
+        rows = rows_in(lines, dialect.first, dialect.separator, dialect.head)
     count = len(dialect.names)
     words = [place for place in range(count) if place not in dialect.numeric]
-    with _opened(path, encoding) as file:
-        numbers = _rows(islice(file, dialect.first, None), dialect, dialect.numeric)
+    numbers = numbers_of(rows, dialect.separator, dialect.decimal, dialect.numeric)
     unnamed = dialect.names == tuple(map(str, range(count)))
     if unnamed and not words and ACROSS * len(numbers) <= count:
         return {str(place): row for place, row in enumerate(numbers)}
@@ -73,27 +78,34 @@ def read_text(path: Path) -> dict[str, Any]:
         dialect.names[place]: column for place, column in zip(dialect.numeric, numbers.T)
     }
     if words:
-        with _opened(path, encoding) as file:
-            lines = (line for line in islice(file, dialect.first, None) if _content(line))
-            cells = [_cells(line, dialect.separator) for line in lines]
+        cells = [cells_of(text, dialect.separator) for text in rows.texts]
         found |= {dialect.names[place]: _words([row[place] for row in cells]) for place in words}
+    if lvm is not None and lvm.step > 0.0:
+        found[dialect.names[0]] = lvm.times(len(rows))
     return {name: found[name] for name in dialect.names}
 
 
 def dialect_of(lines: list[str], name: str) -> Dialect:
     """The dialect of a table that begins with these lines. Raises InputError; `name` stands for the file."""
-    used = [(number, line) for number, line in enumerate(lines) if _content(line)]
+    lvm = lvm_head(lines)
+    if lvm is not None:
+        lines = ["" if number < lvm.lines else line for number, line in enumerate(lines)]
+    used = [(number, line) for number, line in enumerate(lines) if content(line)]
     if not used:
         raise InputError(f"{name}: is empty")
     separator, decimal, rows = max(_readings([line for _, line in used]), key=lambda one: _worth(one[2]))
     if not any(rows):  # no numbers: names alone
-        separator = max(SEPARATORS, key=lambda one: len(_cells(used[-1][1], one)))
-        head = _cells(used[-1][1], separator)
+        separator = max(SEPARATORS, key=lambda one: len(cells_of(used[-1][1], one)))
+        head = cells_of(used[-1][1], separator)
         return Dialect(separator, decimal, len(lines), tuple(head), tuple(range(len(head))))
-    place = next(index for index, row in enumerate(rows) if row)
-    cells = _cells(used[place][1], separator)
-    numeric = tuple(index for index, cell in enumerate(cells) if _number(cell, decimal) is not None)
-    head = _head([line for _, line in used[:place]], separator)
+    split = [cells_of(line, separator) for _, line in used]
+    place = _first_row(split, rows, decimal)
+    cells = split[place]
+    numeric = tuple(index for index, cell in enumerate(cells) if number_of(cell, decimal) is not None)
+    above = _names_above(split[:place], used[place - 1][1] if place else "", len(cells))
+    head = names_of(above, len(cells))
+    if head is not None and lvm is not None:
+        head = lvm.names(head, len(cells))
     if head is None:
         head = _remark(lines[: used[place][0]], separator, len(cells)) or [str(n) for n in range(len(cells))]
     if not head[-1] and not cells[-1]:
@@ -109,15 +121,17 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
         raise InputError(
             f"{name}: two columns have the same name in line {line} ({twice!r}); rename one of them"
         )
-    return Dialect(separator, decimal, used[place][0], tuple(head), numeric)
+    return Dialect(
+        separator, decimal, used[place][0], tuple(head), numeric, tuple(above[-1]) if above else ()
+    )
 
 
 def _readings(lines: list[str]) -> Iterator[tuple[str | None, str, list[int]]]:
     """Separator, decimal mark, and of each line how many numbers it holds where it is a row, else 0."""
     for separator in SEPARATORS:
-        split = [_cells(line, separator) for line in lines]
+        split = [cells_of(line, separator) for line in lines]
         for decimal in (".",) if separator == "," and not any('"' in line for line in lines) else (".", ","):
-            count = [sum(bool(cell) and _number(cell, decimal) is not None for cell in row) for row in split]
+            count = [sum(is_number(cell, decimal) for cell in row) for row in split]
             usual = Counter(len(row) for row, numbers in zip(split, count) if numbers).most_common(1)
             width = usual[0][0] if usual else 0
             yield separator, decimal, [n if len(row) == width else 0 for row, n in zip(split, count)]
@@ -128,97 +142,60 @@ def _worth(rows: list[int]) -> tuple[int, int]:
     return sum(rows), sum(1 for row in rows if row)
 
 
-def _head(above: list[str], separator: str | None) -> list[str] | None:
-    """Names of the columns from the lines above the first row, with a line of units below them where there is one."""
-    if not above:
-        return None
-    names = _cells(above[-1], separator)
-    if len(above) > 1 and all(is_unit(cell) for cell in names):
-        titles = _cells(above[-2], separator)
-        if len(titles) == len(names):
-            return [
-                f"{title} [{unit.strip('[]()')}]" if unit else title for title, unit in zip(titles, names)
-            ]
-    return names
+def _names_above(above: list[list[str]], last: str, count: int) -> list[list[str]]:
+    """The lines above the first row, without those that cannot name its `count` columns.
+
+    The last of them may have another separator than the rows. It is a title where it is one cell by any, and the beginning of a row
+    that was lost where it holds numbers only.
+    """
+    if not above or len(above[-1]) == count:
+        return above
+    for separator in SEPARATORS:
+        if len(cells := cells_of(last, separator)) == count and len(above[-1]) == 1:
+            return [*above[:-1], cells]
+    if len(above[-1]) == 1 and count > 1:  # a title, or a line between names and rows
+        return [] if any(letter.isalnum() for letter in last) else _names_above(above[:-1], "", count)
+    broken = len(above[-1]) < count and all(not cell or is_number(cell, ".") for cell in above[-1])
+    return above[:-1] if broken else above
 
 
 def _remark(lines: list[str], separator: str | None, count: int) -> list[str] | None:
-    """Names in the last comment line that has as many entries as there are columns."""
-    for line in reversed(lines):
-        text = line.strip().lstrip("#% ")
-        cells = _cells(text, separator)
-        if text and len(cells) == count:
-            return cells
-    return None
+    """Names, and units, in the last comment lines that have as many entries as there are columns."""
+    remarks = [line.strip() for line in lines if line.lstrip()[:1] in COMMENTS]
+    told = [cells_of(line.lstrip("#% "), separator) for line in remarks if line.lstrip("#% ")]
+    while told and len(told[-1]) != count:
+        told.pop()
+    return names_of(told, count)
 
 
-def _rows(lines: Iterable[str], dialect: Dialect, columns: tuple[int, ...]) -> np.ndarray:
-    """Numbers [rows, columns]; the slow way with Python's own conversion only where cells are empty or have decimal commas."""
+def _first_row(rows: list[list[str]], numbers: list[int], decimal: str) -> int:
+    """Which line is the first of numbers: not one of a title or of units that holds a number, too.
 
-    def value(cell: str) -> float:
-        found = _number(cell, dialect.decimal)
-        return float(cell) if found is None else found
-
-    def read(lines: Iterable[str], converters: Any) -> np.ndarray:
-        return np.loadtxt(
-            lines, delimiter=dialect.separator, comments=COMMENTS[0], quotechar='"', usecols=columns, ndmin=2,
-            converters=converters,
-        )  # fmt: skip
-
-    held = [_own(line, dialect.separator) for line in lines if _content(line)]
-    if not held or not columns:
-        return np.empty((0, len(columns)))
-    usual = len(_cells(held[0], dialect.separator))
-    for line in held:  # loadtxt itself looks at no column but those that are used
-        if line[0] not in COMMENTS and '"' not in line and dialect.separator is not None:
-            if line.count(dialect.separator) + 1 != usual:
-                raise ValueError(
-                    f"a row has {line.count(dialect.separator) + 1} cells, the first has {usual}"
-                )
-    if dialect.decimal == "." and '"' not in held[0]:
-        try:
-            return read(held, None)
-        except ValueError:
-            pass  # an empty cell, say
-    return read(held, value)
+    Such a line begins with a word where most rows have a number, and has no more numbers than words.
+    """
+    begin = next(place for place, count in enumerate(numbers) if count)
+    usual = Counter(count for count in numbers if count).most_common(1)[0][0]
+    for place in range(begin, len(rows)):
+        if not numbers[place]:
+            continue
+        if 2 * numbers[place] > usual or not _begins_with_word(rows[place], rows[place + 1 :], decimal):
+            return place
+    return begin
 
 
-def _own(line: str, separator: str | None) -> str:
-    """A line without what a spreadsheet has appended that took it for one cell: the commas of empty cells."""
-    line = line.strip(" \r\n")
-    return line if separator == "," else line.rstrip(",")
+def _begins_with_word(row: list[str], below: list[list[str]], decimal: str) -> bool:
+    """Whether the first cell that is filled is no number where most of the rows below have one."""
+    place = next((place for place, cell in enumerate(row) if cell), 0)
+    if number_of(row[place], decimal) is not None:
+        return False
+    there = [is_number(cells[place], decimal) for cells in below if len(cells) == len(row)]
+    return 2 * sum(there) > len(there)
 
 
 def _words(cells: list[str]) -> np.ndarray:
     """A column of seconds where its cells are times, of words else."""
     found = seconds(cells)
     return np.array(cells, dtype=object) if found is None else found  # fixed-width text would take much more
-
-
-def _content(line: str) -> bool:
-    """Whether a line is anything but a comment or empty cells, of which spreadsheets leave thousands below a table."""
-    return bool(line.strip(EMPTY)) and line.lstrip()[0] not in COMMENTS
-
-
-def _cells(line: str, separator: str | None) -> list[str]:
-    """Cells of a line, without quotes and the spaces around them."""
-    if separator is None:
-        return next(csv.reader([" ".join(line.split())], delimiter=" ", skipinitialspace=True), [])
-    row = next(csv.reader([_own(line, separator)], delimiter=separator, skipinitialspace=True), [])
-    return [cell.strip().strip("'").strip() for cell in row]
-
-
-def _number(cell: str, decimal: str) -> float | None:
-    """A cell's value, None where it is no number; an empty one is NaN, so that the complaint can name where."""
-    cell = cell.strip().strip("\"'")
-    if decimal == ",":
-        if "." in cell:
-            return None
-        cell = cell.replace(",", ".")
-    try:
-        return float(cell) if cell else np.nan
-    except ValueError:
-        return None
 
 
 def _encoding(path: Path) -> str:

@@ -59,22 +59,25 @@ def carried_motion(known: Sequence[tuple[Recorded, Meaning]]) -> Carried | None:
     found: list[Carried] = []
     for first, second in pairs:
         there, back = predicts(first, second), predicts(second, first)
-        if there >= max(SURE, ONE_WAY * back) and _surely(first, second, there):
+        if surely_drives(first, second, there, back):
             found.append(Carried(second, first, there, back))
-        elif back >= max(SURE, ONE_WAY * there) and _surely(second, first, back):
+        elif surely_drives(second, first, back, there):
             found.append(Carried(first, second, back, there))
     return max(found, key=lambda one: one.there, default=None)
 
 
-def _surely(driver: Recorded, driven: Recorded, evidence: float) -> bool:
-    """Whether the one goes with the other, later, and the record of the driver, shifted in time, tells much less of the driven.
+def surely_drives(driver: Recorded, driven: Recorded, there: float, back: float) -> bool:
+    """Whether the one tells of the other much more than back, goes with it, later, and tells much more than its shifted record does.
 
-    Two smooth motions help to predict each other however they came about, and so do shifted ones.
+    `there` and `back` are what `predicts` says of them. Two smooth motions help to predict each other however they came about, and
+    so do shifted ones.
     """
+    if there < max(SURE, ONE_WAY * back):
+        return False
     told = follows(driver, driven)
     if told.lag < 0.0 or abs(told.correlation) < LEAST_CORRELATION:
         return False
     count = len(driver.value)
     shifted = [np.roll(driver.value, part * count // SHIFTS) for part in range(1, SHIFTS)]
     chance = max(predicts(replace(driver, value=value), driven) for value in shifted)
-    return evidence >= BEYOND_CHANCE * chance
+    return there >= BEYOND_CHANCE * chance

@@ -19,13 +19,14 @@ WORDS: dict[Quantity, frozenset[str]] = {
     "velocity": frozenset("velocity velocities vel speed rate omega twist dq qd qdot thetadot dtheta xdot dx angvel".split()),
     "acceleration": frozenset("acceleration accelerations accel acc ddq qdd xddot ddx".split()),
     "effort": frozenset(
-        "effort efforts torque torques tau force forces wrench current currents cur voltage volt volts pwm duty load trq "
+        "effort efforts torque torques tau force forces wrench current currents cur voltage volt volts pwm duty trq "
         "moment iq".split()
     ),
 }  # fmt: skip
 DEVICES: dict[str, Quantity] = {
     "encoder": "position",
     "enc": "position",
+    "load": "effort",  # a load cell's; the angle of a load is no effort
 }  # what a device measures, where no word says what it is of
 LETTERS: dict[str, Quantity] = {  # what one letter stands for by custom, where nothing else is said
     "q": "position", "x": "position", "y": "position", "z": "position", "v": "velocity", "w": "velocity", "a": "acceleration",
@@ -36,11 +37,20 @@ COMMANDED = frozenset(
     "request requested".split()
 )
 COMMANDED_LETTERS = frozenset("u r".split())
-MEASURED = frozenset("meas measured act actual state states feedback fb est estimated present real".split())
+MEASURED = frozenset(
+    "meas measured act actual state states feedback fb est estimated present real raw filt filtered smoothed response".split()
+)
+PLACES = frozenset("motor link gear rotor shaft sensor imu camera vicon mocap optitrack laser lidar".split())
 FORCING = frozenset("forcing pump pumping disturbance perturbation external".split())
-BASE = frozenset("base table ground shaker platform floor".split())
+BASE = frozenset(
+    "base table ground shaker platform floor road terrain foundation seismic earthquake quake".split()
+)
+SHAKEN = frozenset(
+    "excitation exc shaking vibration".split()
+)  # a motion that is called so is one of the base
+DRIVING = frozenset("input in stimulus ctrl control drive".split())  # what drives, where no quantity is said
 GENERIC = frozenset(
-    "dof joint joints motor data robot array value values actuator axis trajectory controller controllers".split()
+    "dof joint joints motor data robot array value values actuator axis trajectory controller controllers in out input output".split()
 )
 ROTARY = frozenset(
     "angle angles theta phi alpha torque torques tau q rotation rotary omega revolute hinge encoder moment trq dof joint joints "
@@ -54,6 +64,7 @@ POSED = frozenset(
     "des desired ref reference target targets goal setpoint sp".split()
 )  # of a motion, where nothing else is said
 ELECTRICAL = {"V": "voltage volt volts", "A": "current currents cur iq amp amps i", "1": "pwm duty"}
+IN_SI = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/", "trajectory_msgs/", "control_msgs/")
 IGNORED = frozenset("temp temperature battery power error err status mode".split())
 
 
@@ -92,10 +103,15 @@ def meaning_of(one: Recorded) -> Meaning:
     ):
         commanded = False
     forcing = bool(every & FORCING)
+    base = bool(every & BASE)
+    if (
+        every & SHAKEN
+        and quantity in ("position", "acceleration")
+        and not (one.unit or "m").startswith("rad")
+    ):
+        base, commanded = True, None
     joint = one.joint or _joint_of_column(one)
-    return Meaning(
-        quantity, commanded, forcing, bool(every & BASE), joint, reason.removeprefix("; "), certain
-    )
+    return Meaning(quantity, commanded, forcing, base, joint, reason.removeprefix("; "), certain)
 
 
 def is_ignored(one: Recorded) -> bool:
@@ -109,7 +125,7 @@ def rotary_of(one: Recorded) -> tuple[bool | None, str]:
         return True, f"its unit is {one.written_unit}"
     if one.unit in ("m", "m/s", "m/s^2", "N"):
         return False, f"its unit is {one.written_unit}"
-    if force_unit_of(one) in ("V", "A", "1"):
+    if force_unit_of(one) in ELECTRICAL and meaning_of(one).quantity == "effort":
         return True, "it feeds a motor"
     for word in [*words_of(one.said), *words_of(one.joint), *words_of(one.topic)]:
         if word in LINEAR:
@@ -127,6 +143,11 @@ def force_unit_of(one: Recorded) -> str:
     return next((unit for unit, names in ELECTRICAL.items() if words & set(names.split())), "")
 
 
+def tells_unit(one: Recorded) -> bool:
+    """Whether a heading or the type of a ROS message, which is in SI units by REP 103, tells its unit."""
+    return bool(one.unit) or one.type.startswith(IN_SI)
+
+
 def is_lone_v(one: Recorded) -> bool:
     """Whether nothing but a `v` names it: a velocity, or the voltage that drives."""
     return words_of(one.said) == ["v"] and not one.unit
@@ -138,11 +159,45 @@ def driving_unit_of(one: Recorded) -> str:
 
 
 def poses(one: Recorded) -> bool:
-    """Whether its name says that it is what a motion is to become: a target, a set point."""
-    return bool({*words_of(one.said), *words_of(one.topic)} & POSED)
+    """Whether its name says that it is what a motion is to become: a target, a set point, an `r` that is no side."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & POSED) or words_of(one.said) == ["r"]
+
+
+def says_that_it_drives(one: Recorded) -> bool:
+    """Whether its name says that it drives, of whatever quantity."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & DRIVING)
+
+
+def says_base(one: Recorded) -> bool:
+    """Whether a word of its name says that it is of the base."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & BASE)
+
+
+def names_a_place(one: Recorded) -> bool:
+    """Whether its name says where or by what it was measured."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & (PLACES | DEVICES.keys()))
+
+
+def letter_of(one: Recorded) -> str:
+    """The one letter that stands for a quantity in its name; empty where there is none, or several."""
+    letters = [word for word in words_of(one.said) if word in LETTERS]
+    return letters[0] if letters else ""
+
+
+def differ_in_number(one: Recorded, other: Recorded) -> bool:
+    """Whether two names differ in a number only, as those of two joints or sensors do."""
+    first, second = ([word for word in words_of(each.said) if not word.isdigit()] for each in (one, other))
+    return first == second and one.said != other.said
+
+
+def says_who_asks(one: Recorded) -> bool:
+    """Whether a word of its name says that it was asked for, or that it was measured."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & (COMMANDED | MEASURED))
 
 
 def _quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity | None, str, bool]:
+    if one.unit in ELECTRICAL and (motion := _motion_word(near)):
+        return motion[1], f"its name says {motion[0]!r}, and a sensor's volts or amperes are no effort", True
     if one.unit in BY_UNIT:
         return BY_UNIT[one.unit], f"its heading says {one.written_unit}", True
     for words, where in ((near, "name"), (far, "topic")):
@@ -159,6 +214,15 @@ def _quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity 
     return None, "", False
 
 
+def _motion_word(near: list[str]) -> tuple[str, Quantity] | None:
+    """The word of a name that says a motion, and which; None where the last one that says a quantity says an effort."""
+    for word in reversed(near):
+        for quantity, known in WORDS.items():
+            if word in known:
+                return None if quantity == "effort" else (word, quantity)
+    return None
+
+
 def _one(words: list[str], known: frozenset[str]) -> str:
     return next(word for word in words if word in known)
 
@@ -167,7 +231,15 @@ def _joint_of_column(one: Recorded) -> str:
     """What tells a column from others of the same quantity: `3` of dof_pos[3], `knee` of knee_pos; empty for messages."""
     if one.topic:
         return ""
-    known = COMMANDED | MEASURED | GENERIC | FORCING | BASE | frozenset().union(*WORDS.values(), DEVICES)
-    left = [word for word in words_of(one.column.replace(one.written_unit, "") if one.written_unit else one.column)
-            if word not in known and word not in LETTERS]  # fmt: skip
-    return "_".join(left)
+    known = (
+        COMMANDED
+        | MEASURED
+        | GENERIC
+        | FORCING
+        | BASE
+        | SHAKEN
+        | DRIVING
+        | frozenset().union(*WORDS.values(), DEVICES)
+    )
+    left = [word for word in words_of(one.said) if word not in known and word not in LETTERS]
+    return "_".join([*([one.side] if one.side else []), *left])

@@ -12,9 +12,11 @@ from rhythmid.model import Model
 from rhythmid.record.inventory import Inventory, inventory
 from rhythmid.record.read import load_records, read_record
 from rhythmid.record.signals import Clock, Signals
+from rhythmid.start.known import Ask
 from rhythmid.start.meaning import driving_unit_of
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
-from rhythmid.start.roles import Ask, Roles, first_answer, guess_roles
+from rhythmid.start.roles import Roles, first_answer, guess_roles
+from rhythmid.start.sides import with_sides
 from rhythmid.start.written import GUESSED, clock_of, model_yaml, signals_yaml
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
@@ -32,7 +34,7 @@ class Guess:
         choices = self.roles.choices.items()
         found = [f"{role}: {choice.recorded}: {choice.reason}" for role, choice in choices]
         found += [f"CHECK {role}: {doubt}" for role, choice in choices for doubt in choice.doubts]
-        found += [f"CHECK {note}" for note in self.roles.notes]
+        found += [f"CHECK {note}" for note in (*self.inventory.notes, *self.roles.notes)]
         if self.roles.joint.others:
             found.append(f"joint: {self.roles.joint.name} (others: {', '.join(self.roles.joint.others)})")
         return found
@@ -63,7 +65,7 @@ def guess(
     source: str | Path, joint: str | None = None, rate: float | None = None, ask: Ask = first_answer
 ) -> Guess:
     """Look at one recording and guess which channel is what; parameters and errors as of `start`."""
-    found = inventory(source, rate)
+    found = with_sides(inventory(source, rate))
     roles = guess_roles(found, joint, ask)
     units = _units(roles)
     clock, reason = clock_of(found, roles)

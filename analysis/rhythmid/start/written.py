@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 from rhythmid.elements.element import SLOTS
 from rhythmid.model import INERTIA, Term
+from rhythmid.record.heading import heading_of
 from rhythmid.record.inventory import Inventory, Recorded, header_clock
 from rhythmid.record.signals import ROLES, Clock
-from rhythmid.start.meaning import driving_unit_of, meaning_of
+from rhythmid.start.known import Choice
+from rhythmid.start.meaning import driving_unit_of, meaning_of, tells_unit
 from rhythmid.start.nominal import Nominal
-from rhythmid.start.roles import Choice, Roles
+from rhythmid.start.roles import Roles
 from rhythmid.units import Units
 from rhythmid.value import Value
 
@@ -30,6 +32,7 @@ def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clo
         *comment(f"Which channel of {found.path.name} is what. Guessed by `rhythmid init`: look through it and correct what is wrong."),
         "",
         *comment(f"time: {clock_reason}."),
+        *_time_doubt(clock),
         f"time: {time_of(clock)}",
     ]  # fmt: skip
     for role in ROLES:
@@ -38,6 +41,7 @@ def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clo
             lines += [
                 "",
                 *_said(role, choice),
+                *_unit_doubt(choice.recorded, _unit(role, choice.recorded, roles, units)),
                 f"{role}: {_channel(role, choice.recorded, roles, units, found.is_bag)}",
             ]
         elif role == "input" and "effort" not in roles.choices:
@@ -62,7 +66,7 @@ def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clo
                 f"joint: {name}; standard deviation of its motion {own:.3g}. Others (--joint NAME): {moved}."
             ),
         ]
-    for note in roles.notes:
+    for note in (*found.notes, *roles.notes):
         lines += ["", *comment(f"CHECK: {note}.")]
     if rest:
         lines += ["", *comment(f"Recorded too, and not used: {_listed(rest, 3 * LISTED)}.")]
@@ -71,6 +75,15 @@ def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clo
         lines += ["", *comment(f"Left out: {_listed(left, LISTED)}.")]
     lines += ["", *comment("Only a part of the record:"), "# use: [0, 60]                            # s"]
     return "\n".join(lines) + "\n"
+
+
+def _time_doubt(clock: Clock) -> list[str]:
+    """A comment on a unit of times that no heading tells, and that is not the second."""
+    if clock.kind != "column" or clock.scale == 1.0 or heading_of(str(clock.column)).unit:
+        return []
+    return comment(
+        "  CHECK: no heading tells the unit of the times; the size of their steps is all that says it."
+    )
 
 
 def clock_of(found: Inventory, roles: Roles) -> tuple[Clock, str]:
@@ -165,6 +178,19 @@ def _unit(role: str, one: Recorded, roles: Roles, units: Units) -> str:
     if role == "input" and roles.input_kind != "force":
         return by_kind[roles.input_kind.removeprefix("base_").replace("displacement", "position")]
     return driving_unit_of(one) or ("N*m" if roles.rotary else "N")
+
+
+def _unit_doubt(one: Recorded, unit: str) -> list[str]:
+    """A comment on a unit that neither a heading nor the type of a message tells."""
+    if one.unit and one.unit != unit:
+        return comment(
+            f"  CHECK: its heading says {one.written_unit}, and {unit} is needed: scale: how many {unit} one {one.unit} is."
+        )
+    if tells_unit(one):
+        return []
+    return comment(
+        f"  CHECK: no unit is told; {unit} is taken. For another one:  scale: what one of its units is in {unit}."
+    )
 
 
 def _scale(scale: float) -> str:

@@ -22,6 +22,7 @@ from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.evidence import difference
 from rhythmid.diagnose.free_run import FreeRunResult
+from rhythmid.diagnose.held_out_zeros import held_out_zero_notes
 from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.selection import Contest
 from rhythmid.diagnose.verdict import Decision
@@ -116,7 +117,10 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         ),
         excluded=tuple(Untried(" + ".join(added), why) for added, why in found.excluded),
         heldout=held,
-        notes=tuple(notes),
+        notes=(
+            *notes,
+            *held_out_zero_notes(fit, result.unseen if case.holdout and not case.budget.spent else ()),
+        ),
         assumptions=(ONE_CLOCK,) if any(one.command is not None for one in series) else (),
     )
 

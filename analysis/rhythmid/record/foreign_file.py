@@ -1,0 +1,30 @@
+"""Files of other programs that are not read, and what makes a bag or a table of each."""
+
+from pathlib import Path
+
+from rhythmid.errors import InputError
+
+SAVE_AS_CSV = "save it as .csv in the program that wrote it"
+KINDS = {
+    ".bag": "a bag of ROS 1",
+    ".xlsx": "a workbook", ".xls": "a workbook", ".ods": "a workbook",
+    ".tdms": "a file of LabVIEW", ".mf4": "a file of measurements in MDF", ".mdf": "a file of measurements in MDF",
+    ".psdata": "a file of PicoScope", ".sal": "a capture of Saleae's Logic",
+    ".pkl": "a pickle, which may run any code", ".pickle": "a pickle, which may run any code",
+}  # fmt: skip
+
+
+def refuse_foreign(path: Path) -> None:
+    """Raise InputError, one line with what to do, where a path is a file of another program, or a directory with bags of ROS 1."""
+    suffix = path.suffix.lower()
+    if path.is_dir():
+        if not any(path.glob("*.bag")) or (path / "metadata.yaml").exists():
+            return
+        path, suffix = min(path.glob("*.bag")), ".bag"
+    if suffix == ".bag":
+        into = path.with_suffix("")
+        raise InputError(
+            f"{path}: is a bag of ROS 1, which is not read; convert it:  rosbags-convert --src {path} --dst {into}  (of the package rosbags)"
+        )
+    if suffix in KINDS:
+        raise InputError(f"{path}: is {KINDS[suffix]}, which is not read; {SAVE_AS_CSV}")

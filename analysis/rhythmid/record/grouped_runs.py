@@ -1,0 +1,91 @@
+"""Runs that a file keeps side by side, each in a struct or a group of its own: `runs[0].q` and `runs[1].q`, `trial1.q` and `trial2.q`."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from rhythmid.record.table import Table
+
+NUMBERED = re.compile(r"(.*?)(\[\d+\]|\d+)")  # a struct or a group that is one of several
+OF_RUNS = re.compile(
+    r"(?:.*[._ ])?(?:episodes?|trials?|runs?|trajector(?:y|ies)|segments?|tests?|exp|experiments?|rec|recordings?|records?|logs?"
+    r"|measurements?|sessions?|takes?|sweeps?)[._ ]?",
+    re.IGNORECASE,
+)
+TIME = re.compile(r"(?:.*[._ ])?(?:time|timestamp|stamp|t)(?:[._ ]?(?:s|ms|us|ns))?", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Runs by the path to them, as `runs[0]`, in the order of the file; the arrays of each by their names within it."""
+
+    members: Mapping[str, Mapping[str, Any]]
+
+    @property
+    def note(self) -> str:
+        """How many there are, as a phrase."""
+        first, *_, last = self.members
+        return f"{len(self.members)} runs, {first} to {last}"
+
+    def alone(self, table: Table, column: str | None = None) -> Table:
+        """The table without the arrays of all runs but the one that holds the `column`, by default the first."""
+        paths = [f"{path}." for path in self.members]
+        own = next((path for path in paths if column is not None and column.startswith(path)), paths[0])
+        others = tuple(path for path in paths if path != own)
+        kept = {name: values for name, values in table.columns.items() if not name.startswith(others)}
+        return Table(table.path, kept)
+
+    def numbered(self) -> dict[str, Mapping[str, Any]]:
+        """The arrays of each by what tells it from the others: its number."""
+        return {re.findall(r"\d+", path)[-1]: arrays for path, arrays in self.members.items()}
+
+
+def grouped_runs(table: Table) -> Runs | None:
+    """The runs that a table holds side by side, each with a time of its own; None where it holds no two.
+
+    Structs and groups whose times are the same sample by sample were recorded at once, as the joints of a robot are, unless they are
+    called runs.
+    """
+    families: dict[str, dict[str, dict[str, Any]]] = {}
+    for name, values in table.columns.items():
+        for stem, path, field in _places(name):
+            families.setdefault(stem, {}).setdefault(path, {})[field] = values
+    for stem, members in families.items():
+        timed = {path: arrays for path, arrays in members.items() if _time_of(arrays) is not None}
+        if len(timed) > 1 and (OF_RUNS.fullmatch(stem) or not _at_once(timed)):
+            return Runs(timed)
+    return None
+
+
+def _places(name: str) -> list[tuple[str, str, str]]:
+    """What the groups of a path are called without their number, the path to each with it, and what follows within it."""
+    parts = name.split(".")
+    return [
+        (".".join([*parts[:place], match[1]]), ".".join(parts[: place + 1]), ".".join(parts[place + 1 :]))
+        for place, part in enumerate(parts[:-1])
+        if (match := NUMBERED.fullmatch(part))
+    ]
+
+
+def _time_of(arrays: Mapping[str, Any]) -> np.ndarray | None:
+    """The time among the arrays of a run."""
+    for name, values in arrays.items():
+        array = np.asarray(values)
+        if (
+            TIME.fullmatch(name)
+            and array.dtype.kind in "fiu"
+            and array.size == max(array.shape, default=0) > 1
+        ):
+            return array.reshape(-1)
+    return None
+
+
+def _at_once(timed: Mapping[str, Mapping[str, Any]]) -> bool:
+    times = [_time_of(arrays) for arrays in timed.values()]
+    return all(
+        np.array_equal(one, other) for one, other in pairwise(times) if one is not None and other is not None
+    )

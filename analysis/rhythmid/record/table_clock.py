@@ -1,0 +1,125 @@
+"""Which column of a table holds the times, and how many seconds one of its units is."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.errors import InputError
+from rhythmid.record.clock_time import DAY
+from rhythmid.record.heading import heading_of
+from rhythmid.record.signals import Clock
+
+Array = NDArray[np.float64]
+TIME = re.compile(
+    r"(?:elapsed_?|time_?|wall_?|ros_?)*(?:t|time|timestamp|stamp|seconds|secs?|clock)", re.IGNORECASE
+)
+KIND_OF_TIME = re.compile(r".*_(?:time|timestamp|stamp|clock)", re.IGNORECASE)  # pi_time, cpu_time
+COUNTER = re.compile(
+    r"|index|idx|i|n|k|id|no|nr|frame|sample|step|row|count|counter|seq|unnamed: 0", re.IGNORECASE
+)
+NEAR = 0.5  # of the median step of an unnamed column: a step that differs by no more is a usual one
+USUAL = 0.95  # share of usual steps from which such a column is taken for the time; the others are gaps, and may be as long as they like
+MOST_NAMED = 12  # columns that a complaint lists
+FORWARD = 0.99  # share of steps of a time that go forward
+# the longest sample period [s] that is thought of: a time without a unit whose steps are longer is in ms, µs or ns
+LONGEST_STEP = 0.5
+# days since 1900 of the years 2000 to 2100: what counts from there in steps of no more than a second is a spreadsheet's time
+SERIAL_DAYS = (36526.0, 73051.0)
+NANOSECOND = 1e-9  # s, the smallest unit in which times are written
+MOSTLY_FORWARD = 0.9  # the same of a time that begins anew with each of several recordings
+
+
+def is_time(name: str, value: Array) -> bool:
+    """Whether a column is called a time, or a kind of time, and goes forward as one."""
+    called = _called(name)
+    return (_is_plain_time(name) or KIND_OF_TIME.fullmatch(called) is not None) and _forward(value)
+
+
+def _is_plain_time(name: str) -> bool:
+    """Whether a column is called a time and nothing else, or its unit is one of time."""
+    return TIME.fullmatch(_called(name)) is not None or heading_of(name).unit == "s"
+
+
+def _is_coarse(value: Array) -> bool:
+    """Whether a time stands still from most rows to the next, as whole seconds do."""
+    return float(np.mean(np.diff(value) == 0.0)) > 0.5 if len(value) > 1 else False
+
+
+def _called(name: str) -> str:
+    return heading_of(name).name.rsplit(".", 1)[-1].replace(" ", "_")
+
+
+def _forward(value: Array) -> bool:
+    step = np.diff(value)
+    if not len(step) or not np.isfinite(value).all():
+        return False
+    return bool(value[-1] > value[0]) and float(np.mean(step >= 0.0)) >= FORWARD
+
+
+def _begins_anew(value: Array) -> bool:
+    """Whether a time goes forward but for some steps, as that of recordings one below the other does."""
+    step = np.diff(value)
+    return bool(
+        np.isfinite(value).all() and (step < 0.0).any() and float(np.mean(step >= 0.0)) >= MOSTLY_FORWARD
+    )
+
+
+def is_even(value: Array) -> bool:
+    """Whether a column goes forward by steps that are mostly of one size, as a time does that has gaps, too."""
+    if not _forward(value):
+        return False
+    step = np.diff(value)
+    usual = float(np.median(step))
+    in_any_unit = 0.0 < usual <= LONGEST_STEP / NANOSECOND
+    return in_any_unit and float(np.mean(np.abs(step - usual) <= NEAR * usual)) >= USUAL
+
+
+def table_clock(
+    path: Path, columns: list[tuple[str, Array]], unequal: list[tuple[str, Array]]
+) -> tuple[Clock, str]:
+    """The column that holds the time. Raises InputError where there is none among those of equal length; `unequal` are the others."""
+    for name, value in sorted(
+        columns, key=lambda column: (not _is_plain_time(column[0]), _is_coarse(column[1]))
+    ):
+        if is_time(name, value):
+            heading = heading_of(name)
+            scale, why = heading.scale, f"its heading says {heading.written}" if heading.unit else ""
+            if not why:
+                scale, why = _guessed_scale(value)
+            return Clock("column", column=name, scale=scale), f"called a time, and goes forward; {why}"
+    for name, value in columns:
+        untold = COUNTER.fullmatch(name) is None and not heading_of(name).unit
+        if untold and is_even(value):
+            if name.isdigit() or not (np.diff(value) == 1.0).all():
+                scale, why = _guessed_scale(value)
+                return Clock(
+                    "column", column=name, scale=scale
+                ), f"the first column that goes forward by steps of one size; {why}"
+    names = ", ".join(name for name, _ in columns[:MOST_NAMED])
+    if len(columns) > MOST_NAMED:
+        names += f" and {len(columns) - MOST_NAMED} more"
+    others = ", ".join(f"{name} has {len(value)} rows" for name, value in unequal)
+    if anew := [name for name, value in columns if _is_plain_time(name) and _begins_anew(value)]:
+        raise InputError(
+            f"{path}: {anew[0]!r} begins anew or goes back; take the recordings apart with  rhythmid split {path} --out runs"
+        )
+    why = f"; of another length than their {len(columns[0][1])} rows: {others}" if others else ""
+    raise InputError(
+        f"{path}: no column goes forward like a time ({names}){why}; give the rows' rate with --rate HZ"
+    )
+
+
+def _guessed_scale(value: Array) -> tuple[float, str]:
+    """Seconds in one unit of a time whose unit is not told, by the size of its steps."""
+    step = float(np.median(np.diff(value)))
+    if SERIAL_DAYS[0] <= value[0] <= SERIAL_DAYS[1] and step <= 1.2 / DAY:
+        return (
+            DAY,
+            f"steps of {step:.4g} from {value[0]:.6g} are taken to be days, as a spreadsheet counts them",
+        )
+    for scale, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
+        if step * scale < LONGEST_STEP:
+            return scale, f"steps of {step:.4g} are taken to be {unit}"
+    return NANOSECOND, f"steps of {step:.4g} are taken to be ns"

@@ -1,0 +1,57 @@
+"""The head of a text table: which of the lines above its rows holds the names, and which the units."""
+
+from collections.abc import Sequence
+
+from rhythmid.record.heading import bare_unit, is_unit
+
+MOSTLY = 0.5  # share of the filled cells of a line that are known units, from which it is one of units
+PURE = ("", "-", "1")  # units of pure numbers
+TYPES = frozenset(
+    "double single float float32 float64 real int int8 int16 int32 int64 uint8 uint16 uint32 integer long number numeric bool boolean "
+    "string str text char datetime timestamp duration".split()
+)  # of a line that says how the columns are stored
+
+
+def names_of(above: Sequence[Sequence[str]], count: int) -> list[str] | None:
+    """Names of `count` columns from the cells of the lines above the first row, with units where a line holds them.
+
+    The units stand below the names, or above them. None where there is no line above; where none has as many cells as the rows,
+    the last one as it is, so that a complaint can name it.
+    """
+    if not above:
+        return None
+    fitting: list[Sequence[str]] = []
+    for cells in reversed(above):
+        if len(cells) != count:
+            break
+        if not is_types(cells):
+            fitting.append(cells)
+    if not fitting:
+        return list(above[-1])
+    last, *before = fitting
+    if before and is_units(last) and len(set(before[0])) > 1:
+        return with_units(before[0], last)
+    if before and is_units(before[0]) and not is_units(last):
+        return with_units(last, before[0])
+    return list(last)
+
+
+def is_units(cells: Sequence[str]) -> bool:
+    """Whether a line holds units: most of its cells do, or all stand in brackets; or no cell is anything else, as below names without units."""
+    filled = [cell for cell in cells if cell.strip()]
+    if all(cell.strip()[0] in "[({" and cell.strip()[-1] in "])}" for cell in filled):
+        return True
+    return sum(is_unit(cell) for cell in filled) > MOSTLY * len(filled) or all(
+        is_unit(cell) for cell in cells
+    )
+
+
+def is_types(cells: Sequence[str]) -> bool:
+    """Whether a line says how the columns are stored."""
+    return all(cell.strip().lower() in TYPES for cell in cells)
+
+
+def with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
+    """Names with their units in brackets, but for those of pure numbers."""
+    pairs = zip(names, map(bare_unit, units), strict=True)
+    return [name if unit in PURE else f"{name} [{unit}]" for name, unit in pairs]

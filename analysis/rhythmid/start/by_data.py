@@ -1,0 +1,131 @@
+"""What a number is of which no name tells it: by what it follows, what follows it, and what it goes with."""
+
+from collections.abc import Sequence
+from functools import cache
+
+from rhythmid.errors import InputError
+from rhythmid.record.inventory import Recorded
+from rhythmid.start.carried import surely_drives
+from rhythmid.start.direction import COPY
+from rhythmid.start.known import Choice, Known
+from rhythmid.start.meaning import (
+    Quantity,
+    differ_in_number,
+    letter_of,
+    meaning_of,
+    poses,
+    says_that_it_drives,
+)
+from rhythmid.start.relation import GOES_ALONG, RATIO, coherent, derivative, drives, follows, predicts
+
+SURE_INTEGRAL = (
+    0.98  # correlation from which a position and a velocity belong together, where no name says so
+)
+HARDLY = 0.3  # coherence with the output below which a number without a name is not taken for what drives
+OR_ELSE = "a base that moves is  kind: base_displacement, what a controller is asked for  kind: reference"
+NAMED = 8  # numbers that a note names
+
+
+def output_by_data(able: list[Known], known: list[Known], place: str) -> tuple[Choice, list[Known]]:
+    """Where no name tells: the integral of another one, else what is driven more by the others than it drives them."""
+    if not able:
+        raise InputError(
+            f"{place}: no position, velocity or acceleration is measured; write signals.yaml by hand"
+        )
+    for first in able:
+        for second in able:
+            if first is second:
+                continue
+            r, ratio = derivative(first.one, second.one)
+            if r > SURE_INTEGRAL and abs(ratio - 1.0) < RATIO:
+                choice = Choice(
+                    first.one, f"no name says it; it is the integral of {second.one} ({r:.2f} correlation)"
+                )
+                changed: dict[int, Quantity] = {id(first): "position", id(second): "velocity"}
+                return choice, [
+                    one.taken_for(changed[id(one)]) if id(one) in changed else one for one in known
+                ]
+    if len(able) == 1:
+        return Choice(able[0].one, "the only number that is left"), [
+            one.taken_for("position") if one is able[0] else one for one in known
+        ]
+
+    @cache
+    def lead(first: Recorded, second: Recorded) -> float:
+        return drives(first, second) - drives(second, first)
+
+    scored: list[tuple[float, Known]] = []
+    for one in able:
+        others = [other for other in able if other is not one]
+        scored.append((sum(lead(o.one, one.one) for o in others), one))
+    (gain, best), *_ = sorted(scored, key=lambda pair: -pair[0])
+    others = tuple(one.one for one in able if one is not best)
+    doubts = ("no name says what it measures: set kind and unit",)
+    choice = Choice(
+        best.one, f"no name says it; the past of the others predicts it better than it predicts them ({gain:+.2f} in log variance)",
+        others, doubts,
+    )  # fmt: skip
+    return choice, [one.taken_for("position") if one is best else one for one in known]
+
+
+def by_data(one: Known, output: Recorded, measured: Quantity, velocity: Choice | None) -> Known:
+    """What a command without a quantity asks for: what it comes closest to."""
+    if one.quantity is not None:
+        return one
+    targets: list[tuple[Quantity, Recorded]] = [(measured, output)]
+    if velocity is not None:
+        targets.append(("velocity", velocity.recorded))
+    for quantity, answer in targets:
+        told = follows(one.one, answer)
+        later = told.lag > 0.0 or (told.lag == 0.0 and one.meaning.commanded is True)
+        if told.correlation > COPY and told.is_copy and later:
+            reason = f"the {quantity} follows it {1e3 * told.lag:.3g} ms later ({told.correlation:.2f} correlation)"
+            return one.taken_for(quantity, reason, commanded=True)
+    if poses(one.one):
+        told = follows(one.one, output)
+        reason = f"a target of the {measured}, which follows it ({told.correlation:.2f} correlation)"
+        return one.taken_for(measured, reason, commanded=True)
+    if one.meaning.base:
+        return one.taken_for("position", "its name says that it is one of the base")
+    return _driver(one, output)
+
+
+def _driver(one: Known, output: Recorded) -> Known:
+    """What drives, where its name, its coherence with the output or its past says so; else what it was."""
+    if one.meaning.commanded or says_that_it_drives(one.one):
+        return one.taken_for("effort", _coherence(one, output))
+    letter = meaning_of(one.one).quantity
+    if letter == "position" and differ_in_number(one.one, output):
+        return one  # a second joint or sensor
+    there, back = predicts(one.one, output), predicts(output, one.one)
+    share = coherent(one.one, output)
+    if share < GOES_ALONG and surely_drives(one.one, output, there, back):
+        reason = f"its past tells of the output ({there:.3g} times as much as by chance; back {back:.2g})"
+    elif share >= HARDLY:
+        reason = _coherence(one, output)
+    else:
+        return one
+    if letter == "position" and letter_of(one.one) == letter_of(output):
+        return one.taken_for("position", f"a motion that goes with the output: {reason}").of_base()
+    doubt = (
+        ""
+        if share >= GOES_ALONG
+        else f"no name says that it drives, and its coherence with the output is {share:.2f} only: {OR_ELSE}"
+    )
+    return one.taken_for("effort", reason).doubted(doubt)
+
+
+def _coherence(one: Known, output: Recorded) -> str:
+    share = coherent(one.one, output)
+    return f"no motion is a copy of it, and it is coherent with the output (coherence {share:.2f})"
+
+
+def note_of_unknown(unknown: Sequence[Known], output: Recorded) -> str:
+    """What to tell of numbers of which neither a name nor the data say that they drive, where nothing else does."""
+    told = sorted(((coherent(one.one, output), one) for one in unknown), key=lambda pair: -pair[0])
+    listed = "; ".join(f"{one.one} (coherence {share:.2f})" for share, one in told[:NAMED])
+    more = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""
+    return (
+        f"nothing is taken to drive the machine: no name says what these are, and they hardly go with the output: {listed}{more}; "
+        f"make the input of what drives; {OR_ELSE}"
+    )

@@ -1,0 +1,95 @@
+"""Which of two copies of one motion leads: what is asked for comes before what is measured."""
+
+from dataclasses import replace
+
+from rhythmid.record.inventory import Recorded
+from rhythmid.start.known import Choice, Known
+from rhythmid.start.meaning import names_a_place, words_of
+from rhythmid.start.relation import Follows, follows, predicts
+
+COPY = 0.9  # correlation with its command from which an answer is the same quantity
+LEAST_LAG = 2.5  # samples: two sensors of one motion may be that far apart by their filters and buses
+AGAINST = (
+    4.0  # times the evidence for the one direction, from which that for the other one contradicts the lag
+)
+AXES = frozenset("x y z".split())  # motions of one body in several directions, however alike they are
+
+
+def leads(first: Recorded, second: Recorded) -> Follows | None:
+    """How the second follows the first, where it is a later copy of it and its past does not tell more of the first; None else."""
+    told = follows(first, second)
+    if told.correlation < COPY or not told.is_copy or told.lag * min(first.rate, second.rate) < LEAST_LAG:
+        return None
+    return None if predicts(second, first) > AGAINST * max(predicts(first, second), 1.0) else told
+
+
+def by_direction(output: Choice, known: list[Known]) -> tuple[Choice, list[Known], list[str]]:
+    """The output, what is known, and what a user should know, where another channel of its quantity leads or follows it as a copy.
+
+    The earlier one was asked for, the later one was measured, unless a name says otherwise. Motions of other joints or of places, which
+    may lead as a motor leads its load, and axes of one body are left as they are.
+    """
+    own = next(one for one in known if one.one is output.recorded)
+    able = [one for one in known if one is not own and _is_alike(own, one)]
+    leading = [(told.correlation, told, one) for one in able if (told := leads(one.one, own.one)) is not None]
+    if leading:
+        _, told, first = max(leading, key=lambda each: each[0])
+        return output, _asked_for(first, known, told), [_note(first.one, own.one, told)]
+    if own.meaning.commanded is not None:
+        return output, known, []
+    following = [
+        (told.correlation, told, one) for one in able if (told := leads(own.one, one.one)) is not None
+    ]
+    if not following:
+        return output, known, []
+    _, told, last = max(following, key=lambda each: each[0])
+    reason = f"a measured {last.quantity}: {last.meaning.reason}; it follows {own.one} {1e3 * told.lag:.3g} ms later"
+    others = tuple(one for one in output.others if one is not last.one)
+    return Choice(last.one, reason, others), _asked_for(own, known, told), [_note(own.one, last.one, told)]
+
+
+def _is_alike(own: Known, other: Known) -> bool:
+    """Whether no name tells which of the two was asked for, and they may be one motion."""
+    meaning = other.meaning
+    if other.quantity != own.quantity or meaning.commanded is not None or meaning.forcing or meaning.base:
+        return False
+    if names_a_place(own.one) or names_a_place(other.one):
+        return False
+    axes = {words_of(one.one.said)[-1:] == [axis] for one in (own, other) for axis in AXES}
+    joints = {meaning.joint, own.meaning.joint} - {""}
+    return len(joints) < 2 and not axes >= {True}
+
+
+def _asked_for(first: Known, known: list[Known], told: Follows) -> list[Known]:
+    """What is known, with one of it as what was asked for."""
+    reason = f"it leads the output by {1e3 * told.lag:.3g} ms ({told.correlation:.2f} correlation)"
+    asked = replace(first, meaning=replace(first.meaning, commanded=True, reason=reason))
+    return [asked if one is first else one for one in known]
+
+
+def _note(first: Recorded, last: Recorded, told: Follows) -> str:
+    return (
+        f"no name says whether {first} or {last} was asked for; {first} is taken for the reference, because it leads by "
+        f"{1e3 * told.lag:.3g} ms: if it is another sensor, delete it"
+    )
+
+
+def doubt_of_direction(reference: Recorded, output: Recorded) -> str:
+    """What is doubtful about a reference that its name says to be one and that comes after the output; empty where it does not."""
+    told = leads(output, reference)
+    if told is None:
+        return ""
+    return (
+        f"it comes {1e3 * told.lag:.3g} ms after the output, which is a copy of it ({told.correlation:.2f} correlation): "
+        "are the two exchanged, or their clocks apart?"
+    )
+
+
+def notes_of_other_joints(output: Recorded, others: list[Known]) -> list[str]:
+    """What to tell of motions of other joints, by their names, that lead or follow the output as a reference and its answer do."""
+    pairs = [pair for one in others for pair in ((one.one, output), (output, one.one))]
+    told = [(first, last, found) for first, last in pairs if (found := leads(first, last)) is not None]
+    return [
+        f"{first} leads {last} by {1e3 * found.lag:.3g} ms ({found.correlation:.2f} correlation): where it was asked for, it is the reference"
+        for first, last, found in told
+    ]

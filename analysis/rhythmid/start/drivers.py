@@ -1,0 +1,119 @@
+"""What drives the machine: efforts, a forcing, a reference, or the motion of its base."""
+
+from dataclasses import replace
+
+from rhythmid.record.inventory import Recorded
+from rhythmid.record.signals import InputKind
+from rhythmid.start.direction import COPY, doubt_of_direction
+from rhythmid.start.known import Ask, Choice, Known, chosen, pick, ranked_by_worth, strongest
+from rhythmid.start.meaning import Quantity, meaning_of, says_base
+from rhythmid.start.relation import coherent, follows
+
+
+def drivers(
+    rest: list[Known], output: Recorded, measured: Quantity, ask: Ask
+) -> tuple[dict[str, Choice], InputKind, Quantity]:
+    """What drives the machine: efforts commanded and measured, forcing, references, or the motion of its base."""
+    efforts = [one for one in rest if one.quantity == "effort"]
+    forcing = [one for one in efforts if one.meaning.forcing]
+    efforts = [one for one in efforts if not one.meaning.forcing]
+    commanded = [one for one in efforts if one.meaning.commanded]
+    sensed = [one for one in efforts if not one.meaning.commanded]
+    sensed = [
+        one for one in sensed if one.meaning.certain
+    ] or sensed  # what a name says before what may be anything
+    if commanded and not forcing:  # a wrench beside a command is what pushes from outside
+        forcing = [
+            one for one in sensed if one.one.type.startswith("geometry_msgs/") and "Wrench" in one.one.type
+        ]
+        sensed = [one for one in sensed if one not in forcing]
+    found: dict[str, Choice] = {}
+    if forcing:
+        found["forcing"] = strongest(forcing, "moves most of what pushes from outside")
+    reference, of = _reference(rest, output, measured)
+    base = [one for one in rest if one.meaning.base and one.quantity in ("position", "acceleration")]
+    if commanded:
+        found["input"] = _driving(commanded, output, "an effort that was asked for", ask)
+        if sensed:
+            found["effort"] = _measured_effort(sensed, found["input"].recorded, output, ask)
+    elif sensed and reference is not None:
+        found["effort"] = _driving(sensed, output, "an effort that was measured", ask)
+    elif sensed:
+        found["input"] = _driving(sensed, output, "an effort, and nothing else drives", ask)
+    elif base:
+        found["input"], kind = _moving_base(base)
+        return found, kind, of
+    for role in ("input", "effort"):
+        if base and role in found:
+            found[role] = _beside_base(found[role], base)
+            break
+    if reference is not None and ("effort" in found or "input" not in found):
+        if "input" in found or "effort" in found:
+            found["reference"] = reference
+        else:
+            found["input"] = reference
+            return found, "reference", of
+    return found, "force", of
+
+
+def _beside_base(choice: Choice, base: list[Known]) -> Choice:
+    """The choice with a doubt where a motion of the base was recorded, too, which is left unused."""
+    listed = ", ".join(str(one.one) for one in base)
+    doubt = f"a motion of the base was recorded, too ({listed}), and is not used: where it is what drives, make it the input, with its kind"
+    return replace(choice, doubts=(*choice.doubts, doubt))
+
+
+def _moving_base(base: list[Known]) -> tuple[Choice, InputKind]:
+    """The motion of the base that is greatest, and its kind."""
+    choice = strongest(base, "the motion of the base")
+    picked = next(one for one in base if one.one is choice.recorded)
+    if not (says_base(picked.one) and picked.meaning.certain):
+        doubt = (
+            "taken for a displacement of the base: say  kind: base_acceleration  where it is its acceleration, kind: reference  where it "
+            "is what a controller is asked for, and no kind where it is a force"
+        )
+        choice = replace(choice, doubts=(*choice.doubts, doubt))
+    return choice, "base_displacement" if picked.quantity == "position" else "base_acceleration"
+
+
+def _driving(able: list[Known], output: Recorded, reason: str, ask: Ask) -> Choice:
+    """Of several efforts the one that goes best with the output."""
+    if len(able) == 1:
+        return chosen(able[0], f"{reason}: {able[0].meaning.reason}")
+    ranked = ranked_by_worth([(coherent(one.one, output) + 1e-9, one) for one in able])
+    best = ranked[pick("What drives the machine (input)?", ranked, ask)][1]
+    picked = next(one for one in able if one.one is best)
+    others = [one for _, one in ranked if one is not best]
+    along = f"of those it goes best with the output (coherence {coherent(best, output):.2f})"
+    return chosen(picked, f"{reason}: {picked.meaning.reason}; {along}", others)
+
+
+def _measured_effort(sensed: list[Known], command: Recorded, output: Recorded, ask: Ask) -> Choice:
+    choice = _driving(sensed, output, "an effort that was measured", ask)
+    told = follows(command, choice.recorded)
+    if told.correlation > COPY and not told.is_copy:
+        doubt = f"it is {told.ratio:.3g} times the command: one of them is in another unit, or behind a gear"
+        return replace(choice, doubts=(*choice.doubts, doubt))
+    return choice
+
+
+def _reference(rest: list[Known], output: Recorded, measured: Quantity) -> tuple[Choice | None, Quantity]:
+    """The position, else the velocity, that was asked for: the one that the output follows best."""
+    for quantity in ("position", "velocity"):
+        able = [
+            one for one in rest if one.meaning.commanded and one.quantity == quantity and not one.meaning.base
+        ]
+        able = [one for one in able if one.meaning.joint == meaning_of(output).joint] or able
+        if able and (quantity == measured or quantity == "velocity"):
+            scored = [(abs(follows(one.one, output).correlation), one) for one in able]
+            ranked = ranked_by_worth(scored)
+            told = follows(ranked[0][1], output)
+            why = next(one.meaning.reason for one in able if one.one is ranked[0][1])
+            reason = f"a {quantity} that was asked for: {why}"
+            if quantity == measured:
+                when = f"{1e3 * abs(told.lag):.3g} ms {'earlier' if told.lag < 0.0 else 'later'}"
+                reason += f"; the output follows it {when} ({told.correlation:.2f} correlation)"
+            doubt = doubt_of_direction(ranked[0][1], output) if quantity == measured else ""
+            others = tuple(one for _, one in ranked[1:])
+            return Choice(ranked[0][1], reason, others, (doubt,) if doubt else ()), quantity
+    return None, "position"

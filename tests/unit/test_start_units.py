@@ -1,0 +1,62 @@
+"""Units that nobody tells are marked for a user to check; those that a heading or a message's type tells are not."""
+
+import foreign
+import numpy as np
+import pytest
+from foreign import array, joint_state, moved, tones
+
+from rhythmid.start.start import guess
+
+TIME = np.arange(4000) * foreign.STEP
+FORCE = tones(1, TIME)
+X, V = moved(FORCE, 0.05, 0.1, 6.0)
+
+
+def checked(text: str) -> list[str]:
+    """The roles above which a comment on an untold unit stands."""
+    lines = text.splitlines()
+    doubts = [place for place, line in enumerate(lines) if "CHECK: no unit is told" in line]
+    return [next(line for line in lines[place:] if line[0] != "#").split(":")[0] for place in doubts]
+
+
+@pytest.mark.parametrize(
+    ("names", "roles"),
+    [
+        (("angle", "current"), ["input", "output"]),
+        (("angle [rad]", "current"), ["input"]),
+        (("angle [deg]", "current [A]"), []),
+        (("pos_mm", "tau"), ["input"]),
+    ],
+)
+def test_a_unit_of_a_column_that_its_heading_does_not_tell_is_marked(tmp_path, names, roles):
+    np.savez(tmp_path / "run.npz", t=TIME, **{names[0]: X, names[1]: FORCE})
+    assert checked(guess(tmp_path / "run.npz").signals) == roles
+
+
+def test_messages_with_units_of_their_own_are_not_marked(tmp_path):
+    now = 1.7e9
+    states = [(now + t, joint_state(now + t, ["a"], position=[x])) for t, x in zip(TIME, X, strict=True)]
+    efforts = [(now + t, joint_state(now + t, ["a"], effort=[f])) for t, f in zip(TIME, FORCE, strict=True)]
+    bag = foreign.write(tmp_path / "told", {"/states": states, "/command": efforts})
+    assert checked(guess(bag).signals) == []
+    numbers = [(now + t, array([f])) for t, f in zip(TIME, FORCE, strict=True)]
+    bag = foreign.write(tmp_path / "untold", {"/states": states, "/effort_command": numbers})
+    assert checked(guess(bag).signals) == ["input"]
+
+
+@pytest.mark.parametrize(("scale", "marked"), [(1.0, False), (1e3, True)])
+def test_a_unit_of_time_that_only_the_steps_tell_is_marked(tmp_path, scale, marked):
+    np.savez(tmp_path / "run.npz", t=scale * TIME, x=X, f=FORCE)
+    assert ("no heading tells the unit of the times" in guess(tmp_path / "run.npz").signals) == marked
+
+
+def test_volts_of_a_position_sensor_are_no_effort_and_its_scale_is_asked_for(tmp_path):
+    np.savez(tmp_path / "run.npz", t=TIME, **{"Position [V]": X, "Force [N]": FORCE})
+    found = guess(tmp_path / "run.npz")
+    assert {role: str(one.recorded) for role, one in found.roles.choices.items()} == {
+        "output": "Position [V]",
+        "input": "Force [N]",
+    }
+    assert "CHECK: its heading says V, and m is needed: scale:" in found.signals
+    np.savez(tmp_path / "fed.npz", t=TIME, position=X, **{"motor voltage [V]": FORCE})
+    assert str(guess(tmp_path / "fed.npz").roles.choices["input"].recorded) == "motor voltage [V]"

@@ -1,0 +1,51 @@
+"""Titles, names, units and types above the rows of a text table, in the orders in which programs write them."""
+
+import pytest
+
+from rhythmid.record.table import Table
+
+PLAIN = ["Time", "Position", "Torque"]
+SI = ["Time [s]", "Position [rad]", "Torque [Nm]"]
+ROWS = "".join(f"{0.01 * k:.3f},{0.1 * k:.3f},{k % 7:.1f}\n" for k in range(1, 60))
+
+
+@pytest.mark.parametrize(
+    ("head", "names"),
+    [
+        ("Time,Position,Torque\n", PLAIN),
+        ("Test of Friday\nTime,Position,Torque\n", PLAIN),
+        ("Experiment 7,,\nTime,Position,Torque\n", PLAIN),
+        ("Left,,Right\nTime,Position,Torque\n", PLAIN),
+        ("Time,Position,Torque\n,,\n", PLAIN),
+        ("Time,Position,Torque\ns,rad,Nm\n", SI),
+        ("Test of Friday\nTime,Position,Torque\ns,rad,Nm\n", SI),
+        ("Experiment 7,12,\nTime,Position,Torque\ns,rad,Nm\n", SI),
+        ("Motor,Motor,Motor\nTime,Position,Torque\ns,rad,Nm\n", SI),
+        ("s,rad,Nm\nTime,Position,Torque\n", SI),
+        ("Time,Position,Torque\ndouble,double,double\ns,rad,Nm\n", SI),
+        ('"Time","Position","Torque"\n"s","rad","Nm"\n', SI),
+        ("# Time,Position,Torque\n# s,rad,Nm\n", SI),
+        ("Time,Position,Torque\n(ms),(deg),(V)\n\n", ["Time [ms]", "Position [deg]", "Torque [V]"]),
+        ("Time,Position,Torque\n[s],[counts],[%]\n", ["Time [s]", "Position [counts]", "Torque [%]"]),
+        ("Time,Position,Torque\ns,rad,Nm/kg\n", ["Time [s]", "Position [rad]", "Torque [Nm/kg]"]),
+        ("Time,Position,Torque\ns,1,-\n", ["Time [s]", "Position", "Torque"]),
+        ("Time,Pos,Pos\ns,rad,deg\n", ["Time [s]", "Pos [rad]", "Pos [deg]"]),
+    ],
+)
+def test_names_and_units_are_found_in_the_lines_above_the_rows(tmp_path, head, names):
+    (tmp_path / "run.csv").write_text(head + ROWS)
+    table = Table.load(tmp_path / "run.csv")
+    assert list(table.columns) == names
+    assert [table.column(name)[0] for name in names] == [0.01, 0.1, 1.0]
+
+
+@pytest.mark.parametrize("separator", [";", "\t", " "])
+def test_they_are_found_whatever_separates_the_columns(tmp_path, separator):
+    head = "Time,Position,Torque\ns,rad,Nm\n"
+    (tmp_path / "run.txt").write_text((head + ROWS).replace(",", separator))
+    assert list(Table.load(tmp_path / "run.txt").columns) == SI
+
+
+def test_a_first_row_with_a_cell_that_is_empty_is_a_row(tmp_path):
+    (tmp_path / "run.csv").write_text("Time,Position,Torque\n0.000,,\n" + ROWS)
+    assert len(Table.load(tmp_path / "run.csv").column("Position")) == 60
