@@ -206,12 +206,14 @@ def contend(
     """Contenders of these trials, in their order; those that diverge are left out.
 
     Chi2 of those that matter comes to `reach`; what does not is weighed as far as it has come. The nominal model is a measure for
-    all and always fitted whole.
+    all and always fitted whole, and so is the best model of each number of effects: what richer ones explain beside it decides.
     """
+    whole = {min(group, key=lambda one: one.chi2).added for group in _by_size(trials).values()}
 
     def one(case: tuple[Trial, Kind]) -> tuple[CrossValidated, Array, dict[str, float]]:
-        needed = math.inf if case[1] == "nominal" else reach
-        fit = whole_fit(case[0], series, rows.noise, step, reach=needed)
+        trial, kind = case
+        needed = math.inf if kind == "nominal" or trial.added in whole else reach
+        fit = whole_fit(trial, series, rows.noise, step, reach=needed)
         found = cross_validate(linearised(fit, rows), rows.blocks)
         state_steps = fit.linearisation.state_steps
         free = start_freedom(
@@ -225,6 +227,15 @@ def contend(
     results = counted(fork_map(one, list(trials)), len(trials), "hypotheses", tell)
     done = {i: r for i, r in results if not isinstance(r, Exception) and np.isfinite(r[0].error).all()}
     return [Contender(*trials[i], *done[i]) for i in sorted(done)]
+
+
+def _by_size(trials: Sequence[tuple[Trial, Kind]]) -> dict[int, list[Trial]]:
+    """The models of effects, by the number of these."""
+    found: dict[int, list[Trial]] = {}
+    for trial, kind in trials:
+        if kind == "effects":
+            found.setdefault(len(trial.added), []).append(trial)
+    return found
 
 
 def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> list[Hypothesis]:

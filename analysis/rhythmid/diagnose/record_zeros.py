@@ -4,7 +4,8 @@ A zero of each record is a hypothesis like any other. It is not missing physics,
 the mean of a motion shifts with its amplitude where a stiffness is not symmetric. So it is adopted, for all hypotheses alike, where
 it predicts data that the fit has not seen decisively better, both beside the nominal model and beside the effect of the catalogue that
 explains the records best, and where with both the machine is followed: a zero is a calibration, and does not stand for a machine that
-has changed from record to record. The output is linear in its zeros, so that cross-validation to first order is exact in them.
+has changed from record to record. The output is linear in its zeros, so that beside the nominal model cross-validation to first order is
+exact in them; beside the effect both are fitted together.
 """
 
 import math
@@ -67,11 +68,27 @@ class _Seen:
         none = np.empty(0)
         return beside(self.fit, self.base, FreeMap("zero", columns, none, none), self.rows, self.reach)
 
+    def refitted(self, pool: ThreadPoolExecutor | None) -> Linearised | None:
+        """The fit with a zero of each record, everything fitted again: an effect that was fitted without them is far from where it is with
+        them. None where that fails."""
+        try:
+            free = estimate(
+                with_record_zero(self.fit.model),
+                others_marked(self.fit.run.series),
+                noise=self.rows.noise,
+                pool=pool,
+            )
+            return following(linearised(free, self.rows), self.rows, reach_of(free, self.rows, pool))
+        except InputError:
+            return None
 
-def _told(seen: _Seen, most: float = math.inf) -> bool:
+
+def _told(seen: _Seen, with_zeros: Linearised | None, most: float = math.inf) -> bool:
     """Whether zeros predict unseen data decisively better than the fit alone, and by a practical size; with an error of `most` at
     the most, as a share of the motion."""
-    found = predict([seen.with_zeros(), seen.base], seen.rows.blocks, seen.rows.record)
+    if with_zeros is None:
+        return False
+    found = predict([with_zeros, seen.base], seen.rows.blocks, seen.rows.record)
     size = seen.rows.size / seen.rows.noise.std  # errors are in units of the noise
     removed = found[1].mean_square - found[0].mean_square
     decided = weight_for(found[0], found[1]) > decisive(1) and removed > (PRACTICAL * size) ** 2
@@ -93,11 +110,13 @@ def with_zeros(
     fit, series, kept = calibration.fit, calibration.series, (calibration, list(unseen))
     if len({record_of(one) for one in series}) < 2 or series[0].measured != "position":
         return kept
-    if not _told(_Seen.of(fit, pool)):
+    alone = _Seen.of(fit, pool)
+    if not _told(alone, alone.with_zeros()):
         return kept
     tell("the output's zero seems to differ from record to record; looking for an effect that says the same")
     known = catalogue.within(scales(series, fit.model))
-    if not _told(_Seen.of(search(series, fit, given, known, pool, tell, most=1).fit, pool), FOLLOWS):
+    explained = _Seen.of(search(series, fit, given, known, pool, tell, most=1).fit, pool)
+    if not _told(explained, explained.refitted(pool), FOLLOWS):
         return kept
     tell("refitting with a zero of each record")
     try:

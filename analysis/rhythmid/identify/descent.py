@@ -60,20 +60,28 @@ def _first_steps(model: Model, names: Sequence[str], run: FreeRun) -> Array:
     return np.array(steps)
 
 
-def _step(jacobian: Array, residual: Array, damping: float, blocked: NDArray[np.bool_]) -> Array:
-    """Levenberg-Marquardt step in the parameters that are not blocked at a bound."""
+def _step(
+    jacobian: Array, residual: Array, damping: float, blocked: NDArray[np.bool_], least: Array, most: Array
+) -> Array:
+    """Levenberg-Marquardt step (p,) in the parameters that are not blocked at a bound; one that would go beyond `least` or `most` (p,)
+    ends there, and the others are solved for again beside it."""
     free = ~blocked
     step = np.zeros(jacobian.shape[1])
-    if not free.any():
-        return step
-    j = jacobian[:, free]
-    norms = np.linalg.norm(j, axis=0)
-    norms[norms == 0.0] = 1.0
-    scaled = j / norms
-    hessian = scaled.T @ scaled
-    step[free] = -np.linalg.lstsq(
-        hessian + damping * np.eye(len(hessian)), scaled.T @ residual, rcond=1e-13
-    )[0] / norms  # fmt: skip
+    while free.any():
+        j = jacobian[:, free]
+        norms = np.linalg.norm(j, axis=0)
+        norms[norms == 0.0] = 1.0
+        scaled = j / norms
+        hessian = scaled.T @ scaled
+        left = residual + jacobian[:, ~free] @ step[~free]
+        step[free] = -np.linalg.lstsq(
+            hessian + damping * np.eye(len(hessian)), scaled.T @ left, rcond=1e-13
+        )[0] / norms  # fmt: skip
+        outside = free & ((step < least) | (step > most))
+        if not outside.any():
+            break
+        step[outside] = np.clip(step, least, most)[outside]
+        free &= ~outside
     return step
 
 
@@ -164,10 +172,11 @@ def descend(
         blocked = ((values <= low) & (gradient > 0)) | ((values >= high) & (gradient < 0))
         improved = False
         for _ in range(12):
-            step = _step(jacobian, residual, damping, blocked)
             floor = np.array([a + STAY * (v - a) if v > b else a for v, a, b in zip(values, low, brink)])
+            least, most = floor - values, high - values
+            step = _step(jacobian, residual, damping, blocked, least, most)
+            whole = bool(np.all(blocked | ((step > least) & (step < most))))
             proposed = np.clip(values + step, floor, high)
-            whole = bool(np.all(proposed == values + step))
             step = proposed - values
             trial = model.with_values(dict(zip(names, proposed)))
             moved, promised = [], _prior_cost(priors, proposed)

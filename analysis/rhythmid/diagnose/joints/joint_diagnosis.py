@@ -259,13 +259,17 @@ def _augmented(best: _Explained) -> Machine:
     for joint, one in best.found.items():
         fitted = one.result.chosen if stated[joint] else one.result.nominal
         path = machine.paths[joint]
-        rotor = fitted.model.mass.value - path.mass.value
-        if INERTIA in fitted.fit.names:
+        adopted = {
+            *stated[joint],
+            *one.result.nominal.fit.names,
+        }  # not a value that was set free and is not stated
+        if INERTIA in adopted:
+            rotor = fitted.model.mass.value - path.mass.value
             before = machine.body.parameters[f"{joint}.armature"]
             inertial[f"{joint}.armature"] = max(before + rotor, 0.0)
         for label, std in fitted.std().items():  # a free mass is as the joint says that tells it best
             link = label.removeprefix(f"{BODY}.")
-            free = label.startswith(f"{BODY}.") and link not in best.links
+            free = label.startswith(f"{BODY}.") and label in adopted and link not in best.links
             if free and std < spreads.get(link, math.inf):
                 inertial[link], spreads[link] = fitted.model.value(label), std
         machine = machine.with_path(joint, _without_body(fitted.model, path))

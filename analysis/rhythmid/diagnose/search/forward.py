@@ -59,7 +59,7 @@ UNDERSTATED = 0.1  # share of what a refit gains that a score shows at least, wh
 EFFECTS_AT_ONCE = 3  # effects at once
 RIVALS_COMPARED = 4  # models of each number of effects that are compared at the end
 OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
-# of the noise: integration error of an element with corners beyond which all steps are made finer
+# of the noise that a model leaves: integration error beyond which all steps are made finer
 POOR_FIT = 0.1
 
 
@@ -247,9 +247,11 @@ def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State
 
 
 def _finely_fitted(task: _Task, trial: Trial, noise: NoiseModel, step: float) -> tuple[Fit, float]:
-    """The whole fit of a trial, with the step [s] that it needs."""
+    """The whole fit of a trial, with the step [s] that it needs: what was an error of integration beside a mismatch may be all that is
+    left once that is explained."""
     fit = whole_fit(trial, task.series, noise, step, pool=task.pool)
-    finer = accurate(fit.run, fit.model, fit.starts, POOR_FIT * fit.noise.variance**0.5, 2)
+    left = noise_of(fit.residuals, task.series, task.floor)
+    finer = accurate(fit.run, fit.model, fit.starts, POOR_FIT * left.variance**0.5, 2)
     if finer.max_step >= 0.45 * fine_enough(trial.model, step):
         return fit, step
     step = finer.max_step
