@@ -97,17 +97,17 @@ def test_what_is_not_tried_is_told_with_the_reason(scales, name, reason):
     )
 
 
-def test_a_machine_that_nothing_drives_lacks_no_command_nor_actuator(scales):
+def test_a_machine_that_nothing_drives_lacks_no_command_no_actuator_and_no_other_clock(scales):
     model = Model.from_text("inertia: {mass: 1.0}")
     idle = candidates(CATALOGUE, model.setting, replace(scales, idle=True))
     driven = candidates(CATALOGUE, model.setting, scales)
     gone = {element.name for element, _ in driven.tried} - {element.name for element, _ in idle.tried}
-    assert {"actuator_lag", "backlash", "command_hold", "load_dependent_friction"} <= gone
+    assert {"actuator_lag", "backlash", "command_hold", "clock_skew", "load_dependent_friction"} <= gone
     assert {idle.not_tried[name] for name in gone} == {IDLE}
     assert gone == {
         element.name
         for element, _ in driven.tried
-        if element.slot in ("command", "actuator") or element.name == "load_dependent_friction"
+        if element.slot in ("command", "actuator", "timing") or element.name == "load_dependent_friction"
     }
 
 

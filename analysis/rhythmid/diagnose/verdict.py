@@ -171,7 +171,7 @@ def decide(
     names = dict(zip(chosen.elements, chosen.names))
     if chosen.kind == "free_map":  # the map is no name
         labels = tuple(label for label in labels if label != chosen.elements[-1])
-    if chosen.kind == "delay" and len(labels) > 1:  # a delay beside effects is told with the delays
+    if chosen.kind == "delay" and chosen.effects:  # a delay beside effects is told with the delays
         labels = tuple(label for label in labels if label != INPUT_DELAY)
     alone = {label: _sure(shares[label], left.expected, size_errors.get(label, 0.0)) for label in labels}
     open_ = [label for label in labels if alone[label] < STATED]

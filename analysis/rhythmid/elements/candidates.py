@@ -85,7 +85,7 @@ def _unsuitable(element: Element, setting: Setting, scales: Scales) -> str | Non
         return "it needs an angle as position"
     if element.controlled and not setting.controlled:
         return "it needs a controller in the model"
-    if scales.idle and (element.driven or element.slot in ("command", "actuator")):
+    if scales.idle and (element.driven or element.slot in ("command", "actuator", "timing")):
         return IDLE
     if element.displaced_base and not scales.displaced_base:
         return "it needs an input that displaces the base"

@@ -194,7 +194,9 @@ def stated_at(one: JointResult) -> tuple[str, ...]:
     if chosen.kind not in ("freed_value", "delay") or not (alike or decision.joint >= STATED):
         return ()
     known = all(label == INERTIA or name_of(one.joint, label)[0] != label for label in own)
-    return decision.named if known else ()  # another value of the path is its author's to check
+    if not known:  # another value of the path is its author's to check
+        return ()
+    return decision.named if alike else tuple(n for n in decision.named if decision.probability[n] >= STATED)
 
 
 def _own_labels(one: JointResult) -> list[str]:
