@@ -230,10 +230,14 @@ def _step(
 
 
 def condition_of(fit: EffortFit) -> float:
-    """Condition number of the parameters' columns, each scaled to length 1, without the priors' help."""
+    """Condition number of the parameters' columns, each scaled to length 1, without the priors' help.
+
+    A parameter that moves no row, such as the time of a jump within a sample, is mistaken for no other one and does not count.
+    """
     columns = fit.jacobian[:, 1:]
     norms = np.linalg.norm(columns, axis=0)
-    if not len(norms) or not norms.all():
+    acting = norms > 0.0
+    if not acting.any():
         return math.inf if len(norms) else 1.0
-    values = np.linalg.svd(columns / norms, compute_uv=False)
+    values = np.linalg.svd(columns[:, acting] / norms[acting], compute_uv=False)
     return float(values[0] / values[-1]) if values[-1] > 0.0 else math.inf
