@@ -66,13 +66,14 @@ def repeated_samples(value: Array) -> Mask:
     if len(value) < NEAR or not np.any(step == 0.0) or not np.any(step != 0.0):
         return found
     edges = np.diff(np.concatenate([[False], step == 0.0, [False]]).astype(int))
-    runs = list(zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)))  # of steps of zero
+    # of steps of zero
+    runs = list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
     lengths = np.array([end - begin for begin, end in runs])
     count = resolution(value)
     even = _read_often(step, lengths, count)
     share = lengths.sum() / len(step)
     for begin, end in runs:
-        leap = count == 0.0 and share <= LARGEST_SHARE and _leaps(step, int(begin), int(end))
+        leap = count == 0.0 and share <= LARGEST_SHARE and _leaps(step, begin, end)
         if end < len(step) and (even or leap):
             found[begin + 1 : end + 1] = True
     if even:
@@ -93,9 +94,7 @@ def _read_often(step: Array, lengths: NDArray[np.int64], count: float) -> bool:
 def _measured_again(runs: Sequence[tuple[int, int]], every: int) -> list[int]:
     """Samples within runs of repeats at which a sensor that measures `every` so many samples has found the same once more."""
     return [
-        int(begin) + number * every
-        for begin, end in runs
-        for number in range(1, round((end + 1 - begin) / every))
+        begin + number * every for begin, end in runs for number in range(1, round((end + 1 - begin) / every))
     ]
 
 
