@@ -45,7 +45,7 @@ class SpentText(ProgressColumn):
 
 
 def spent_words(elapsed: float, seconds: float) -> str:
-    """How much of a budget [s] is spent after `elapsed` [s]. What is under way when it ends is brought to its end."""
+    """How much of a budget [s] is spent after `elapsed` [s]. What an answer needs is done all the same."""
     if elapsed >= seconds:
         return f"{seconds:g} s spent; finishing"
     return f"{100.0 * elapsed / seconds:.0f} % of {seconds:g} s spent"

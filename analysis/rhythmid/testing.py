@@ -92,7 +92,7 @@ class GraphRun:
     def diagnose(self, model: str | Path = PAPER_HOPPER, budget: float | None = None) -> Diagnosis:
         """Verdict about the nominal `model`, by default the paper's hopper: what `rhythmid diagnose` says.
 
-        `budget` [s] bounds the search. Raises InputError.
+        `budget` [s] bounds the diagnosis. Raises InputError.
         """
         from rhythmid.diagnose.diagnosis import diagnose
         from rhythmid.model import Model

@@ -6,10 +6,11 @@ import pytest
 from answers import diagnosed
 
 from machines import CATALOGUE, SHORT, hopper, records
+from rhythmid.deadline import SPENT
 from rhythmid.diagnose import diagnosis as module
 from rhythmid.diagnose.answer.result import Diagnosis, Untried
-from rhythmid.diagnose.case import SPENT
-from rhythmid.diagnose.diagnosis import DOUBTED, Answer, diagnose
+from rhythmid.diagnose.diagnosis import ANOTHER, DOUBTED, Answer, diagnose
+from rhythmid.errors import InputError
 
 RECORD = records(hopper(), SHORT[2:])
 FRICTION = diagnosed("missing_physics", "coulomb_friction")
@@ -96,6 +97,43 @@ def test_every_other_verdict_is_told_with_what_it_says(monkeypatch):
 def test_one_way_to_score_is_compared_with_nothing(monkeypatch):
     assert answered(monkeypatch, FRICTION) == (FRICTION, [])
     assert answered(monkeypatch, QUIET, by_effort=FRICTION) == (QUIET, [])
+
+
+def test_another_way_to_score_that_cannot_follow_the_machine_is_told_with_the_reason(monkeypatch):
+    def answers(*_):
+        yield Answer(diagnosed("undecided", kind="effort"), hopper(), SimpleNamespace())  # type: ignore[arg-type]
+        raise InputError("the model diverges")
+
+    monkeypatch.setattr(module, "applicable", lambda *_: SimpleNamespace(applies=True))
+    monkeypatch.setattr(module, "_answers", answers)
+    found = diagnose(RECORD, hopper(), catalogue=CATALOGUE).diagnosis
+    assert found.verdict == "undecided"
+    assert found.excluded == (Untried(ANOTHER, "the model diverges"),)
+
+
+def test_where_neither_motion_nor_effort_can_be_scored_both_reasons_are_told(monkeypatch):
+    def answers(*_):
+        raise InputError("the model diverges")
+        yield
+
+    refused = SimpleNamespace(applies=False, balance=object(), reason="no map explains it")
+    monkeypatch.setattr(module, "applicable", lambda *_: refused)
+    monkeypatch.setattr(module, "_answers", answers)
+    with pytest.raises(InputError, match=r"diverges\. The recorded effort .* no map explains it"):
+        diagnose(RECORD, hopper(), catalogue=CATALOGUE)
+
+
+def test_a_warning_of_units_for_which_there_was_no_time_is_no_reason_to_refuse(monkeypatch):
+    def refused(*_):
+        raise InputError("the input seems to be in mm")
+
+    monkeypatch.setattr(module, "check_plausible", refused)
+    monkeypatch.setattr(module, "time_is_up", lambda: True)
+    found, _ = answered(monkeypatch, FRICTION)
+    assert found.excluded == (Untried("units and signs of the channels", SPENT),)
+    monkeypatch.setattr(module, "time_is_up", lambda: False)
+    with pytest.raises(InputError, match="in mm"):
+        answered(monkeypatch, FRICTION)
 
 
 def test_a_comparison_for_which_there_is_no_time_is_told(monkeypatch):

@@ -1,5 +1,6 @@
 """A budget of time: whatever it cuts off is told, by motion and by effort, and nothing where there is time enough."""
 
+import math
 from collections.abc import Iterator
 from itertools import chain, repeat
 
@@ -8,9 +9,11 @@ from axes import CATALOGUE as EVERYTHING
 from axes import axis, axis_model
 
 from machines import CATALOGUE, SHORT, hopper, only, records
+from rhythmid.deadline import SPENT
 from rhythmid.diagnose.answer.result import Diagnosis
-from rhythmid.diagnose.case import SPENT, Budget
+from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.diagnosis import diagnose
+from rhythmid.diagnose.effort import search
 
 FEW = ("coulomb_friction", "cubic_stiffness", "quadratic_drag")
 FRICTION = {"force": 0.02, "transition": 0.002}
@@ -55,6 +58,25 @@ def test_by_motion_a_budget_that_is_spent_after_an_effect_tells_that_it_was_not_
     found = by_motion()
     assert found.missing[0].element == "coulomb_friction"
     assert "backward elimination" in cut_off(found)
+
+
+def test_by_motion_a_time_that_is_over_tells_what_could_not_be_tried_and_names_nothing(monkeypatch):
+    calibrated = Budget(0.0, began=-1e9)
+    monkeypatch.setattr(Budget, "at", lambda self, share, least=0.0: math.inf if least else calibrated.began)
+    monkeypatch.setattr(Budget, "spent", False)
+    found = by_motion()
+    assert found.verdict == "undecided" and not found.missing
+    told = " ".join(cut_off(found))
+    assert all(
+        one in told for one in ("coulomb_friction", "freed values", "convergence of the nominal model")
+    )
+
+
+def test_by_effort_a_time_that_is_over_tells_the_candidates_that_were_not_fitted(monkeypatch):
+    monkeypatch.setattr(search, "time_is_up", lambda: True)
+    found = by_effort()
+    assert found.verdict == "undecided" and not found.missing
+    assert "coulomb_friction" in cut_off(found)
 
 
 def test_by_effort_a_budget_that_is_spent_at_once_tells_all_candidates(monkeypatch):

@@ -183,6 +183,24 @@ def test_beyond_a_saturation_the_effort_that_went_in_stays_finite():
     )
 
 
+@pytest.mark.parametrize("share", [1e-3, 0.01, 0.1, 0.5])
+def test_a_saturation_below_most_of_the_effort_asks_for_its_excess_and_no_more(share):
+    balance = Balance.of([axis()], axis_model())
+    after = balance.required(axis_model())[0]
+    limit = share * float(np.abs(after).max())
+    model = axis_model().with_element(CATALOGUE["actuator_saturation"], {"limit": limit})
+    into = balance.required(model)[0]
+    excess = np.where(np.abs(after) > limit, after - np.sign(after) * limit, 0.0)
+    np.testing.assert_allclose(into, after + excess, atol=0.01)  # within the secant over the corner, less
+
+
+def test_a_parameter_that_moves_no_row_keeps_no_effort_from_being_scored():
+    model = axis_model().with_element(CATALOGUE["linear_spring"], {"stiffness": 1.0, "rest_length": 0.0})
+    jump = {"change": 0.1, "time": 7.002}  # between two samples
+    found = applicable([axis(jitter=0.0)], model.with_element(CATALOGUE["stiffness_jump"], jump))
+    assert found.applies and np.isfinite(found.condition)
+
+
 def test_a_dead_band_takes_what_it_takes_from_the_effort():
     model = axis_model().with_element(CATALOGUE["actuator_deadband"], {"threshold": 0.1})
     balance = Balance.of([axis()], axis_model())

@@ -38,6 +38,30 @@ def test_a_sensor_that_is_read_more_often_than_it_measures_keeps_its_measurement
     assert np.array_equal(value[kept][: len(fresh) - 2], fresh[:-2])
 
 
+@given(seed=seeds, times=st.integers(2, 10))
+def test_a_fine_encoder_that_is_read_too_often_keeps_its_measurements_though_its_counts_show(seed, times):
+    count = 1e-6
+    fresh = count * np.round(motion(np.random.default_rng(seed), 1e-4)[::times] / count)
+    fresh[3] = fresh[2] + count
+    value = np.repeat(fresh, times)[: len(TIME)]
+    assert resolution(value) == pytest.approx(count, rel=1e-6)
+    kept = ~repeated_samples(value)
+    assert np.array_equal(np.flatnonzero(kept)[: len(fresh) - 2], times * np.arange(len(fresh) - 2))
+
+
+def test_a_coarse_value_that_creeps_evenly_from_count_to_count_loses_no_sample():
+    assert not repeated_samples(1e-3 * np.floor(np.arange(5000) / 10.0)).any()
+
+
+@pytest.mark.parametrize("count", [0.0, 1e-6])
+def test_of_a_rest_of_the_machine_a_sensor_that_is_read_too_often_keeps_what_it_measures(count):
+    fresh = motion(np.random.default_rng(1), 1e-4)[::10]
+    fresh[:50] = fresh[50]
+    fresh = count * np.round(fresh / count) if count else fresh
+    kept = ~repeated_samples(np.repeat(fresh, 10))
+    assert np.array_equal(np.flatnonzero(kept)[:495], 10 * np.arange(495))
+
+
 def test_a_sensor_that_stands_still_for_a_while_is_believed_before_and_after():
     value = motion(np.random.default_rng(1), 1e-3)
     value[1000:1060] = value[999]

@@ -340,3 +340,16 @@ def test_an_inertia_that_the_record_does_not_tell_is_what_follows_within_a_sampl
     )
     assert "CHECK inertia.mass: the records do not tell the inertia" in "\n".join(begun.lines())
     assert "#   CHECK: the records do not tell the inertia" in begun.model
+
+
+def test_the_interval_within_which_an_inertia_is_not_told_is_that_of_the_filtered_motion(tmp_path):
+    rng = np.random.default_rng(0)
+    place = foreign.STEP * np.cumsum(FORCE / 0.6) + 1e-4 * rng.standard_normal(len(FORCE))
+    noisy = FORCE + 0.05 * rng.standard_normal(len(FORCE))
+    np.savez(tmp_path / "run.npz", t=TIME, position=place, force=noisy)
+    begun = start([tmp_path / "run.npz"])
+    model = begun.nominal.model
+    interval = model.value("inertia.mass") / model.value("viscous_damper.damping")
+    assert interval > 1.5 * foreign.STEP
+    told = "\n".join(begun.lines())
+    assert f"within {1e3 * interval:.2g}" in told and "once noise is filtered out" in told

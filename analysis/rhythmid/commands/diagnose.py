@@ -58,7 +58,7 @@ def diagnose(
         typer.Option(
             "--budget",
             metavar="SECONDS",
-            help="Wall-clock time after which no new round of the search and no other scoring mode begins; "
+            help="Wall-clock time in which an answer is due: 70 % of it for the search, the rest for what weighs its results; "
             "the answer says what was not tried.",
         ),
     ] = None,

@@ -37,7 +37,7 @@ def proof(
         ),
     ] = False,
     budget: Annotated[
-        float, typer.Option("--budget", min=0.0, help="Seconds that each diagnosis may search; 0: no limit.")
+        float, typer.Option("--budget", min=0.0, help="Seconds in which each diagnosis is due; 0: no limit.")
     ] = 0.0,
     jobs: Annotated[
         int, typer.Option("--jobs", min=1, help="Cases in parallel; they share the processors evenly.")

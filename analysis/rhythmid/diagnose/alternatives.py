@@ -27,6 +27,7 @@ from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import INERTIA, Model, Term
+from rhythmid.progress import Tell, silent
 from rhythmid.simulation.compiled import compile_model
 from rhythmid.simulation.generated_source import DRIVES
 from rhythmid.simulation.transport import INPUT_DELAY
@@ -48,6 +49,7 @@ def alternatives(
     rounds: Sequence[Round],
     weighed: Sequence[Trial],
     reach: float = math.inf,
+    tell: Tell = silent,
 ) -> list[tuple[Trial, Kind]]:
     """Fitted trials of other kinds, for the nominal model and in the place of the chosen effects.
 
@@ -82,7 +84,8 @@ def alternatives(
     if not kinds:
         return []
     states = compile_model(chosen.model).layout.states
-    trials, _ = run_trials(list(proposals.values()), series, chosen.starts, states, noise, step, reach=reach)
+    given = list(proposals.values())
+    trials, _ = run_trials(given, series, chosen.starts, states, noise, step, reach=reach, tell=tell)
     return [(trial, kinds[tuple(sorted(trial.added))]) for trial in trials]
 
 

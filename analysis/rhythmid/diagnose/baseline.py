@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rhythmid.deadline import time_is_up
 from rhythmid.diagnose.constants import EARLIEST, FOLLOWS, LATEST, NOT_HELD, NOT_HELD_LEAST, STANDS_IN
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
@@ -119,7 +120,7 @@ def calibrate(
         best = estimate(model, series, pool=pool)
     except InputError as error:
         failure = error
-    if best is None or best.nrmse() > SETTLED or not best.converged:
+    if best is None or ((best.nrmse() > SETTLED or not best.converged) and not time_is_up()):
         try:
             again = estimate(_shooting_start(model, series, pool), series, pool=pool)
             if best is None or sum(float(r @ r) for r in again.residuals) < sum(
@@ -134,7 +135,7 @@ def calibrate(
     if INERTIA in best.names and best.std[INERTIA] > best.model.value(INERTIA):
         found = calibrate(_as_given(model, INERTIA), series, catalogue, pool, tell)
         return replace(found, notes=(*notes, _no_mass(model), *found.notes))
-    if best.nrmse() > FOLLOWS:
+    if best.nrmse() > FOLLOWS and not time_is_up():
         best = _scan_delays(best, series, pool)
     found = _hold(best, series, pool, tell)
     return replace(found, notes=(*notes, *found.notes))

@@ -1,5 +1,6 @@
 """A case: what a diagnosis is asked, and what all of its parts need."""
 
+import math
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -10,21 +11,27 @@ from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 
-SPENT = "the time given was spent"  # why something was not tried
+# shares of a budget up to which the catalogue is searched, and other kinds of explanation are weighed and tried: what follows needs
+# the rest
+SEARCHED, WEIGHED = 0.7, 0.85
+LEAST_CALIBRATION = 10.0  # s in which the nominal model may be refitted, however small a budget is: without that nothing can be said
 
 
 @dataclass(frozen=True)
 class Budget:
-    """Seconds on the wall clock, from when the budget was made, after which a search begins nothing more; None for as long as
-    it needs."""
+    """Seconds on the wall clock, from when the budget was made, in which an answer is due; None for as long as it needs."""
 
     seconds: float | None = None
     began: float = field(default_factory=time.monotonic)
 
+    def at(self, share: float, least: float = 0.0) -> float:
+        """When so large a share of it will have passed, but `least` [s] at least; infinite without any seconds."""
+        return math.inf if self.seconds is None else self.began + max(share * self.seconds, least)
+
     @property
     def spent(self) -> bool:
-        """Whether no more is to be begun."""
-        return self.seconds is not None and time.monotonic() - self.began > self.seconds
+        """Whether the search is to begin nothing more."""
+        return time.monotonic() > self.at(SEARCHED)
 
 
 @dataclass(frozen=True)
@@ -38,7 +45,7 @@ class Case:
     catalogue : elements that may be missing.
     pool : threads that simulate.
     tell : is told what begins.
-    budget : time for the search.
+    budget : time for the answer.
     """
 
     nominal: Model

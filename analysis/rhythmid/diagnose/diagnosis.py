@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any, cast
 
 from threadpoolctl import threadpool_limits
 
+from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.admission import Admitted, admitted
 from rhythmid.diagnose.answer.compose import compose
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis, Untried
 from rhythmid.diagnose.baseline import causal, check_free
-from rhythmid.diagnose.case import SPENT, Budget, Case
+from rhythmid.diagnose.case import LEAST_CALIBRATION, SEARCHED, Budget, Case
 from rhythmid.diagnose.constants import DRIVES_IT, LEFT
 from rhythmid.diagnose.effort.candidate import SEEN
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
 
 HOW: Mapping[ScoringKind, str] = {"free_run": "in free run", "windows": "in windows", "effort": "by effort"}
 BY_EFFORT, BY_MOTION = "scoring by the recorded effort", "scoring by the motion, in free run or in windows"
+ANOTHER = "another scoring mode"
 DOUBTED = "Believe neither without another experiment."
 
 
@@ -176,7 +178,7 @@ def diagnose(
     tell
         Called with a sentence at the beginning of each step.
     budget
-        Seconds on the wall clock that may pass before the search begins nothing more; the answer says what was not tried.
+        Seconds on the wall clock in which an answer is due; the answer says what was not tried for want of time.
 
     Returns
     -------
@@ -220,17 +222,19 @@ def diagnose(
         case = Case(model, given.records, given.holdout, known, pool, tell, Budget(budget))
         whole = replace(case, records=given.whole_records, holdout=given.whole_holdout)
         effort = applicable(whole.records, model)
-        warned = check_plausible(case.nominal, case.records, case.pool)
+        untried: list[Untried] = []
+        warned = _warning(case, untried)
         made: list[Answer] = []
-        untried: list[str] = []
         answers = _answers(case, whole, effort, given, untried)
         while not made or not made[-1].stands:
             try:
                 answer = next(answers, None)
-            except InputError:
+            except InputError as error:
                 if not made:
-                    raise
-                break  # another way to score could not follow the machine
+                    raise _refused(error, effort) from error
+                # another way to score could not follow the machine
+                untried.append(Untried(ANOTHER, str(error)))
+                break
             if answer is None:
                 break
             made.append(answer)
@@ -238,15 +242,37 @@ def diagnose(
         unscored = effort.applies and all(one.diagnosis.scoring.kind != "effort" for one in made)
         if unscored and chosen.stands:
             if case.budget.spent:
-                untried.append("a comparison with the recorded effort")
+                untried.append(Untried("a comparison with the recorded effort", SPENT))
             else:
                 made.append(_by_effort(whole, effort, (), len(chosen.diagnosis.missing)))
         answer = _with_untried(_compared(chosen, made), untried)
         return with_unit_warning(answer, case.nominal, warned)
 
 
+def _warning(case: Case, untried: list[Untried]) -> str | None:
+    """What `check_plausible` warns of. With the time for it over it is no judgement, and joins `untried`."""
+    with deadline(case.budget.at(SEARCHED, LEAST_CALIBRATION)):
+        try:
+            warned = check_plausible(case.nominal, case.records, case.pool)
+        except InputError:
+            if not time_is_up():
+                raise
+            warned = None
+        if not time_is_up():
+            return warned
+    untried.append(Untried("units and signs of the channels", SPENT))
+    return None
+
+
+def _refused(error: InputError, effort: Applicability) -> InputError:
+    """Why no way to score could be gone: what the motion lacks, and what the recorded effort does."""
+    if effort.balance is None:
+        return error
+    return InputError(f"{error}. The recorded effort cannot be scored either: {effort.reason}")
+
+
 def _answers(
-    case: Case, whole: Case, effort: Applicability, given: Admitted, untried: list[str]
+    case: Case, whole: Case, effort: Applicability, given: Admitted, untried: list[Untried]
 ) -> Iterator[Answer]:
     """Answers of all ways to score that apply, the most telling way first; they are worked out as they are asked for.
 
@@ -261,7 +287,7 @@ def _answers(
 
     def late(way: str) -> bool:
         if case.budget.spent:
-            untried.append(way)
+            untried.append(Untried(way, SPENT))
         return case.budget.spent
 
     if effort.applies and not effort.free_run_means_something:
@@ -272,9 +298,10 @@ def _answers(
     series, count = prepare((*case.records, *case.holdout)), len(case.records)
 
     def by_motion(windows: bool) -> Iterator[Answer]:
-        ways = settle(
-            case.nominal, series[:count], series[count:], case.catalogue, case.pool, case.tell, windows
-        )
+        with deadline(case.budget.at(SEARCHED, LEAST_CALIBRATION)):
+            ways = settle(
+                case.nominal, series[:count], series[count:], case.catalogue, case.pool, case.tell, windows
+            )
         for number, scoring in enumerate(ways):
             if number and late(f"scoring {HOW[scoring.kind]}"):
                 return
@@ -330,13 +357,12 @@ def _difference(found: Diagnosis, other: Diagnosis) -> str | None:
     return f"{scored} come to another verdict. {other.summary}"
 
 
-def _with_untried(answer: Answer, ways: Sequence[str]) -> Answer:
-    """The answer that says, too, which ways to score the budget left no time for."""
-    if not ways:
+def _with_untried(answer: Answer, untried: Sequence[Untried]) -> Answer:
+    """The answer that says, too, which ways to score the budget left no time for, or the records could not be scored in."""
+    if not untried:
         return answer
     found = answer.diagnosis
-    late = tuple(Untried(way, SPENT) for way in ways)
-    return replace(answer, diagnosis=replace(found, excluded=(*found.excluded, *late)))
+    return replace(answer, diagnosis=replace(found, excluded=(*found.excluded, *untried)))
 
 
 def with_unit_warning(answer: Answer, nominal: Model, warned: str | None) -> Answer:

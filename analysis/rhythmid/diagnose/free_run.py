@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.alternatives import alternatives
 from rhythmid.diagnose.baseline import Calibration
-from rhythmid.diagnose.case import SPENT, Case
+from rhythmid.diagnose.case import WEIGHED, Case
 from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
 from rhythmid.diagnose.contenders import (
     Contender,
@@ -59,6 +60,7 @@ from rhythmid.identify.student import autocorrelation_time
 
 # what competes beside the effects that were searched for, where there is time
 OTHER_KINDS = ("freed values, longer delays, other places, free functions and related laws",)
+INTERVALS = ("intervals followed along the likelihood, and integration in finer steps",)
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,12 @@ class FreeRunResult:
 
 
 def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
-    """Search, weigh and decide."""
+    """Search, weigh and decide; what the budget of the case leaves no time for is told among what the search has excluded."""
+    with deadline(case.budget.at(1.0)):
+        return _free_run(case, scoring)
+
+
+def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     calibration = _with_jitter(scoring)
     seen = list(calibration.series)
     unseen = tuple(scoring.unseen) if case.holdout else ()
@@ -98,7 +105,8 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     rows = rows_of(seen, unseen, found.noise)
     kinds: list[tuple[Trial, Kind]] = [(t, "effects" if t.added else "nominal") for t in found.trials]
     reach = reach_of(found.fit.chi2, found.fit.samples)
-    contenders = contend(kinds, seen, rows, step, reach, case.tell)
+    with deadline(case.budget.at(WEIGHED)):
+        contenders = contend(kinds, seen, rows, step, reach, case.tell)
     run = trajectories(found.fit)
     sizes = scales(seen, found.fit.model)
     structured = scoring.kind == "free_run" and calibration.fit.noise.is_structure
@@ -111,9 +119,12 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     elif chosen.kind != "freed_value":
         nominal = next(one.trial for one in contenders if one.kind == "nominal")
         weighed = [one.trial for one in contenders]
-        others = alternatives(
-            nominal, trial, seen, known, found.noise, step, run, found.rounds, weighed, reach
-        )
+        case.tell("trying other kinds of explanation")
+        with deadline(case.budget.at(WEIGHED)):
+            others = alternatives(
+                nominal, trial, seen, known, found.noise, step, run, found.rounds, weighed, reach, case.tell
+            )
+            found = _told(found, OTHER_KINDS)
         contenders += contend(others, seen, rows, step, reach, case.tell)
     case.tell("locating what is left")
     after = dependences(run, rows, case.pool)
@@ -138,7 +149,8 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     found = _with_best(found, trial, case)
     least = _detectable(contenders, selection.chosen, rows)
     if trial.added and selection.chosen.kind == "effects":
-        found = ticks_followed(profiled(finely_stepped(found, case.pool), case.pool), case.pool)
+        found = _told(_followed(found, case), INTERVALS)
+    found = replace(found, excluded=(*found.excluded, *_unconverged(calibration.fit, found)))
     between = covariance_between(found.fit.names, selection.chosen, contest.hypotheses)
     unnamed = _unnamed(found, known, case)
     fit = with_robust_covariance(found.fit)
@@ -160,6 +172,30 @@ def free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         least,
         errors,
     )
+
+
+def _followed(found: Search, case: Case) -> Search:
+    """The search with a fit of its chosen model whose intervals hold, as far as there is time."""
+    for step in (finely_stepped, profiled, ticks_followed):
+        if time_is_up():
+            break
+        if step is profiled:
+            case.tell("following the likelihood to the ends of the intervals")
+        found = step(found, case.pool)
+    return found
+
+
+def _told(found: Search, untried: tuple[str, ...]) -> Search:
+    """The search that tells what was not tried, or not brought to its end, where time was up meanwhile."""
+    return replace(found, excluded=(*found.excluded, (untried, SPENT))) if time_is_up() else found
+
+
+def _unconverged(nominal: Fit, found: Search) -> list[tuple[tuple[str, ...], str]]:
+    """Which of the refitted nominal model and the chosen one a deadline has stopped before its end."""
+    named = {"nominal": nominal, "chosen" if found.best.added else "nominal": found.fit}
+    return [
+        ((f"convergence of the {name} model",), SPENT) for name, fit in named.items() if fit.message == SPENT
+    ]
 
 
 def _step(found: Search) -> float:

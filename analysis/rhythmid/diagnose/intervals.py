@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.deadline import time_is_up
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.search.refit import whole_fit
 from rhythmid.errors import InputError
@@ -55,10 +56,12 @@ def profiled(found: Search, pool: ThreadPoolExecutor | None = None) -> Search:
     """The search with its fit at the lowest minimum within sight, and intervals of its effects that the likelihood bears out.
 
     A parameter whose likelihood does not rise before its bound, or before it has lost all relation to its value, is
-    undetermined: its variance is infinite.
+    undetermined: its variance is infinite. Where a deadline passes the intervals are borne out as far as they were followed.
     """
     reach = np.zeros(len(found.fit.names))
     for _ in range(DESCENTS):
+        if time_is_up():
+            break
         reach, lower = _reach(found.fit, _places(found), pool)
         better = None if lower is None else _descended(found, lower, pool)
         if better is None:
@@ -90,7 +93,7 @@ def _reach(fit: Fit, places: Sequence[int], pool: ThreadPoolExecutor | None) -> 
     reach = np.zeros(len(fit.names))
     for along in ways:
         for way, rise in [(way, next(rises)) for way in along]:
-            if not _odd(way, rise):
+            if not _odd(way, rise) or time_is_up():
                 continue
             likely, lower = _followed(fit, way, pool)
             if lower is not None:
@@ -122,7 +125,7 @@ def _followed(fit: Fit, way: _Way, pool: ThreadPoolExecutor | None) -> tuple[Arr
     if rise >= _enough(way):
         return None, None
     reach = np.zeros(len(fit.names))
-    while rise < _enough(way):
+    while rise < _enough(way) and not time_is_up():
         if rise < -FALLS:
             return None, model
         reach = np.maximum(reach, _distance(fit, model))

@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 
+from rhythmid.deadline import time_is_up
 from rhythmid.diagnose.baseline import Calibration, calibrate, reconstructed
 from rhythmid.diagnose.constants import BETTER_STEP, BETTER_TOGETHER, FOLLOWS, HOPELESS, PATIENCE
 from rhythmid.diagnose.hypothesis import ScoringKind
@@ -73,7 +74,7 @@ def settle(
     idle = 0
     failure: InputError | None = None
     for how in _ladder(model, series):
-        if how.kind == "windows" and not windows:
+        if (how.kind == "windows" and not windows) or (tried and time_is_up()):
             break
         if how.kind != "free_run":
             tell(f"scoring in {how.reason}")
@@ -121,6 +122,8 @@ def _disturbed_free_run(
     tell: Tell,
 ) -> tuple[Scoring, ...]:
     """The free run of a machine that integrates or is unstable, where the model follows it: no window shows what is slow."""
+    if time_is_up():
+        return ()
     cut, unseen = list(series), list(separate)
     if not separate:
         cut, unseen = hold_out_tail(cut)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.deadline import SPENT, time_is_up
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import FreeRun, start_of
 from rhythmid.identify.noise import NoiseModel
@@ -121,7 +122,7 @@ def descend(
 
     Stops when a further step lowers chi2, or promises to lower it, by less than `tolerance` (less where the noise model turns
     out to be too wide) or 1e-7 of itself; and when chi2, falling on as it did in the last `PACE` iterations, would not come to
-    `reach` in those that are left. `differences` are steps known from another descent of the same structure; without
+    `reach` in those that are left; and where a deadline passes. `differences` are steps known from another descent of the same structure; without
     them they are sought. Raises InputError when the model diverges at its initial values.
     """
     problem = Problem(run, names, noise, pool)
@@ -152,6 +153,8 @@ def descend(
     samples = sum(len(problem.whitened(i, r)) for i, r in enumerate(residuals))
     costs = [cost]
     for done in range(iterations):
+        if time_is_up():
+            break
         if done >= PACE and out_of_reach(costs[-1 - PACE], cost, (iterations - done) / PACE, reach):
             break
         here, states, steps, state_steps_next = problem.linearise(
@@ -231,11 +234,18 @@ def descend(
         chi2=float(sum(np.sum(w**2) for w in white)),
         samples=samples,
         converged=converged,
-        message="converged" if converged else f"no convergence in {iterations} iterations",
+        message=_message(converged, iterations),
         at_bound=tuple(name for name, stuck in zip(names, blocked) if stuck),
         differences=(steps, state_steps),
         linearisation=here,
     )
+
+
+def _message(converged: bool, iterations: int) -> str:
+    """How a descent ended."""
+    if converged:
+        return "converged"
+    return SPENT if iterations and time_is_up() else f"no convergence in {iterations} iterations"
 
 
 def out_of_reach(before: float, now: float, left: float, reach: float) -> bool:

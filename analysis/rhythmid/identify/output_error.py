@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.deadline import without_deadline
 from rhythmid.errors import InputError
 from rhythmid.identify.covariance import covariance_of, on_the_edge
 from rhythmid.identify.descent import WHITE, Descent, descend, first_guess
@@ -244,9 +245,10 @@ def estimate(
 
 
 def start_only(model: Model, series: Sequence[Series], noise: NoiseModel, max_step: float) -> Fit:
-    """Free run over records that the model has not seen: only their initial states are estimated."""
+    """Free run over records that the model has not seen: only their initial states are estimated, whatever the time."""
     run = prepare_run(model, series, max_step)
-    return minimise(model, run, (), noise)
+    with without_deadline():
+        return minimise(model, run, (), noise)
 
 
 def with_bounds(model: Model, bounds: Mapping[str, tuple[float, float]]) -> Model:

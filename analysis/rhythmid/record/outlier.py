@@ -1,6 +1,8 @@
 """Samples that do not say where the machine was: outliers, which a smooth signal cannot have taken, such as a bit that fell
 over or a lost echo, and repeats, where a sensor is read more often than it measures or has stood still for a while."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
@@ -18,6 +20,7 @@ LEAP = 1.5  # times the steps before and after, that the step out of repeats is 
 OFTEN = 0.3  # share of repeats, from which a sensor may be read more often than it measures
 FRESH = 2.5  # new values in a row between repeats, at most, where it is: two at a rate half as high again as its own
 EVEN = 0.8  # share of runs of repeats that are of one length, within one, where it is
+COUNTS = 3.0  # steps of the resolution that the usual change spans at least, where it is: a rounded value that creeps on changes by one
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -54,22 +57,45 @@ def repeated_samples(value: Array) -> Mask:
 
     It did where the sensor is read more often than it measures, so that repeats come in even runs, and where they are an exception
     with a leap after them. A machine that sticks repeats values, too, but starts from rest, and one that does so often sticks and
-    slips; where values are rounded, repeats say nothing, and what is clipped is another matter.
+    slips; where values are rounded, repeats say nothing unless what comes between them are leaps of many counts; and what is clipped
+    is another matter. A sensor that is read too often measures a machine at rest again and again: of a longer run the samples are kept
+    at which it did.
     """
     found = np.zeros(len(value), dtype=bool)
     step = np.diff(value)
-    if len(value) < NEAR or not np.any(step == 0.0) or resolution(value) > 0.0:
+    if len(value) < NEAR or not np.any(step == 0.0) or not np.any(step != 0.0):
         return found
     edges = np.diff(np.concatenate([[False], step == 0.0, [False]]).astype(int))
-    runs = list(zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)))  # of steps of zero
+    # of steps of zero
+    runs = list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
     lengths = np.array([end - begin for begin, end in runs])
+    count = resolution(value)
+    even = _read_often(step, lengths, count)
     share = lengths.sum() / len(step)
-    fresh = (len(step) - lengths.sum()) / len(runs)  # values in a row that are new
-    even = share > OFTEN and fresh < FRESH and np.mean(np.abs(lengths - np.median(lengths)) <= 1) > EVEN
     for begin, end in runs:
-        if end < len(step) and (even or (share <= LARGEST_SHARE and _leaps(step, int(begin), int(end)))):
+        leap = count == 0.0 and share <= LARGEST_SHARE and _leaps(step, begin, end)
+        if end < len(step) and (even or leap):
             found[begin + 1 : end + 1] = True
+    if even:
+        found[_measured_again(runs, round(float(np.median(lengths))) + 1)] = False
     return found & ~clipped_samples(value)
+
+
+def _read_often(step: Array, lengths: NDArray[np.int64], count: float) -> bool:
+    """Whether steps (n,) with runs of zeros of these lengths are those of a sensor that is read more often than it measures, in `count`s
+    of its resolution (0: none)."""
+    share = lengths.sum() / len(step)
+    fresh = (len(step) - lengths.sum()) / len(lengths)  # values in a row that are new
+    regular = np.mean(np.abs(lengths - np.median(lengths)) <= 1) > EVEN
+    usual = float(np.median(np.abs(step[step != 0.0])))
+    return bool(share > OFTEN and fresh < FRESH and regular and usual >= COUNTS * count)
+
+
+def _measured_again(runs: Sequence[tuple[int, int]], every: int) -> list[int]:
+    """Samples within runs of repeats at which a sensor that measures `every` so many samples has found the same once more."""
+    return [
+        begin + number * every for begin, end in runs for number in range(1, round((end + 1 - begin) / every))
+    ]
 
 
 def _leaps(step: Array, begin: int, end: int) -> bool:

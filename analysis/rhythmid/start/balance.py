@@ -37,7 +37,7 @@ class Law:
 class Rows:
     """What drives, and the columns of the balance, of all stretches, low-pass filtered.
 
-    `drives` (n,) and `columns` (n, 6) of each stretch, in the order of COLUMNS; `period` [s] of each; `margin` samples at either end
+    `drives` (n,) and `columns` (n, 6) of each stretch, in the order of COLUMNS; `period` [s] of each, as the filtered motion is sampled; `margin` samples at either end
     that the filter spoils. `span` is the travel of the position, relative to the base where that moves; where the base drives
     (`by_base`), what drives is −a.
     """

@@ -97,14 +97,16 @@ def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Ca
 
 
 def _shown(law: Law, rows: Rows) -> tuple[float, dict[str, str]]:
-    """The inertia of a balance, and what is doubtful about it: none is seen that follows damper and spring within a sample."""
+    """The inertia of a balance, and what is doubtful about it: none is seen that follows damper and spring within an
+    interval of the filtered motion, a sample or a tenth of the shortest period that stands out of the noise."""
     found, period = law.coefficients, max(rows.period)
     least = max(found["velocity"] * period, found.get("position", 0.0) * period**2)
     if found["acceleration"] >= least:
         return found["acceleration"], {}
     doubt = (
         f"the records do not tell the inertia, which the balance puts at {found['acceleration']:.1g}: this is the largest that "
-        f"follows the other forces within a sample ({1e3 * period:.3g} ms); put in what is known, and fix it"
+        f"follows the other forces within {1e3 * period:.3g} ms, the interval at which the motion is known once noise is filtered "
+        "out; put in what is known, and fix it"
     )
     return least, {INERTIA: doubt}
 
@@ -262,7 +264,7 @@ def _servo_law(records: Sequence[Record], of: str) -> Law:
     except InputError:
         return fallback
     lag = law.coefficients["velocity"]
-    # an inertia that follows within a sample is not seen, and would only make the model stiff
+    # an inertia that follows within an interval of the filtered motion is not seen, and would only make the model stiff
     inertial = max(law.coefficients["acceleration"], lag * max(rows.period))
     if inertial <= 0.0:
         return fallback

@@ -13,7 +13,7 @@ from rhythmid.record.convert import write_record
 from rhythmid.record.record import Record
 
 NICER = 5  # than the twin: a third of its share of a busy processor, by the kernel's table of weights, and not starved
-BUDGET = 120.0  # s after which its search begins no further round
+BUDGET = 120.0  # s in which its answer is due
 PATIENCE = 900.0  # s that it may take in all
 
 

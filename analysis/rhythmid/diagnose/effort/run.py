@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.diagnose.case import Case
+from rhythmid.deadline import deadline
+from rhythmid.diagnose.case import SEARCHED, Case
 from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.discrepancy import mean_product
 from rhythmid.diagnose.effort.candidate import columns_of, screen, starts_of
@@ -116,10 +117,11 @@ def effort_run(
     """Search for up to `most` effects, weigh and decide; `unseen` is the balance of held-out efforts where the case has no records
     of them, `promising` as for `search_effort`; the same search is made at so many `places`, and chance has as many
     candidates. Raises InputError where the records hold too little."""
-    found = search_effort(
-        case.records, case.nominal, case.catalogue, applicability.balance, most, case.tell, case.budget,
-        promising,
-    )  # fmt: skip
+    with deadline(case.budget.at(SEARCHED)):
+        found = search_effort(
+            case.records, case.nominal, case.catalogue, applicability.balance, most, case.tell, case.budget,
+            promising,
+        )  # fmt: skip
     case.tell("weighing the hypotheses on data that no fit has seen")
     rows = _rows(case, found, unseen)
     size = variation_of(found.balance)

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from rhythmid.diagnose.case import SPENT, Budget
+from rhythmid.deadline import SPENT, time_is_up, without_deadline
+from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.effort.beyond_gain import beyond_gain, recorded_efforts
 from rhythmid.diagnose.effort.beyond_motion import beyond_motion
@@ -107,7 +108,8 @@ def search_effort(
     names = balance.estimated(model)
     _, jacobian = linearise(balance, model, names, 0.0)
     priors = priors_of(balance, model, names, jacobian[:, 1:])
-    nominal = Fitted.of((), "nominal", fit_effort(balance, model, names, priors), priors)
+    with without_deadline():  # all else is compared with it
+        nominal = Fitted.of((), "nominal", fit_effort(balance, model, names, priors), priors)
     blocks = Blocks.of(balance.record, GAP)
     reference = reference_of(balance, nominal, blocks)
     search = _Search(
@@ -115,10 +117,9 @@ def search_effort(
     )
     chosen = nominal
     budget = budget or Budget()
-    cut: dict[str, str] = {}
     for number in range(most):
         if budget.spent:
-            cut = search.cut_off(chosen)
+            search.cut.update(search.cut_off(chosen))
             break
         tell(f"looking for effect {number + 1} in the effort")
         better = search.further(chosen)
@@ -131,7 +132,7 @@ def search_effort(
         search.reduce(one)
     beyond = reference_of(balance, chosen, search.blocks)
     return EffortSearch(
-        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)) | cut, len(search.tried), bool(cut),
+        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)) | search.cut, len(search.tried), bool(search.cut),
     )  # fmt: skip
 
 
@@ -149,6 +150,7 @@ class _Search:
     recorded: Array | None = None  # efforts as they were recorded
     tried: set[str] = field(default_factory=set)
     ruled_out: list[Fitted] = field(default_factory=list)
+    cut: dict[str, str] = field(default_factory=dict)  # what the budget left no time for
 
     @property
     def set_aside(self) -> tuple[Fitted, ...]:
@@ -173,6 +175,9 @@ class _Search:
         tried = len(screened)
         new: list[Fitted] = []
         for one in self._promising(shortlist(screened), parent):
+            if time_is_up():
+                self.cut[one.start.name] = SPENT
+                continue
             for base in self._bases(parent, one.start):
                 fitted = self.fitted(base, one)
                 if fitted is None or self._known(fitted):
@@ -211,7 +216,7 @@ class _Search:
         found = list(new)
         for place, plain in enumerate(new):
             model = at_values_of(best, plain)
-            if model is not None:
+            if model is not None and not time_is_up():
                 aligned = self._aligned(plain.elements)
                 fit = self._fit(plain.elements, model, plain.priors, aligned, best.fit.alignment)
                 made = replace(fit, shape=plain.shape)
@@ -272,6 +277,9 @@ class _Search:
         """Fit a hypothesis of several effects without each of them, and with each law that one of them contains in its place: beside
         what was found later the simpler law may do."""
         for label in fitted.elements if len(fitted.elements) > 1 else ():
+            if time_is_up():
+                self.cut["backward elimination"] = SPENT
+                break
             base = self.without(fitted, label)
             self._keep(base)
             term = fitted.fit.model.term(label)

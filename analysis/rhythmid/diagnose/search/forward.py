@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.diagnose.case import SPENT, Budget
+from rhythmid.deadline import SPENT, deadline, time_is_up
+from rhythmid.diagnose.case import SEARCHED, Budget
 from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
 from rhythmid.diagnose.search.backward import eliminate
 from rhythmid.diagnose.search.order import in_best_order
@@ -154,28 +155,38 @@ def search(
 ) -> Search:
     """Search the catalogue for what the nominal model lacks; `nominal` is the fit to the same series of the one `given`.
 
-    At most `most` effects are found. Once the `budget` is spent no further round begins; what was not tried is told among the excluded.
+    At most `most` effects are found. Once the `budget` is spent no further round begins, and fits that are under way end with what they
+    have; what was not tried is told among the excluded.
     """
     budget = budget or Budget()
+    with deadline(budget.at(SEARCHED)):
+        return _searched(series, nominal, given, catalogue, pool, tell, budget, most)
+
+
+def _searched(
+    series: Sequence[Series], nominal: Fit, given: Model, catalogue: Catalogue, pool: ThreadPoolExecutor | None, tell: Tell,
+    budget: Budget, most: int,
+) -> Search:  # fmt: skip
     tell("scoring the catalogue")
     first, nominal = one_round(nominal, (), catalogue, pool)
     floor = 1e-9 * max(float(np.std(one.averaged)) for one in series)
     task = _Task(series, nominal, given, catalogue, pool, tell, floor)
-    state, cut_short = _begun(task, first), False
+    state, ended = _begun(task, first), False
     while len(state.best.added) < most and _could_pay(state):
         if budget.spent:
-            untried = distinct(state.rounds[-1].scores, REFITTED)
-            state, cut_short = state.without([((one.element.name,), SPENT) for one, _ in untried]), True
+            state, ended = state.without(_cut_off(state)), True
             break
         state, found = _refitted(task, state)
         state, grant = _granted(task, state, found)
         if grant is None:
             break
         state = _with_effect(task, state, grant, last=len(grant.winner.added) >= most)
+    cut_short = ended or any(why == SPENT for _, why in state.excluded)
     if state.best.added and budget.spent:
         state = state.without([(("backward elimination",), SPENT)])
     elif state.best.added:
         state = _reduced(task, state)
+        state = state.without([(("part of the backward elimination",), SPENT)] if time_is_up() else [])
     best, noise, ranked = _ranked(task, state)
     fit = whole_fit(best, series, noise, state.step, pool=pool)
     return Search(
@@ -193,6 +204,15 @@ def _begun(task: _Task, first: Round) -> _State:
     )  # fmt: skip
     lost = not_tried(fit, task.catalogue, first)
     return _State(base, base, fit, fit.noise, fit.run.max_step, {(): base}, (first,), tuple(lost))
+
+
+def _cut_off(state: _State) -> list[tuple[tuple[str, ...], str]]:
+    """What is not tried any more once the budget is spent: the elements that scored best, or all that may stand beside the effects
+    that were found last, after which nothing was scored."""
+    added, last = state.best.added, state.rounds[-1]
+    if last.added != added:
+        return [((f"further effects beside {' and '.join(added)}",), SPENT)]
+    return [((one.element.name,), SPENT) for one, _ in distinct(last.scores, REFITTED)]
 
 
 def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
@@ -265,7 +285,7 @@ def _with_effect(task: _Task, state: _State, grant: _Grant, last: bool) -> _Stat
     task.tell(f"{best.added[-1]} explains it better by {grant.gain:.0f}; looking for more")
     current = whole_fit(best, task.series, grant.noise, state.step, pool=task.pool)
     state = replace(state.with_trials([best]), best=best, current=current, noise=grant.noise, gained=gained)
-    if last:
+    if last or time_is_up():
         return state
     now, current = one_round(current, best.added, task.catalogue, task.pool)
     here = under_noise([best], task.series, current.noise, state.step, 0)[0]

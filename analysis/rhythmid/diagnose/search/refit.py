@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.deadline import SPENT, time_is_up
 from rhythmid.diagnose.search.trial import FAINTER, Outcome, Proposal, Trial, outcome_of, trial_of
 from rhythmid.elements.element import ELAPSED, STEP
 from rhythmid.errors import InputError
@@ -66,8 +67,10 @@ def _fit_proposal(
     """A few iterations from each guess, more from the best as long as it may come to `reach`, starting in `starts` (whose states
     are `known` by name); no further guess is tried once chi2 falls below `enough`.
 
-    Raises InputError when the model diverges from every guess.
+    Raises InputError when the model diverges from every guess, or a deadline had passed before the first.
     """
+    if time_is_up():
+        raise InputError(SPENT)
     run = prepare_run(proposal.model, series, fine_enough(proposal.model, max_step))
     names = tuple(proposal.model.free)
     best: Descent | None = None
@@ -88,7 +91,7 @@ def _fit_proposal(
             continue
         if best is None or end.chi2 < best.chi2:
             best = end
-        if best.chi2 < enough:
+        if best.chi2 < enough or time_is_up():
             break
     if best is None:
         assert failure is not None
@@ -97,7 +100,7 @@ def _fit_proposal(
     of_effect = f"{proposal.added[-1]}." if proposal.added else ""
     guessed = [name for name in (proposal.guesses or ({},))[0] if name.startswith(of_effect)]
     flat = _flat(best.model, best.differences[0], guessed)
-    if flat:
+    if flat and not time_is_up():
         back = best.model.with_values({name: proposal.guesses[0][name] for name in flat})
         again = descend(back, run, names, noise, best.starts, BRIEF, None, TOLERANCE)
         best = min(best, again, key=lambda end: end.chi2)
@@ -110,7 +113,7 @@ def _carried_on(
     """The descent carried on to `BRIEF` iterations, and beyond as long as it still falls steeply: in a narrow, bent valley it
     comes from far away and can be the deepest in the end. It is given up where it would not come to `reach` at its rate."""
     done, steep, costs = SKETCH, True, [end.chi2]
-    while not end.converged and (done < BRIEF or (steep and done < THOROUGH)):
+    while not (end.converged or time_is_up()) and (done < BRIEF or (steep and done < THOROUGH)):
         if len(costs) > 1 and out_of_reach(costs[-2], costs[-1], (THOROUGH - done) / SKETCH, reach):
             break
         end = descend(end.model, run, names, noise, end.starts, SKETCH, None, TOLERANCE, end.differences)
@@ -144,6 +147,8 @@ def _hopped(
     """The deepest of the minima that a parameter has at about this distance, as far as every next one is deeper."""
     low, high = best.model.parameters[name].bounds
     for _ in range(HOPS):
+        if time_is_up():
+            break
         before = best
         for value in (before.model.value(name) + hop * distance for hop in HOP_DISTANCES):
             if not low < value < high:
@@ -167,7 +172,7 @@ def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
     """The trial with flat parameters of its effects tried again from the elements' own guesses, where that is better: one
     iteration from each, for all others are where they belong, more from the best."""
     best = trial
-    if trial.differences is None:
+    if trial.differences is None or time_is_up():
         return best
     for label in trial.added:
         element = trial.element(label)
@@ -236,8 +241,8 @@ def run_trials(
             excluded.append((proposals[index].added, str(result)))
         else:
             trials.append(trial_of(proposals[index].added, proposals[index].model, result, noise))
-    if not trials:
-        return [], excluded
+    if not trials or time_is_up():
+        return sorted(trials, key=lambda t: t.bic()), excluded
     # many minima are gone through only where that can matter: few descents are as dear
     ceilings = {proposal.added: proposal.ceiling for proposal in proposals}
     lowest = min(trial.chi2 for trial in trials)
@@ -277,7 +282,7 @@ def whole_fit(
 ) -> Fit:
     """The full fit of a trial under a noise model; one that has converged under it is only evaluated, one that would not come to
     `reach` is not carried to convergence."""
-    if trial.noise is noise and trial.converged:
+    if _settled(trial, noise):
         iterations = 1
     run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
     names = tuple(trial.model.free)
@@ -316,8 +321,8 @@ def under_noise(
 ) -> list[Trial]:
     """The trials, best first, all under one noise model: those that were fitted under another are fitted again, as far as they may
     come to `reach`."""
-    done = [trial for trial in trials if trial.noise is noise and trial.converged]
-    others = [trial for trial in trials if not (trial.noise is noise and trial.converged)]
+    done = [trial for trial in trials if _settled(trial, noise)]
+    others = [trial for trial in trials if not _settled(trial, noise)]
 
     def one(trial: Trial) -> Outcome:
         return _again(trial, series, noise, max_step, iterations, reach)
@@ -328,6 +333,11 @@ def under_noise(
         if not isinstance(result, Exception)
     ]
     return sorted([*done, *again], key=lambda trial: trial.bic())
+
+
+def _settled(trial: Trial, noise: NoiseModel) -> bool:
+    """Whether a trial was fitted under this noise model and is at its end, or has to stay where a deadline has left it."""
+    return trial.noise is noise and (trial.converged or time_is_up())
 
 
 def near_under_noise(

@@ -45,6 +45,7 @@ SETTLING = 0.5  # of its error that a correction has to leave at most: a limit o
 EXACT = 1e-6  # of a signal: as near as an inversion goes
 SECANT = 1e-3  # of a signal, over which a slope is taken
 FLAT = 0.05  # of its usual slope, below which an element counts as passing nothing on
+NO_SLOPE = 1e-9  # below which a slope is the rounding of what comes out, over a secant of `SECANT`
 SUBSTEPS = 4  # of an element's own states in a sample of the motion, whose bandwidth has ten
 INVISIBLE = 1e-4  # of a signal that is left by a filter that it does not pass
 NEIGHBOURS = np.arange(-2, 4)  # samples from which a value between two is interpolated (Lagrange)
@@ -271,12 +272,14 @@ class Balance:
     def _slope(
         self, motion: Motion, term: Term, model: Model, effort: Array, leg: Array, signal: Array
     ) -> Array:
-        """Slope (n,) of what comes out of an element without memory over what goes in; 0 where hardly anything more comes out."""
+        """Slope (n,) of what comes out of an element without memory over what goes in; 0 where hardly anything more comes out than
+        usually does where something does."""
         width = SECANT * (float(np.std(signal)) or 1.0)
         sides = [self._along(motion, term, model, effort, leg, signal + side * width) for side in (-0.5, 0.5)]
         slope = 1.0 + (sides[1] - sides[0]) / width
-        usual = float(np.median(slope)) or 1.0
-        return np.where(slope / usual > FLAT, slope, 0.0)
+        passing = np.abs(slope) > NO_SLOPE
+        usual = float(np.median(slope[passing])) if passing.any() else 1.0
+        return np.where(passing & (slope / usual > FLAT), slope, 0.0)
 
     def _along(
         self, motion: Motion, term: Term, model: Model, effort: Array, leg: Array, signal: Array

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.deadline import time_is_up
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.student import autocorrelation_time, cost_of, scale_of, weights_of
 from rhythmid.model import INERTIA, Model
@@ -142,7 +143,8 @@ def fit_effort(
 ) -> EffortFit:
     """Fit the named free parameters of a model (all that the effort can tell of) to the recorded efforts.
 
-    `priors` state more than `priors_of` knows. Starts from the model's values and from `alignment` [s].
+    `priors` state more than `priors_of` knows. Starts from the model's values and from `alignment` [s]. It ends with what it has where
+    a deadline passes.
     """
     names = tuple(balance.estimated(model) if names is None else names)
     aligned = aligned or Alignment.of(balance)
@@ -164,6 +166,8 @@ def fit_effort(
         return cost_of(error, scale) + 0.5 * float(precision @ (at - mean) ** 2)
 
     for _ in range(steps):
+        if time_is_up():
+            break
         scale = scale_of(residual)
         before = cost(residual, value, scale)
         nearest = np.where(divides, np.maximum(low, value / SHRINKS), low)
@@ -230,10 +234,14 @@ def _step(
 
 
 def condition_of(fit: EffortFit) -> float:
-    """Condition number of the parameters' columns, each scaled to length 1, without the priors' help."""
+    """Condition number of the parameters' columns, each scaled to length 1, without the priors' help.
+
+    A parameter that moves no row, such as the time of a jump within a sample, is mistaken for no other one and does not count.
+    """
     columns = fit.jacobian[:, 1:]
     norms = np.linalg.norm(columns, axis=0)
-    if not len(norms) or not norms.all():
+    acting = norms > 0.0
+    if not acting.any():
         return math.inf if len(norms) else 1.0
-    values = np.linalg.svd(columns / norms, compute_uv=False)
+    values = np.linalg.svd(columns[:, acting] / norms[acting], compute_uv=False)
     return float(values[0] / values[-1]) if values[-1] > 0.0 else math.inf

@@ -15,6 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.deadline import time_is_up
 from rhythmid.errors import InputError
 from rhythmid.identify.output_error import Fit, minimise, noise_of
 from rhythmid.identify.sample_clock.clock import clock_of
@@ -42,6 +43,8 @@ def ticks_sought(fit: Fit, floor: float, pool: ThreadPoolExecutor | None = None)
         return fit
     series, places = fit.run.series, places_of(fit)
     for _ in range(SCANS):
+        if time_is_up():
+            break
         noise = noise_of(fit.residuals, series, floor)
         try:
             now = minimise(fit.model, fit.run, fit.names, noise, fit.starts, 0, pool)

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.deadline import time_is_up
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import FreeRun, prepare_run
 from rhythmid.identify.multiple_shooting import split
@@ -91,7 +92,7 @@ def scanned(
     rates = np.concatenate([np.arange(slowest, slow, reach), np.arange(low, high, reach)])
     cases, _ = best_of(length, _unshifted(rates), cases[0])
     followed, shifts = FOLLOWED, np.zeros(1)
-    while reach > FINEST / longest:
+    while reach > FINEST / longest and not time_is_up():
         around = [(step * reach, shift) for step in STEPS for shift in shifts]
         cases = _apart(cases, followed, APART / length)
         length = min(2.0 * length, whole)
