@@ -1,6 +1,7 @@
 """`rhythmid init`: looks at a recording and writes the two files that describe it."""
 
 import math
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -69,10 +70,11 @@ def init(
     terminal = Terminal(quiet)
     for line in begun.lines():
         terminal.say(line)
-    given = " ".join(map(str, sources))
     terminal.say(f"{signals}, {model}: every guess is a comment there; go on with")
-    terminal.say(f"  rhythmid check {sources[0]} --signals {signals}")
-    terminal.say(f"  rhythmid diagnose {given} --signals {signals} --model {model}")
+    with_signals = ["--signals", str(signals)]
+    terminal.say(f"  {shlex.join(['rhythmid', 'check', str(sources[0]), *with_signals])}")
+    diagnosis = ["rhythmid", "diagnose", *map(str, sources), *with_signals, "--model", str(model)]
+    terminal.say(f"  {shlex.join(diagnosis)}")
 
 
 def _prompt(question: str, answers: Sequence[str]) -> int:

@@ -21,7 +21,8 @@ SPELLINGS = {
     "second": "s", "msec": "ms", "millis": "ms", "usec": "us", "micros": "us", "µs": "us", "nsec": "ns", "nanos": "ns",
     "nanoseconds": "ns", "milliseconds": "ms", "microseconds": "us", "radians": "rad", "radian": "rad", "newtons": "N", "newtonmeters": "Nm", "newtonmeter": "Nm", "meter": "m",
     "meters": "m", "metre": "m", "metres": "m", "newton": "N", "amp": "A", "amps": "A", "volt": "V", "volts": "V",
-    "rads": "rad/s", "mps": "m/s", "radps": "rad/s", "degps": "deg/s", "r/min": "rpm", "1/min": "rpm",
+    "rads": "rad/s", "mps": "m/s", "radps": "rad/s", "degps": "deg/s", "r/min": "rpm", "1/min": "rpm", "rev/min": "rpm",
+    "rpm": "rpm", "deg": "deg", "rad": "rad",  # in any case: RPM, Deg
 }  # fmt: skip
 # after an underscore, in any case; not those that are words or other quantities, too: _in, _g, _min, _rev
 SUFFIXES = (
