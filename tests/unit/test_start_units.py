@@ -33,6 +33,14 @@ def test_a_unit_of_a_column_that_its_heading_does_not_tell_is_marked(tmp_path, n
     assert checked(guess(tmp_path / "run.npz").signals) == roles
 
 
+def test_the_only_number_that_was_recorded_is_the_motion_whatever_its_unit(tmp_path):
+    text = "\n".join(f"{t:.4f},{np.exp(-0.1 * t) * np.cos(5.0 * t):.5f}" for t in TIME[::4])
+    (tmp_path / "decay.csv").write_text(f"time (s),sensor (V)\n{text}\n")
+    signals = guess(tmp_path / "decay.csv").signals
+    assert 'output: {column: "sensor (V)"' in signals and "input: none" in signals
+    assert "CHECK: its unit is none of a motion: set kind, unit and scale" in signals
+
+
 def test_messages_with_units_of_their_own_are_not_marked(tmp_path):
     now = 1.7e9
     states = [(now + t, joint_state(now + t, ["a"], position=[x])) for t, x in zip(TIME, X, strict=True)]

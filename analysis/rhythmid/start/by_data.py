@@ -28,6 +28,11 @@ NAMED = 8  # numbers that a note names
 
 def output_by_data(able: list[Known], known: list[Known], place: str) -> tuple[Choice, list[Known]]:
     """Where no name tells: the integral of another one, else what is driven more by the others than it drives them."""
+    if not able and len(known) == 1:
+        doubts = ("its unit is none of a motion: set kind, unit and scale",)
+        return Choice(known[0].one, "the only number that was recorded", (), doubts), [
+            known[0].taken_for("position")
+        ]
     if not able:
         raise InputError(
             f"{place}: no position, velocity or acceleration is measured; write signals.yaml by hand"
