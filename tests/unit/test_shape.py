@@ -132,6 +132,13 @@ def test_of_several_effects_the_worst_statistics_are_told_and_labels_without_an_
     assert shape_of(model, ("inertia.mass",), motion(), SIZES) == {}
 
 
+@pytest.mark.parametrize(("frequency", "same"), [(2.5, True), (2.95, True), (3.5, False), (1.5, False)])
+def test_a_resonance_between_the_frequencies_of_a_free_motions_swings_is_none_of_its_own(frequency, same):
+    free = replace(SIZES, forcing_frequency=0.0, idle=True, frequency=2.4, swings=(2.0, 3.0), duration=10.0)
+    values = {"mass": 0.01, "frequency": frequency, "damping_ratio": 0.001}
+    assert (shape("second_mode", values, sizes=free)["own_frequency"] < 1.0) is same
+
+
 @pytest.mark.parametrize(("apart", "same"), [(0.5, True), (-0.5, True), (3.0, False)])
 def test_a_disturbance_at_the_frequency_of_a_free_motion_is_another_damping_or_stiffness(apart, same):
     free = replace(SIZES, forcing_frequency=0.0, idle=True)

@@ -74,15 +74,16 @@ def _within_bounds(term: Term, sizes: Scales) -> float:
 
 def _own_frequency(term: Term, sizes: Scales) -> float:
     """Distance of a vibration, or of a resonance as narrow as one, from the forcing's harmonics, in lines that the records
-    resolve, or in a free motion from the frequency of that; infinite for other effects."""
+    resolve, or in a free motion from the frequencies of that; infinite for other effects."""
     forcing, line = sizes.forcing_frequency, 1.0 / sizes.duration
     free = forcing <= 0.0 and sizes.idle
     if term.element.kernel is None or (forcing <= 0.0 and not free):
         return math.inf
     found = [term.values[one.name].value for one in term.element.parameters if one.unit == "Hz"]
     damping = term.values[term.element.width].value if term.element.width else 0.0
+    low, high = min(sizes.frequency, sizes.swings[0] or math.inf), max(sizes.frequency, sizes.swings[1])
     apart = [
-        abs(f - (sizes.frequency if free else round(f / forcing) * forcing))
+        max(low - f, f - high, 0.0) if free else abs(f - round(f / forcing) * forcing)
         for f in found
         if damping * f < line
     ]

@@ -101,6 +101,7 @@ class Scales:
     rest: float | None = None  # position at which the model's linear spring is at rest, where that is known
     displaced_base: bool = False  # whether the input displaces the base that the leg stands on
     idle: bool = False  # whether no command, forcing or controller drives the machine: it moves freely
+    swings: tuple[float, float] = (0.0, 0.0)  # [Hz] lowest and highest frequency of a free motion's swings
 
     @property
     def force(self) -> float:

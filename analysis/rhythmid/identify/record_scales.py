@@ -9,6 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from rhythmid.elements.element import Scales
 from rhythmid.identify.series import Series, displacement, dominant_frequency
+from rhythmid.identify.swing_frequency import swing_frequencies
 from rhythmid.model import Model
 from rhythmid.simulation.signal import FOR_EVER
 
@@ -68,6 +69,7 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
         rest=None if REST_LENGTH in model.free else model.borrowed(REST_LENGTH, 0.0),
         displaced_base=any(one.kind == "base_displacement" for one in series),
         idle=not driven,
+        swings=(0.0, 0.0) if driven else swing_frequencies(series),
     )
 
 
