@@ -1,7 +1,8 @@
-"""Tables in text, NumPy, MATLAB and Parquet: valid, spoilt, and read."""
+"""Tables in text, JSON, NumPy, MATLAB and Parquet: valid, spoilt, and read."""
 
 import gzip
 import io
+import json
 import random
 import zipfile
 from collections.abc import Callable
@@ -25,6 +26,19 @@ def texts() -> list[bytes]:
         b'"run 7"\n"t","u","note"\ns,N,-\n' + b"".join(b'%d,"%.2f","a, ""b"""\n' % (k, VALUES[k]) for k in range(COUNT)),
         TABLE.decode().encode("utf-16"), TABLE.replace(b"u", "µ".encode("cp1252")),
     ]  # fmt: skip
+
+
+def jsons() -> list[bytes]:
+    rows = [
+        {"t": 1e-3 * k, "state": {"q": VALUES[k], "v": [VALUES[-k], None]}, "mode": "run"}
+        for k in range(COUNT)
+    ]
+    by_name = {"t": [1e-3 * k for k in range(COUNT)], "q": dict(enumerate(VALUES))}
+    return [
+        "\n".join(map(json.dumps, rows)).encode(),
+        json.dumps(rows, indent=1).encode(),
+        json.dumps(by_name).encode(),
+    ]
 
 
 def _arrays() -> dict[str, np.ndarray]:

@@ -136,6 +136,7 @@ TARGETS = {
         Target("latency", _latencies, spoil_text, _use_latency),
         Target("csv", tables.texts, spoil_text, tables.use_table(".csv")),
         Target("csv.gz", tables.texts, tables.spoil_gzip, tables.use_table(".csv.gz")),
+        Target("json", tables.jsons, spoil_text, tables.use_table(".json")),
         Target("npz", tables.npz_parts, tables.spoil_npz, tables.use_table(".npz")),
         Target("mat", tables.mats, spoil_bytes, tables.use_table(".mat")),
         Target("parquet", tables.parquets, spoil_bytes, tables.use_table(".parquet")),

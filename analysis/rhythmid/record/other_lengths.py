@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.record.grouped_runs import grouped_runs
+from rhythmid.record.json_table import JSON
 from rhythmid.record.signals import Signals
 from rhythmid.record.table import HDF5, WIDEST, Table, table_suffix
 
-OF_ARRAYS = (".mat", ".npz", *HDF5)  # kinds of tables whose columns may differ in length
+OF_ARRAYS = (".mat", ".npz", *HDF5, *JSON)  # kinds of tables whose columns may differ in length
 LEAST = 40  # values of an array that may be a recording, not a set of parameters
 NAMED = 8  # arrays that a note names
 

@@ -1,4 +1,4 @@
-"""Tables: columns of numbers in .mat, .h5, .npz, .parquet, .csv and other text files, which may be compressed (.csv.gz)."""
+"""Tables: columns of numbers in .mat, .h5, .npz, .parquet, .json, .csv and other text files, which may be compressed (.csv.gz)."""
 
 import re
 from collections.abc import Iterator
@@ -15,12 +15,14 @@ from rhythmid.record.compression import largest
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.hdf5_table import is_hdf5, read_hdf5
 from rhythmid.record.joined_stamps import with_joined_stamps
+from rhythmid.record.json_table import JSON, read_json
 from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.own_process import arrays_in_own_process
-from rhythmid.record.text_table import COMPRESSED, TEXT, read_text
+from rhythmid.record.text_file import COMPRESSED
+from rhythmid.record.text_table import TEXT, read_text
 
 HDF5 = (".h5", ".hdf5")
-SUFFIXES = (".mat", *HDF5, ".npz", ".parquet", *TEXT)
+SUFFIXES = (".mat", *HDF5, ".npz", ".parquet", *JSON, *TEXT)
 WIDEST = 64  # columns of an array beyond which it is an image or a scan, not joints
 ONE_OF_MANY = re.compile(r"(.+)\[(\d+)\]")  # dof_pos[3]: one column of an array
 
@@ -33,7 +35,7 @@ def table_name(path: Path) -> str:
 def table_suffix(path: Path) -> str:
     """The suffix that tells what kind of table a file is, in lower case: `.csv` of a compressed `run.csv.gz`, too."""
     suffix = path.suffix.lower()
-    if suffix == COMPRESSED and (inner := Path(path.stem).suffix.lower()) in TEXT:
+    if suffix == COMPRESSED and (inner := Path(path.stem).suffix.lower()) in (*JSON, *TEXT):
         return inner
     return suffix
 
@@ -49,13 +51,14 @@ class Table:
     def load(cls, path: Path) -> "Table":
         """Read a table. Raises InputError when the file is missing, damaged or of an unknown kind."""
         readers = {
-            ".mat": _mat, ".npz": _npz, ".parquet": _parquet, **dict.fromkeys(HDF5, read_hdf5), **dict.fromkeys(TEXT, read_text),
+            ".mat": _mat, ".npz": _npz, ".parquet": _parquet, **dict.fromkeys(HDF5, read_hdf5), **dict.fromkeys(JSON, read_json),
+            **dict.fromkeys(TEXT, read_text),
         }  # fmt: skip
         read = readers.get(table_suffix(path))
         if read is None:
             refuse_foreign(path)
             raise InputError(
-                f"{path}: is not a table; .mat, {', '.join(HDF5)}, .npz, .parquet and {', '.join(TEXT)} can be read"
+                f"{path}: is not a table; .mat, {', '.join(HDF5)}, .npz, .parquet, {', '.join((*JSON, *TEXT))} can be read"
             )
         try:
             check_content(path)

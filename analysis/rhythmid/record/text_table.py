@@ -4,31 +4,27 @@ spaces between the columns; decimal points or commas; cells in quotes.
 Nothing has to be said of a file: the separator is the one by which most lines are rows of numbers of one length.
 """
 
-import gzip
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
 from rhythmid.errors import InputError
 from rhythmid.record.clock_time import seconds
-from rhythmid.record.compression import largest
 from rhythmid.record.lvm_head import lvm_head
 from rhythmid.record.text_cells import COMMENTS, cells_of, content, is_number, number_of
+from rhythmid.record.text_file import opened
 from rhythmid.record.text_head import names_of
 from rhythmid.record.text_rows import numbers_of, rows_in
 
 TEXT = (".csv", ".tsv", ".txt", ".dat", ".lvm", ".log")
-COMPRESSED = ".gz"
 SEPARATORS = ("\t", ";", ",", None)  # None: any number of spaces; in this order where two do equally well
 LOOKED_AT = 200  # lines from which the dialect is told: more than any head has
 ACROSS = 10  # times as many columns as rows, from which the lines of a table without names are its columns
-SAMPLE = 1 << 16  # bytes from which the encoding is told
-BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 
 
 @dataclass(frozen=True)
@@ -59,13 +55,10 @@ def read_text(path: Path) -> dict[str, Any]:
     Raises InputError where the file is empty, its names are not unique or do not belong to the rows; ValueError where a row
     is damaged.
     """
-    encoding = _encoding(path)
-    if path.suffix.lower() == COMPRESSED:
-        _check_size(path)
-    with _opened(path, encoding) as file:
+    with opened(path) as file:
         begin = list(islice(file, LOOKED_AT))
     dialect, lvm = dialect_of(begin, str(path)), lvm_head(begin)
-    with _opened(path, encoding) as file:
+    with opened(path) as file:
         lines = islice(file, dialect.first, None)
         rows = rows_in(lines, dialect.first, dialect.separator, dialect.head)
     count = len(dialect.names)
@@ -196,36 +189,3 @@ def _words(cells: list[str]) -> np.ndarray:
     """A column of seconds where its cells are times, of words else."""
     found = seconds(cells)
     return np.array(cells, dtype=object) if found is None else found  # fixed-width text would take much more
-
-
-def _encoding(path: Path) -> str:
-    """UTF-8 or UTF-16 by its mark, else UTF-8 where the beginning is, else Windows' own."""
-    with gzip.open(path) if path.suffix.lower() == COMPRESSED else path.open("rb") as file:
-        start = file.read(SAMPLE)
-    for mark, encoding in BYTE_ORDER_MARKS.items():
-        if start.startswith(mark):
-            return encoding
-    try:
-        start[: start.rfind(b"\n") + 1].decode()
-    except UnicodeDecodeError:
-        return "cp1252"
-    return "utf-8"
-
-
-def _check_size(path: Path) -> None:
-    """Raise InputError where a compressed table holds more than a table could."""
-    most = largest(path.stat().st_size)
-    size = 0
-    with gzip.open(path) as file:
-        while piece := file.read(SAMPLE):
-            size += len(piece)
-            if size > most:
-                raise InputError(
-                    f"{path}: holds more than {most} bytes in {path.stat().st_size}: such tables are not read"
-                )
-
-
-def _opened(path: Path, encoding: str) -> TextIO:
-    if path.suffix.lower() == COMPRESSED:
-        return gzip.open(path, "rt", encoding=encoding, errors="replace")
-    return path.open(encoding=encoding, errors="replace")

@@ -1,0 +1,103 @@
+"""Tables in JSON: an object a line, a list of objects, or lists by name, within one another (RFC 8259, jsonlines.org)."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rhythmid.record.clock_time import seconds
+from rhythmid.record.text_cells import number_of
+from rhythmid.record.text_file import opened
+
+LINES = (".jsonl", ".ndjson")
+JSON = (".json", *LINES)
+UNNAMED = "values"  # what a list without a name is called
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Columns by the path to them: `state.q` where each row is an object that holds others, float64[n, k] where each holds a list.
+
+    What some rows lack is NaN there, and what is neither a list nor in one is left out. Raises ValueError where it is no JSON; a last
+    line that breaks off, as where a logger was switched off, is left out.
+    """
+    with opened(path) as file:
+        text = file.read()
+    try:
+        found = json.loads(text)
+    except json.JSONDecodeError:
+        lines = [(number, line) for number, line in enumerate(text.split("\n"), start=1) if line.strip()]
+        if not lines or lines[0][1].strip() in ("[", "{"):
+            raise
+        found = list(_rows(lines))
+    if isinstance(found, Mapping) and not any(isinstance(one, (Mapping, list)) for one in found.values()):
+        found = [found]  # a file of one line
+    return dict(_lists("", found))
+
+
+def _rows(lines: Sequence[tuple[int, str]]) -> Iterator[Any]:
+    """What each line holds. Raises ValueError with the number of one that is no JSON, but for a last one that breaks off."""
+    for number, line in lines:
+        try:
+            yield json.loads(line)
+        except json.JSONDecodeError as error:
+            if number == lines[-1][0] and number > lines[0][0]:
+                return
+            raise ValueError(
+                f"line {number} is no JSON ({error.msg}); delete what does not belong to it"
+            ) from None
+
+
+def _lists(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Columns of all lists in a value."""
+    if isinstance(value, list):
+        yield from _columns(name, value)
+    elif isinstance(value, Mapping):
+        if len(value) > 1 and all(key.isdecimal() for key in value):  # a list by the numbers of its rows
+            yield from _columns(name, list(value.values()))
+            return
+        for key, inner in value.items():
+            yield from _lists(_path(name, key), inner)
+
+
+def _columns(name: str, rows: Sequence[Any]) -> Iterator[tuple[str, Any]]:
+    """Columns of what each row holds; None where a row holds nothing."""
+    there = [one for one in rows if one is not None]
+    if not there:
+        return
+    if all(isinstance(one, Mapping) for one in there):
+        for key in dict.fromkeys(key for one in there for key in one):
+            yield from _columns(_path(name, key), [None if one is None else one.get(key) for one in rows])
+    elif all(isinstance(one, list) for one in there):
+        width = max(map(len, there))
+        if all(_is_number(cell) for one in there for cell in one):
+            nothing = [None] * width
+            cells = [[*(row or []), *nothing][:width] for row in rows]
+            yield name or UNNAMED, np.array(cells, dtype=np.float64).reshape(len(rows), width)
+            return
+        for place in range(width):
+            parts = [one[place] if one is not None and place < len(one) else None for one in rows]
+            yield from _columns(f"{name or UNNAMED}[{place}]", parts)
+    elif all(_is_number(one) for one in there):
+        yield name or UNNAMED, np.array(rows, dtype=np.float64)
+    elif all(isinstance(one, str) or _is_number(one) for one in there):
+        yield name or UNNAMED, _words(["" if one is None else str(one) for one in rows])
+
+
+def _words(cells: Sequence[str]) -> Any:
+    """Numbers that are written as words, times in seconds, or words."""
+    numbers = [number_of(cell, ".") for cell in cells]
+    if all(number is not None for number in numbers):
+        return np.array(numbers, dtype=np.float64)
+    found = seconds(list(cells))
+    return np.array(cells, dtype=object) if found is None else found
+
+
+def _is_number(cell: Any) -> bool:
+    """Whether it is a number, true or false, or nothing."""
+    return cell is None or isinstance(cell, (int, float))
+
+
+def _path(above: str, key: str) -> str:
+    return f"{above}.{key}" if above else key
