@@ -47,7 +47,7 @@ def test_the_forms_of_json_give_the_same_columns(tmp_path, name, written):
 def test_columns_within_a_named_list_are_found_by_the_path_to_them(tmp_path):
     (tmp_path / "run.json").write_text(json.dumps({"mass": 0.5, "entries": ROWS}))
     np.testing.assert_array_equal(Table.load(tmp_path / "run.json").column("entries.state.q"), Q)
-    assert [str(one) for one in inventory(tmp_path / "run.json").recorded][0] == "entries.state.q"
+    assert next(str(one) for one in inventory(tmp_path / "run.json").recorded) == "entries.state.q"
 
 
 def test_a_compressed_file_is_read(tmp_path):
@@ -61,6 +61,15 @@ def test_what_a_row_lacks_is_missing(tmp_path):
     table = Table.load(tmp_path / "run.jsonl")
     np.testing.assert_array_equal(table.column("q"), [1.0, np.nan, np.nan])
     np.testing.assert_array_equal(table.column("u[1]"), [np.nan, 2.0, np.nan])
+
+
+def test_a_channel_that_no_row_tells_is_left_out(tmp_path):
+    rows = [{"t": t, "q": q if k % 2 else None, "u": None if k % 2 else q, "v": None if k % 2 else "nan"}
+            for k, (t, q) in enumerate(zip(TIME, Q, strict=True))]  # fmt: skip
+    (tmp_path / "run.jsonl").write_text("\n".join(map(json.dumps, rows)))
+    found = inventory(tmp_path / "run.jsonl")
+    assert [str(one) for one in found.recorded] == ["q", "u"]
+    assert found.left_out == ("v: never changes",)
 
 
 def test_numbers_and_dates_that_are_written_as_words_are_read(tmp_path):

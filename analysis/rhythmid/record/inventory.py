@@ -174,7 +174,8 @@ def _rows_of(columns: list[tuple[str, Array]]) -> int:
 
 
 def _not_zero(constant: list[Recorded]) -> tuple[Recorded, ...]:
-    return tuple(one for one in constant if np.isfinite(one.value).all() and one.value[0] != 0.0)
+    """Those of a known value, which is not zero; one that no row has is none."""
+    return tuple(one for one in constant if np.isfinite(one.value).all() and one.value[:1].any())
 
 
 def _of_bag(bag: Bag) -> Inventory:
