@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.model import Model
 from rhythmid.proof.machine import UNFORCED, Effect, Machine, observe
 from rhythmid.proof.machines.designs import DESIGNS
 from rhythmid.proof.machines.rig import Rig
+from rhythmid.proof.nominal import free_attributes, nominal_model
 from rhythmid.proof.sizes import SIZES, motion_of
-from rhythmid.proof.sizing import force_share
+from rhythmid.proof.sizing import force_share, mismatch, with_shift
 
 SHOWN = 0.5  # [s] of a record that is compared
 MACHINE = Machine(1.0, 0.0, 2.0, 0.0, 0.0, return_damping=2.0)
@@ -199,3 +202,23 @@ def test_a_mismatch_in_the_effort_leaves_out_what_free_parameters_absorb():
     rubbed = rig.observe_all([Effect("coulomb_friction", {"force": 0.1})])
     plain = rig.observe_all([])
     assert force_share(rig, rubbed, ("mass", "damping")) > 1e-4 > force_share(rig, plain, ("mass", "damping"))
+
+
+@pytest.mark.parametrize("name", ["shaken", "motor"])
+def test_a_lag_of_half_a_sample_is_a_shift_of_the_input_and_no_mismatch(name):
+    catalogue, design, rig = load_catalogue(), DESIGNS[name], _rig(name)
+    free = free_attributes(design)
+    text = nominal_model(rig, design, rig.machine)
+    exact = with_shift(Model.from_text(text, catalogue=catalogue), rig, catalogue)
+    lag, element = (
+        {"shaken": "sensor_lag", "motor": "actuator_lag"}[name],
+        {"time_constant": 0.5 / rig.runs[0].rate},
+    )
+    lagged, plain = rig.observe_all([Effect(lag, element)]), rig.observe_all([])
+    if design.by_effort:
+        unlogged = replace(rig, recorded="nothing")  # there is no input that could be shifted
+        assert force_share(rig, lagged, free) < 0.5 * force_share(unlogged, lagged, free)
+        return
+    size = float(np.std(np.concatenate([one.measured for one in plain])))
+    fixed = Model.from_text(text, catalogue=catalogue)
+    assert mismatch(exact, rig, lagged, 1e-3 * size) < 0.2 * mismatch(fixed, rig, lagged, 1e-3 * size)

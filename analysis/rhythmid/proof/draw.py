@@ -26,6 +26,7 @@ from rhythmid.proof.noise import NOISES, Log, Noise, draw_log, draw_noise
 from rhythmid.proof.nominal import free_attributes, nominal_model, wrong
 from rhythmid.proof.protocol import Run
 from rhythmid.proof.sizes import EQUIVALENT, SIZES, Motion, motion_of
+from rhythmid.proof.sizing import with_shift
 
 Kind = Literal["single", "pairs", "null", "left-out"]
 KINDS: tuple[Kind, ...] = ("single", "null", "pairs", "left-out")
@@ -186,6 +187,7 @@ def _draw(
     delays = (rig.input_delay, rig.measurement_delay)
     complete = replace(rig, believed=rig.machine, lacks=None)
     exact = Model.from_text(nominal_model(complete, design, rig.machine, fixed, delays), catalogue=catalogue)
+    exact = with_shift(exact, rig, catalogue)
     plain = complete.observe_all([])
     if plain is None:
         return None

@@ -2,16 +2,18 @@
 
 The one place where the proof uses the estimator: to know the size of what it conceals, before anything is sealed. Where a
 free run means little, the mismatch is a force: what the effects add to the truth's motion, less what the nominal model's
-free parameters absorb of it, by plain linear least squares, and less what a shift of effort and motion against each
-other absorbs, which no record tells from a lag as short.
+free parameters absorb of it, by plain linear least squares. What a shift of the input and the motion against each other
+absorbs is left out of either, for no record tells it from a lag as short.
 """
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.noise import NoiseModel
@@ -23,13 +25,14 @@ from rhythmid.proof.machines.rig import Rig
 from rhythmid.proof.protocol import Run
 from rhythmid.proof.sizes import drive_of
 from rhythmid.record.record import Channel, Record
+from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
 AVERAGED = 200  # [Hz] to which samples are averaged
 STEP = 6.25e-4  # [s] of the fit's integrator: its error must not pass for a mismatch
 CLOSE = 1.25  # factor within which a mismatch is the one asked for
 TRIES = 7
-SHIFT = 2.0  # samples by which effort and motion may be logged apart: nobody knows their clocks better before
+SHIFT = 2.0  # samples by which input and motion may be logged apart: nobody knows their clocks better before
 
 
 def record_of(rig: Rig, run: Run, seen: Observation) -> Record:
@@ -74,6 +77,16 @@ def mismatch(nominal: Model, rig: Rig, seen: Sequence[Observation] | None, scale
     return math.sqrt(fit.chi2 / fit.samples) * scale
 
 
+def with_shift(nominal: Model, rig: Rig, catalogue: Catalogue) -> Model:
+    """The model with an input that may be logged earlier or later by `SHIFT` samples, where its delay is no part of it."""
+    if rig.recorded == "nothing" or nominal.term("input_delay") is not None:
+        return nominal
+    most = SHIFT / rig.runs[0].rate
+    model = nominal.with_element(catalogue["input_delay"], {"delay": 0.0})
+    shift = replace(model.parameters[INPUT_DELAY], bounds=(-most, most))
+    return model.with_parameters({INPUT_DELAY: shift})
+
+
 def plain_force(machine: Machine, x: Array, v: Array) -> Array:
     """Force [N] of spring, damper and a pendulum's gravity at positions and velocities (n,)."""
     damping = np.where(v > 0.0, machine.damping, machine.return_damping)
@@ -83,8 +96,8 @@ def plain_force(machine: Machine, x: Array, v: Array) -> Array:
 
 def force_share(rig: Rig, seen: Sequence[Observation] | None, free: Sequence[str]) -> float:
     """Rms of the force that the nominal model lacks in the learning records `seen`, in proportion to that of the force that
-    drives the machine; what the model's `free` attributes can absorb of it is left out, and where the effort is recorded what a
-    shift of the effort by up to `SHIFT` samples can."""
+    drives the machine; what the model's `free` attributes can absorb of it is left out, and what a shift of a recorded effort or
+    command by up to `SHIFT` samples can."""
     if seen is None:
         return math.inf
     x = np.concatenate([one.position for one in seen])
@@ -98,7 +111,7 @@ def force_share(rig: Rig, seen: Sequence[Observation] | None, free: Sequence[str
         "moment": np.sin(x - rig.believed.hanging),
     }  # fmt: skip
     absorbed = np.column_stack([columns[name] for name in free if getattr(rig.believed, name)])
-    if rig.recorded == "effort":
+    if rig.recorded in ("effort", "command"):
         forces = np.split(drive, np.cumsum([len(one.position) for one in seen])[:-1])
         moved = [np.gradient(force) for force in forces]  # by one sample
         shift = np.concatenate(moved)[:, None]
