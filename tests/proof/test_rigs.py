@@ -215,6 +215,7 @@ def test_a_lag_of_half_a_sample_is_a_shift_of_the_input_and_no_mismatch(name):
         {"time_constant": 0.5 / rig.runs[0].rate},
     )
     lagged, plain = rig.observe_all([Effect(lag, element)]), rig.observe_all([])
+    assert plain is not None
     if design.by_effort:
         unlogged = replace(rig, recorded="nothing")  # there is no input that could be shifted
         assert force_share(rig, lagged, free) < 0.5 * force_share(unlogged, lagged, free)
