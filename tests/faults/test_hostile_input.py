@@ -272,13 +272,17 @@ def test_a_stamp_far_in_the_future_is_no_gap_that_is_filled(tmp_path, bounded, l
     assert whole.input is not None and len(whole.input) < 200
 
 
-def test_measurements_near_the_largest_number_bring_no_warning(tmp_path, recwarn):
-    rows = [f"{k},{k % 7}e300,{k % 5}" for k in range(60) if k % 20]
+@pytest.mark.parametrize("sizes", [("e300", ""), ("", "e300"), ("e160", "e160")])
+def test_values_that_no_machine_has_are_refused_with_their_place_and_without_a_warning(
+    tmp_path, recwarn, sizes
+):
+    rows = [f"{k},{k % 7}{sizes[0]},{k % 5}{sizes[1]}" for k in range(60) if k % 20]
     (tmp_path / "run.csv").write_text("t,y,u\n" + "\n".join(rows) + "\n")
     signals = Signals.from_text(
         "time: {column: t}\ninput: {column: u}\noutput: {column: y}", tmp_path / "signals.yaml"
     )
-    cut_at_gaps(read_record(tmp_path / "run.csv", signals))
+    with pytest.raises(InputError, match="beyond 1e\\+100, the first at"):
+        read_record(tmp_path / "run.csv", signals)
     assert not recwarn.list
 
 

@@ -29,6 +29,7 @@ from rhythmid.record.unit_notes import unit_notes
 from rhythmid.simulation.signal import Hold
 
 MOSTLY = 0.5  # share of samples that are no number, beyond which a channel is useless
+LARGEST = 1e100  # of a measured value: its square is still a number
 AMBIGUOUS = 0.01  # share of samples that may have the time of another one with another value
 RUN_CLOCK = 10.0  # seconds; a clock that reads less at the first sample started with the run
 CALENDAR = (
@@ -162,10 +163,7 @@ def read_tables(signals: Signals) -> Record:
             raise InputError(
                 f"{source.place}{table.path}: time is not finite in row {int(np.argmin(np.isfinite(time)))}"
             )
-        with np.errstate(
-            over="ignore", invalid="ignore"
-        ):  # what is infinite is refused later, with its place
-            value = value * source.scale + source.offset
+        value = _in_unit(value, source)
         if merged[source.file] or is_sampled_rarely(value):  # its empty cells are no samples
             time, value = time[~np.isnan(value)], value[~np.isnan(value)]
         made[role] = Samples(source, time, value)
@@ -256,8 +254,15 @@ def _from_columns(
     assert stamp_ns is not None
     kept = ~missing
     lateness = np.asarray((found.log_ns - stamp_ns)[kept] * 1e-9) if stamped else None
-    value = found.values[source.field][kept] * source.scale + source.offset
+    value = _in_unit(found.values[source.field][kept], source)
     return stamp_ns[kept], Samples(source, np.empty(0), value, lateness, int(missing.sum()))
+
+
+@np.errstate(over="ignore", invalid="ignore")  # of numbers near the largest, and NaN of every kind
+def _in_unit(value: NDArray[np.float64], source: Source) -> NDArray[np.float64]:
+    """Values (n,) in the unit of the analyses. What no machine has, as damaged bytes may, becomes infinite, and is refused with its place."""
+    value = value * source.scale + source.offset
+    return np.where(np.abs(value) > LARGEST, np.copysign(np.inf, value), value)
 
 
 def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str, quality: Quality) -> Record:
@@ -312,7 +317,7 @@ def _finish(record: Record, signals: Signals) -> Record:
         if not finite.all():
             raise InputError(
                 f"{signals.channels[role].place}{channel.source}: {np.count_nonzero(~finite)} of {len(channel)} samples "
-                f"are infinite, the first at {channel.time[np.argmin(finite)]:.6f} s"
+                f"are infinite or beyond {LARGEST:g}, the first at {channel.time[np.argmin(finite)]:.6f} s"
             )
     if len(record.output) < SHORTEST:
         raise InputError(
