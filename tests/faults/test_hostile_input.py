@@ -281,7 +281,7 @@ def test_values_that_no_machine_has_are_refused_with_their_place_and_without_a_w
     signals = Signals.from_text(
         "time: {column: t}\ninput: {column: u}\noutput: {column: y}", tmp_path / "signals.yaml"
     )
-    with pytest.raises(InputError, match="beyond 1e\\+100, the first at"):
+    with pytest.raises(InputError, match="are infinite, the first at .* 1e\\+100"):
         read_record(tmp_path / "run.csv", signals)
     assert not recwarn.list
 

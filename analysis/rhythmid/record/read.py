@@ -317,7 +317,7 @@ def _finish(record: Record, signals: Signals) -> Record:
         if not finite.all():
             raise InputError(
                 f"{signals.channels[role].place}{channel.source}: {np.count_nonzero(~finite)} of {len(channel)} samples "
-                f"are infinite or beyond {LARGEST:g}, the first at {channel.time[np.argmin(finite)]:.6f} s"
+                f"are infinite, the first at {channel.time[np.argmin(finite)]:.6f} s (so is what is beyond {LARGEST:g})"
             )
     if len(record.output) < SHORTEST:
         raise InputError(
