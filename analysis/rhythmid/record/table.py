@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.record.compression import largest
+from rhythmid.record.counter_wrap import unwrapped
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.hdf5_table import is_hdf5, read_hdf5
 from rhythmid.record.joined_stamps import with_joined_stamps
 from rhythmid.record.json_table import JSON, read_json
 from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.own_process import arrays_in_own_process
+from rhythmid.record.table_clock import is_called_time
 from rhythmid.record.text_file import COMPRESSED
 from rhythmid.record.text_table import TEXT, read_text
 
@@ -62,7 +64,7 @@ class Table:
             )
         try:
             check_content(path)
-            return cls(path, with_joined_stamps(read(path)))
+            columns = with_joined_stamps(read(path))
         except FileNotFoundError:
             raise InputError(f"{path}: no such file") from None
         except InputError:
@@ -71,6 +73,9 @@ class Table:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
         except Exception as error:  # the readers of damaged .mat and .npz files raise anything
             raise InputError(f"{path}: cannot be read as a table: {' '.join(str(error).split())}") from None
+        return cls(
+            path, {name: unwrapped(one) if is_called_time(name) else one for name, one in columns.items()}
+        )
 
     def vectors(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
         """Columns of numbers by name, those of arrays one by one."""

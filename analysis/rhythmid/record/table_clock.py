@@ -33,8 +33,12 @@ MOSTLY_FORWARD = 0.9  # the same of a time that begins anew with each of several
 
 def is_time(name: str, value: Array) -> bool:
     """Whether a column is called a time, or a kind of time, and goes forward as one."""
-    called = _called(name)
-    return (_is_plain_time(name) or KIND_OF_TIME.fullmatch(called) is not None) and _forward(value)
+    return is_called_time(name) and _forward(value)
+
+
+def is_called_time(name: str) -> bool:
+    """Whether a column is called a time, or a kind of time."""
+    return _is_plain_time(name) or KIND_OF_TIME.fullmatch(_called(name)) is not None
 
 
 def _is_plain_time(name: str) -> bool:
