@@ -276,7 +276,8 @@ def test_a_stamp_far_in_the_future_is_no_gap_that_is_filled(tmp_path, bounded, l
 def test_values_that_no_machine_has_are_refused_with_their_place_and_without_a_warning(
     tmp_path, recwarn, sizes
 ):
-    rows = [f"{k},{k % 7}{sizes[0]},{k % 5}{sizes[1]}" for k in range(60) if k % 20]
+    # the values stay for two samples each
+    rows = [f"{k},{k // 2 % 7}{sizes[0]},{k // 2 % 5}{sizes[1]}" for k in range(60) if k % 20]
     (tmp_path / "run.csv").write_text("t,y,u\n" + "\n".join(rows) + "\n")
     signals = Signals.from_text(
         "time: {column: t}\ninput: {column: u}\noutput: {column: y}", tmp_path / "signals.yaml"

@@ -33,6 +33,7 @@ STEP = 6.25e-4  # [s] of the fit's integrator: its error must not pass for a mis
 CLOSE = 1.25  # factor within which a mismatch is the one asked for
 TRIES = 7
 SHIFT = 2.0  # samples by which input and motion may be logged apart: nobody knows their clocks better before
+HELD = 0.5  # samples that a held input, which the machine sees as a smooth one, comes later
 
 
 def record_of(rig: Rig, run: Run, seen: Observation) -> Record:
@@ -78,10 +79,10 @@ def mismatch(nominal: Model, rig: Rig, seen: Sequence[Observation] | None, scale
 
 
 def with_shift(nominal: Model, rig: Rig, catalogue: Catalogue) -> Model:
-    """The model with an input that may be logged earlier or later by `SHIFT` samples, where its delay is no part of it."""
+    """The model with an input that may be logged earlier or later by `SHIFT` samples and act `HELD` later, where its delay is no part of it."""
     if rig.recorded == "nothing" or nominal.term("input_delay") is not None:
         return nominal
-    most = SHIFT / rig.runs[0].rate
+    most = (SHIFT + HELD) / rig.runs[0].rate
     model = nominal.with_element(catalogue["input_delay"], {"delay": 0.0})
     shift = replace(model.parameters[INPUT_DELAY], bounds=(-most, most))
     return model.with_parameters({INPUT_DELAY: shift})

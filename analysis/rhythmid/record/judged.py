@@ -31,14 +31,14 @@ def judged(
     stamped : whether it is the output with stamps of its own, of whose jitter the samples tell; a declared rate makes no stamps.
     missing, conflicts : messages without the channel's entry, and duplicates with other values.
     """
-    absent = np.isnan(value)
-    present = value[~absent]
+    told = np.isfinite(value)  # what is infinite is refused where it is used
+    present = value[told]
     skew = None if lateness is None else clock_skew(recorded, lateness)
-    jitter = stamp_jitter([(time[~absent], present)]) if stamped else None
+    jitter = stamp_jitter([(time[told], present)]) if stamped else None
     return ChannelQuality(
         source,
         Timing.of(recorded),
-        nan=int(absent.sum()),
+        nan=int(np.isnan(value).sum()),
         clipped=clipped(present),
         missing=missing,
         conflicts=conflicts,
