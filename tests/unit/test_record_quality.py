@@ -11,6 +11,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.bag_writer import write_bag
 from rhythmid.record.messages import Messages
+from rhythmid.record.judged import judged
 from rhythmid.record.quality import ChannelQuality, Quality, clipped
 from rhythmid.record.timing import Timing, nominal_period, put_in_order
 
@@ -176,3 +177,13 @@ def test_the_report_tells_why_a_bag_cannot_be_used(tmp_path):
     report = quality_report(write_bag(tmp_path / "bag", topics))
     assert not report.usable and "topic /hopper/joint_states is not in" in report.problems[0]
     assert [topic.name for topic in report.topics] == ["/hopper/excitation"]
+
+
+def test_infinite_values_do_not_disturb_what_is_told_of_the_others(recwarn):
+    time = 0.01 * np.arange(400)
+    value = np.round(np.clip(np.sin(5.0 * time), -0.8, 0.9), 2)
+    spoilt = value.copy()
+    spoilt[[60, 61, 62, 200, 201, 202]] = np.inf
+    plain, found = (judged("q", time, None, time, one, False, 0, 0) for one in (value, spoilt))
+    assert found.clipped > 0 and found.resolution == plain.resolution
+    assert not recwarn.list
