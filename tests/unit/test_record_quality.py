@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from rhythmid.errors import InputError
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.bag_writer import write_bag
-from rhythmid.record.messages import Messages
 from rhythmid.record.judged import judged
+from rhythmid.record.messages import Messages
 from rhythmid.record.quality import ChannelQuality, Quality, clipped
 from rhythmid.record.timing import Timing, nominal_period, put_in_order
 
