@@ -97,8 +97,8 @@ def plain_force(machine: Machine, x: Array, v: Array) -> Array:
 
 def force_share(rig: Rig, seen: Sequence[Observation] | None, free: Sequence[str]) -> float:
     """Rms of the force that the nominal model lacks in the learning records `seen`, in proportion to that of the force that
-    drives the machine; what the model's `free` attributes can absorb of it is left out, and what a shift of a recorded effort or
-    command by up to `SHIFT` samples can."""
+    drives the machine; what the model's `free` attributes can absorb of it is left out, and where the effort is recorded what a
+    shift of the effort by up to `SHIFT` samples can."""
     if seen is None:
         return math.inf
     x = np.concatenate([one.position for one in seen])
@@ -112,7 +112,7 @@ def force_share(rig: Rig, seen: Sequence[Observation] | None, free: Sequence[str
         "moment": np.sin(x - rig.believed.hanging),
     }  # fmt: skip
     absorbed = np.column_stack([columns[name] for name in free if getattr(rig.believed, name)])
-    if rig.recorded in ("effort", "command"):
+    if rig.recorded == "effort":
         forces = np.split(drive, np.cumsum([len(one.position) for one in seen])[:-1])
         moved = [np.gradient(force) for force in forces]  # by one sample
         shift = np.concatenate(moved)[:, None]

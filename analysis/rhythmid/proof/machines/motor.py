@@ -56,6 +56,5 @@ DESIGN = Design(
     draw,
     {"inertia.mass": "mass", "viscous_damper.damping": "damping"},
     (0.003, 0.02),
-    by_effort=True,
     alike=LAGS,
 )
