@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
+from rhythmid.identify.inverse_dynamics.inversion import inverted
 from rhythmid.identify.inverse_dynamics.motion import (
     Motion,
     Stretch,
@@ -38,14 +39,6 @@ MEMORY = 2e8  # bytes of forces that are kept, so that a refit computes again on
 MANY_ROWS = 200  # of a short record that are kept at least: their correlation is allowed for
 QUARTER = 0.25  # of the shortest period of the effort, up to which a gap is bridged: a cubic beside it misses 12 % of that, 1.5 % of one twice as long
 LEAST_ROWS = 40  # rows without which nothing is estimated
-INVERSIONS = (
-    8  # steps of an actuator's inversion at most: an error that halves each time is then below a hundredth
-)
-SETTLING = 0.5  # of its error that a correction has to leave at most: a limit of rate, which cannot be inverted, leaves nearly all
-EXACT = 1e-6  # of a signal: as near as an inversion goes
-SECANT = 1e-3  # of a signal, over which a slope is taken
-FLAT = 0.05  # of its usual slope, below which an element counts as passing nothing on
-NO_SLOPE = 1e-9  # below which a slope is the rounding of what comes out, over a secant of `SECANT`
 SUBSTEPS = 4  # of an element's own states in a sample of the motion, whose bandwidth has ten
 INVISIBLE = 1e-4  # of a signal that is left by a filter that it does not pass
 NEIGHBOURS = np.arange(-2, 4)  # samples from which a value between two is interpolated (Lagrange)
@@ -237,49 +230,34 @@ class Balance:
             for name, (taken_at, column) in motion.links.items():
                 inertial = inertial + (model.value(name) - taken_at) * column
         required = inertial - leg - others
-        if late:
-            load = required if not motion.driven_by_base else zero
-            required = required - sum(self._along(motion, t, model, load, leg, zero) for t in late)
+        if late and motion.driven_by_base:
+            required = required - sum(self._along(motion, t, model, zero, leg, zero) for t in late)
+        elif late:
+            required = self._with_load(motion, late, model, required, leg)
         for slot in ("actuator", "command"):
             for term in reversed([t for t in model.terms if t.element.slot == slot]):
                 if self._counts(term, model):
                     required = self._before(motion, term, model, required, leg)
         return required
 
-    def _before(self, motion: Motion, term: Term, model: Model, after: Array, leg: Array) -> Array:
-        """The signal (n,) that went into an actuator or command element for `after` to come out.
-
-        Newton's steps at each instant where the element has no memory; else the change on the way is taken off again as long as that
-        settles. Where an element passes nothing on, in a dead band or beyond a limit, it is what went in to first order.
-        """
-        into, error = after, -self._along(motion, term, model, after, leg, after)
-        first_order, least = after + error, EXACT * np.linalg.norm(after)
-        for _ in range(INVERSIONS):
-            step = error
-            if not term.element.own:
-                slope = self._slope(motion, term, model, after, leg, into)
-                step = np.divide(error, slope, out=np.zeros_like(error), where=slope != 0.0)
-            left = after - into - step - self._along(motion, term, model, after, leg, into + step)
-            if term.element.own:
-                nearer = np.full(len(after), np.linalg.norm(left) < SETTLING * np.linalg.norm(error))
-            else:
-                nearer = np.abs(left) < np.abs(error)
-            into, error = np.where(nearer, into + step, into), np.where(nearer, left, error)
-            if not nearer.any() or np.linalg.norm(error) <= least:
-                break
-        return np.where(into == after, first_order, into)
-
-    def _slope(
-        self, motion: Motion, term: Term, model: Model, effort: Array, leg: Array, signal: Array
+    def _with_load(
+        self, motion: Motion, terms: Sequence[Term], model: Model, without: Array, leg: Array
     ) -> Array:
-        """Slope (n,) of what comes out of an element without memory over what goes in; 0 where hardly anything more comes out than
-        usually does where something does."""
-        width = SECANT * (float(np.std(signal)) or 1.0)
-        sides = [self._along(motion, term, model, effort, leg, signal + side * width) for side in (-0.5, 0.5)]
-        slope = 1.0 + (sides[1] - sides[0]) / width
-        passing = np.abs(slope) > NO_SLOPE
-        usual = float(np.median(slope[passing])) if passing.any() else 1.0
-        return np.where(passing & (slope / usual > FLAT), slope, 0.0)
+        """The effort (n,) that makes up for the forces of elements that it is the load of; `without` them it is known."""
+        zero = np.zeros(len(motion.time))
+
+        def left_over(effort: Array) -> Array:
+            return effort + np.sum([self._along(motion, t, model, effort, leg, zero) for t in terms], axis=0)
+
+        return inverted(left_over, without, any(term.element.own for term in terms))
+
+    def _before(self, motion: Motion, term: Term, model: Model, after: Array, leg: Array) -> Array:
+        """The signal (n,) that went into an actuator or command element for `after` to come out."""
+
+        def comes_out(into: Array) -> Array:
+            return into + self._along(motion, term, model, after, leg, into)
+
+        return inverted(comes_out, after, bool(term.element.own))
 
     def _along(
         self, motion: Motion, term: Term, model: Model, effort: Array, leg: Array, signal: Array

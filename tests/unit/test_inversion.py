@@ -1,0 +1,60 @@
+"""What must go in for a given signal to come out; friction under load is under the effort that makes up for it."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.inversion import inverted
+from rhythmid.model import Model
+from rhythmid.record.record import Channel, Record
+
+TIME = np.arange(0.0, 20.0, 0.002)
+WAVE = 0.8 * np.sin(2 * np.pi * 0.6 * TIME) + 0.3 * np.sin(2 * np.pi * 1.7 * TIME + 1.0)
+
+
+@given(st.floats(0.3, 3.0), st.floats(0.0, 0.5), st.floats(-1.0, 1.0))
+def test_what_goes_in_brings_out_what_is_wanted(gain, bend, offset):
+    def comes_out(signal):
+        return gain * signal + bend * np.tanh(3.0 * (signal - offset))
+
+    np.testing.assert_allclose(comes_out(inverted(comes_out, WAVE, remembers=False)), WAVE, atol=1e-4)
+
+
+def test_in_a_dead_band_and_beyond_a_limit_it_is_what_goes_in_to_first_order():
+    def limited(signal):
+        return np.clip(signal, -0.5, 0.5)
+
+    def dead(signal):
+        return signal - np.clip(signal, -0.2, 0.2)
+
+    beyond = np.abs(WAVE) > 0.51
+    np.testing.assert_allclose(inverted(limited, WAVE, False)[beyond], (2 * WAVE - limited(WAVE))[beyond])
+    within, clear = np.abs(WAVE) < 0.19, np.abs(WAVE) > 0.21
+    found = inverted(dead, WAVE, False)
+    np.testing.assert_allclose(found[within], (2 * WAVE - dead(WAVE))[within])
+    np.testing.assert_allclose(dead(found)[clear], WAVE[clear], atol=1e-4)
+
+
+@pytest.mark.parametrize("coefficient", [0.05, 0.15, 0.3])
+@pytest.mark.parametrize("name", ["load_dependent_friction", "transmitted_load_friction"])
+def test_friction_under_load_is_under_the_effort_that_makes_up_for_it(name, coefficient):
+    """u = R + mu |u - r e| sgn v is linear in u on either side of its kink; e is the weight, which relieves the teeth."""
+    inertia, weight, ratio, turn = 0.05, 2.0, 0.0 if name == "load_dependent_friction" else 0.5, 0.02
+    velocity = np.gradient(WAVE, TIME)
+    load = -weight * np.sin(WAVE)
+    alone = inertia * np.gradient(velocity, TIME) - load
+    sign = coefficient * np.tanh(velocity / turn)
+    effort = (alone - sign * ratio * load) / (1.0 - sign)
+    wrong_side = effort - ratio * load < 0.0
+    effort[wrong_side] = ((alone + sign * ratio * load) / (1.0 + sign))[wrong_side]
+    more = f", external_ratio: {{value: {ratio}, unit: '1'}}" if ratio else ""
+    model = Model.from_text(
+        f"inertia: {{mass: {{value: {inertia}, unit: kg*m^2}}}}\nforce:\n"
+        f"  - pendulum_gravity: {{moment: {{value: {weight}, unit: N*m}}, reference: {{value: 0.0, unit: rad}}}}\n"
+        f"  - {name}: {{coefficient: {{value: {coefficient}, unit: '1'}}, transition: {{value: {turn}, unit: rad/s}}{more}}}\n"
+    )
+    balance = Balance.of([Record("run", Channel(TIME, WAVE, "rad"), Channel(TIME, effort, "N*m"))], model)
+    error = balance.predicted(model) - balance.measured
+    assert np.std(error) < 0.005 * np.std(balance.measured)
