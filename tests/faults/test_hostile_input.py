@@ -314,3 +314,10 @@ def test_the_name_of_a_model_may_be_longer_than_any_file_s(tmp_path):
     (tmp_path / "experiment.yaml").write_text(text)
     (tmp_path / "delays.csv").write_text("time,delay\n0,0.01\n5,0.02\n")
     assert "no such file" in refusal(lambda: Experiment.load(tmp_path / "experiment.yaml"))
+
+
+def test_a_table_whose_name_no_file_can_have_is_refused_in_one_line(tmp_path):
+    text = "time: {column: t}\noutput: {column: y, file: run." + "9" * 400 + "}"
+    (tmp_path / "signals.yaml").write_text(text)
+    with pytest.raises(InputError, match="is not a table"):
+        read_record(tmp_path / "signals.yaml")

@@ -202,3 +202,9 @@ def test_a_seal_that_was_tampered_with_is_refused(case, tmp_path):
     path.write_text(path.read_text().replace(case.effects[0].name, "gravity"))
     with pytest.raises(InputError, match="hash"):
         unseal(path, told)
+
+
+def test_two_effects_that_make_a_third_are_no_pair(catalogue):
+    assert related(catalogue, "coulomb_friction", "constant_force")
+    assert related(catalogue, "constant_force", "coulomb_friction")
+    assert not related(catalogue, "coulomb_friction", "quadratic_drag")

@@ -187,3 +187,8 @@ def test_infinite_values_do_not_disturb_what_is_told_of_the_others(recwarn):
     plain, found = (judged("q", time, None, time, one, False, 0, 0) for one in (value, spoilt))
     assert found.clipped > 0 and found.resolution == plain.resolution
     assert not recwarn.list
+
+
+def test_a_channel_of_which_nothing_is_finite_has_no_resolution():
+    found = judged("q", np.arange(9.0), None, np.arange(9.0), np.full(9, np.inf), True, 0, 0)
+    assert found.resolution == 0.0 and not found.clipped

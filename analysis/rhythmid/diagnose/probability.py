@@ -48,10 +48,10 @@ def joint_probability(
 
     A richer law that contains a name holds it, too: were it clearly better, it would have been chosen.
     """
-    accepted = [{name, *chosen.richer.get(name, ())} for name in names]
+    accepted = [({name, *chosen.richer.get(name, ())}, names.count(name)) for name in dict.fromkeys(names)]
     held = [
         weights.get(one.key, 0.0)
         for one in contest.hypotheses
-        if all(group & set(one.names) for group in accepted)
+        if all(sum(name in group for name in one.names) >= count for group, count in accepted)
     ]
     return float(np.clip(sum(held), 0.0, 1.0))

@@ -184,8 +184,13 @@ def decide(
         for label in labels
     }
 
+    def stands_for(one: str, label: str) -> bool:
+        return names[one] == names[label] and labels.index(one) <= labels.index(label)
+
     def probability(some: Sequence[str]) -> float:
-        held = joint_probability([names[label] for label in some], contest, chosen, weights)
+        # of effects that are called the same, the smaller one is there only beside the larger ones
+        all_of_them = [one for one in labels if any(stands_for(one, label) for label in some)]
+        held = joint_probability([names[label] for label in all_of_them], contest, chosen, weights)
         return min((sure[label] for label in some), default=1.0) * held
 
     each = {label: probability([label]) for label in labels}

@@ -70,9 +70,8 @@ def variants(element: Element, scales: Scales) -> tuple[Element, ...]:
 def _unsuitable(element: Element, setting: Setting, scales: Scales) -> str | None:
     """Why an element cannot be what the model lacks; None where it can."""
     names = {name for name, _ in setting.present}
-    if (element.name, element.against) in setting.present or (
-        element.name in names and not scales.displaced_base
-    ):
+    there = (element.name, element.against) in setting.present
+    if not element.repeats and (there or (element.name in names and not scales.displaced_base)):
         return "the model has it"
     for other in element.needless_with if element.against != "room" else ():
         if other in names or other in setting.free:

@@ -96,6 +96,8 @@ class Scales:
     forcing_frequency: float = 0.0  # [Hz] pumping frequency, 0 where there is none
     # [Hz] strongest line that the nominal model leaves unexplained, 0 where unknown
     residual_frequency: float = 0.0
+    # strongest lines over position that the nominal model leaves unexplained
+    residual_wavelengths: tuple[float, ...] = ()
     reference: float = 0.0  # standard deviation of a controller's reference, 0 where there is none
     peak_effort: float = 0.0  # largest actuator force, 0 where unknown
     rest: float | None = None  # position at which the model's linear spring is at rest, where that is known
@@ -153,7 +155,7 @@ class Element:
     wants as they were earlier, too, by the time that the parameter `dead_time` says; before a simulation's start they are what
     command and forcing were, with the machine's states led back along their first rates.
     `switches` says where its force changes form: at the value of a parameter, its own or one that it borrows, of position "x" or
-    velocity "v"; at zero where that is "".
+    velocity "v"; at zero where that is "". A machine may have one that `repeats` several times, each with parameters of its own.
     """
 
     name: str
@@ -198,6 +200,7 @@ class Element:
     clock: str = ""
     width: str = ""
     switches: tuple[Literal["x", "v"], str] | None = None
+    repeats: bool = False
     source: str = ""  # file that defines it
 
     def __post_init__(self) -> None:

@@ -100,19 +100,23 @@ def candidates(catalogue: Catalogue, design: Design) -> list[tuple[str, ...]]:
     return classes
 
 
-def related(catalogue: Catalogue, first: str, second: str) -> bool:
-    """Whether two effects are of one family, or one is a special case of the other."""
-    a, b = catalogue[first], catalogue[second]
-    twins = any({first, second} <= group for group in EQUIVALENT)
-    return (
-        first == second or twins or (a.family != "" and a.family == b.family)
-        or first in b.special_case_of or second in a.special_case_of
-    )  # fmt: skip
-
-
 # effects that, with others of the catalogue, make the same model: a friction that differs by direction is one that does not, and a
 # constant force
 SUMS = {"asymmetric_coulomb_friction": ("constant_force",)}
+
+
+def related(catalogue: Catalogue, first: str, second: str) -> bool:
+    """Whether two effects are of one family, one is a special case of the other, or both together are a third."""
+    a, b = catalogue[first], catalogue[second]
+    twins = any({first, second} <= group for group in EQUIVALENT)
+    third = any(
+        (b.name in parts and whole in a.special_case_of) or (a.name in parts and whole in b.special_case_of)
+        for whole, parts in SUMS.items()
+    )
+    return (
+        first == second or twins or third or (a.family != "" and a.family == b.family)
+        or first in b.special_case_of or second in a.special_case_of
+    )  # fmt: skip
 
 
 def absent_with(catalogue: Catalogue, name: str, alike: frozenset[str] = frozenset()) -> tuple[str, ...]:

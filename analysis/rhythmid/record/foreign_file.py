@@ -1,5 +1,6 @@
 """Files of other programs that are not read, and what makes a bag or a table of each."""
 
+import os
 from pathlib import Path
 
 from rhythmid.errors import InputError
@@ -17,7 +18,7 @@ KINDS = {
 def refuse_foreign(path: Path) -> None:
     """Raise InputError, one line with what to do, where a path is a file of another program, or a directory with bags of ROS 1."""
     suffix = path.suffix.lower()
-    if path.is_dir():
+    if os.path.isdir(path):  # false of a name that is too long for one
         if not any(path.glob("*.bag")) or (path / "metadata.yaml").exists():
             return
         path, suffix = min(path.glob("*.bag")), ".bag"

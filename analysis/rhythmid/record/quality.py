@@ -174,7 +174,7 @@ def clipped_samples(value: NDArray[np.float64]) -> NDArray[np.bool_]:
 def resolution(value: NDArray[np.float64]) -> float:
     """Step of the grid that 97 % of the values (n,) at least were rounded to, in their unit; 0 where they lie on none."""
     levels, count = np.unique(value, return_counts=True)
-    step, on_grid = _grid(levels, np.ptp(value))
+    step, on_grid = _grid(levels, float(np.ptp(value))) if len(value) else (0.0, np.empty(0))
     if step == 0.0 or on_grid.mean() > 0.99:
         return step
     common = levels[count > 1]  # a value that was not rounded hardly comes twice

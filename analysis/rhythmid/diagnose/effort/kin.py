@@ -12,6 +12,8 @@ REFINED = 10  # additions that are fitted in earnest in each round: the right on
 
 def kin(first: Element, second: Element) -> bool:
     """Whether two elements are forms of one thing."""
+    if first.name == second.name and first.repeats:
+        return False
     return (
         (first.family != "" and first.family == second.family)
         or second.name in first.special_case_of

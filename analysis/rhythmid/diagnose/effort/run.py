@@ -15,7 +15,7 @@ from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.held_out import HeldOut
 from rhythmid.diagnose.effort.reference import residual_with_map
 from rhythmid.diagnose.effort.remainder import Remainder, remainder_of
-from rhythmid.diagnose.effort.scales import scales_of
+from rhythmid.diagnose.effort.scales import scales_at
 from rhythmid.diagnose.effort.search import GAP, MOST_EFFECTS, EffortSearch, search_effort
 from rhythmid.diagnose.evidence import (
     Blocks,
@@ -190,7 +190,7 @@ def _among_models(
 
 def _unnamed(balance: Balance, fit: EffortFit, catalogue: Catalogue) -> Array:
     """Standard deviations (p,) of the fit's parameters that come from small effects which it lacks."""
-    sizes = scales_of(balance, fit.model)
+    sizes = scales_at(balance, fit)
     starts = [one for one in starts_of(catalogue, fit.model, sizes, balance) if one.kind == "effects"]
     changes = columns_of(balance, fit, [one.start for one in screen(balance, fit, starts)])
     rows = weighted(fit, fit.correlation)

@@ -31,7 +31,7 @@ from rhythmid.diagnose.effort.candidate import (
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.kin import at_values_of, kin, shortlist
 from rhythmid.diagnose.effort.reference import reference_of
-from rhythmid.diagnose.effort.scales import scales_of
+from rhythmid.diagnose.effort.scales import scales_at, scales_of
 from rhythmid.diagnose.evidence import Blocks, Linearised, predict
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, special_case
 from rhythmid.diagnose.rejections import Claim, keeps_shape, rejections_of, replaces
@@ -169,7 +169,7 @@ class _Search:
     def further(self, parent: Fitted) -> Fitted | None:
         """The best model with one effect more, or with a kin in the place of one; None where the table rejects that."""
         model = parent.fit.model
-        starts = starts_of(self.catalogue, model, scales_of(self.balance, model), self.balance)
+        starts = starts_of(self.catalogue, model, scales_at(self.balance, parent.fit), self.balance)
         screened = screen(self.balance, parent.fit, starts)
         self.tried.update(one.start.name for one in screened)
         tried = len(screened)

@@ -1,8 +1,9 @@
 """Position ripple: F = A sin(2 pi x / lambda + phi), for instance the cogging of a linear motor or an eccentric gear.
 
 (A, phi) and (-A, phi + pi) are the same ripple, so A is kept positive. A fit in lambda has one minimum for every
-period that fits into the range of motion: it needs a grid of starts. A period about as long as the whole travel makes
-it but a spring with a cubic term, so the search keeps to shorter ones.
+period that fits into the range of motion: it needs a grid of starts, and where a rotor turns many times the lines over
+position that are left. A period about as long as the whole travel makes it but a spring with a cubic term, so the search
+keeps to shorter ones.
 """
 
 import math
@@ -15,9 +16,12 @@ def kernel(x, v, t, f, amplitude, wavelength, phase):
 
 
 def starts(scales):
+    wavelengths = [
+        4.0 * scales.position / 1.25**k for k in range(12)
+    ]  # from one period in the usual travel to a dozen
     return [
-        {"amplitude": 0.01 * scales.force, "wavelength": 4.0 * scales.position / 1.25**k, "phase": phase}
-        for k in range(12)  # from one period in the usual travel to a dozen
+        {"amplitude": 0.01 * scales.force, "wavelength": wavelength, "phase": phase}
+        for wavelength in (*scales.residual_wavelengths, *wavelengths)
         for phase in (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)  # the amplitude has no sign
     ]
 
@@ -39,6 +43,7 @@ ELEMENT = Element(
     ranges=lambda s: {"wavelength": (0.0, 0.75 * (s.high - s.low))},
     also_known_as=("cogging", "detent force", "torque ripple", "gear eccentricity"),
     family="ripple",
+    repeats=True,  # pole pairs, slots and gears have a wavelength each
     confusable={
         "cubic_stiffness": "long wavelengths: use the whole range of motion",
         "periodic_disturbance": "periodic in position, not in time: change the speed",

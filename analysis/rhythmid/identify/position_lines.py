@@ -1,0 +1,44 @@
+"""Lines over position: the wavelengths of what repeats itself as a machine moves along, such as a motor's cogging."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+
+Array = NDArray[np.float64]
+FEWEST = 2.0  # waves in the travel: what has fewer is a smooth law of the position
+FINER = 4  # bins in the shortest wave
+MOST_BINS = 1 << 20
+PADDED = (
+    2  # times the travel over which the spectrum is taken, so that a line stands in more than one of its bins
+)
+
+
+def strongest_wavelengths(position: Array, signal: Array, shortest: float, count: int) -> tuple[float, ...]:
+    """Wavelengths of the strongest lines of a signal (n,) over position (n,), the strongest first; at most `count`.
+
+    The places that were visited may be spread anyhow: the spectrum is that of the signal's sums in bins of position, tapered to the ends
+    of the travel (D. J. Thomson, Proc. IEEE 70 (1982) 1055). What is shorter than `shortest` is not looked for.
+    """
+    low, travel = float(position.min()), float(np.ptp(position))
+    if len(position) < 8 or not travel > FEWEST * shortest > 0.0:
+        return ()
+    bins = min(MOST_BINS, 1 << math.ceil(math.log2(FINER * travel / shortest)))
+    place = np.minimum(((position - low) * (bins / travel)).astype(np.int64), bins - 1)
+    taper = np.hanning(bins + 2)[1:-1]
+    sums = np.bincount(place, signal - signal.mean(), bins) * taper
+    power = np.abs(np.fft.rfft(sums, PADDED * bins)) ** 2
+    waves = np.arange(len(power)) / PADDED  # in the travel
+    power[(waves < FEWEST) | (waves > travel / shortest)] = 0.0
+    peaks = find_peaks(power, distance=2 * PADDED)[0]
+    best = peaks[np.argsort(-power[peaks], kind="stable")][:count]
+    return tuple(float(travel / _top(power, waves, one)) for one in best)
+
+
+def _top(power: Array, waves: Array, peak: int) -> float:
+    """Where a parabola through the logarithms around a peak has its top."""
+    below, top, above = np.log(np.maximum(power[peak - 1 : peak + 2], 1e-300))
+    bend = below - 2.0 * top + above
+    aside = 0.5 * (below - above) / bend if bend < 0.0 else 0.0
+    return float(waves[peak] + aside * (waves[1] - waves[0]))
