@@ -12,6 +12,7 @@ from rhythmid.model import Model
 from rhythmid.record.inventory import Inventory, inventory
 from rhythmid.record.read import load_records, read_record
 from rhythmid.record.signals import Clock, Signals
+from rhythmid.start.force_unit import MODELLED
 from rhythmid.start.known import Ask
 from rhythmid.start.meaning import driving_unit_of
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
@@ -110,7 +111,7 @@ def start(
 
 def _units(roles: Roles) -> Units:
     """Units of the machine's force, position and inertia."""
-    forces = [roles.choices[role] for role in ("input", "effort", "forcing") if role in roles.choices]
+    forces = [roles.choices[role] for role in MODELLED if role in roles.choices]
     if roles.input_kind != "force" or not forces:
         return per_inertia(units_of(roles, ""))
     return units_of(roles, driving_unit_of(forces[0].recorded))
