@@ -8,7 +8,7 @@ from rhythmid.start.direction import COPY, doubt_of_direction
 from rhythmid.start.force_unit import doubt_of_units, matching, of_one_unit
 from rhythmid.start.known import Ask, Choice, Known, chosen, pick, ranked_by_worth, strongest
 from rhythmid.start.meaning import Quantity, meaning_of, says_base
-from rhythmid.start.relation import coherent, follows
+from rhythmid.start.relation import HARDLY, coherent, follows
 
 
 def drivers(
@@ -32,6 +32,8 @@ def drivers(
     if forcing:
         found["forcing"] = strongest(forcing, "moves most of what pushes from outside")
     reference, of = _reference(rest, output, measured)
+    if reference is not None:
+        commanded = [one for one in commanded if not _is_hardly_effort(one, output)]
     base = [one for one in rest if one.meaning.base and one.quantity in ("position", "acceleration")]
     if commanded and sensed:
         found["input"], found["effort"] = _commanded_and_measured(commanded, sensed, output, ask)
@@ -55,6 +57,11 @@ def drivers(
             found["input"] = reference
             return found, "reference", of
     return found, "force", of
+
+
+def _is_hardly_effort(one: Known, output: Recorded) -> bool:
+    """Whether no name says that a command is an effort, and it hardly goes with the output."""
+    return meaning_of(one.one).quantity is None and coherent(one.one, output) < HARDLY
 
 
 def _beside_base(choice: Choice, base: list[Known]) -> Choice:

@@ -1,6 +1,7 @@
 """What a recorded number means by its name, unit and message type: which quantity, and whether it was asked for or measured."""
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
@@ -110,7 +111,7 @@ def meaning_of(one: Recorded) -> Meaning:
         and not (one.unit or "m").startswith("rad")
     ):
         base, commanded = True, None
-    joint = one.joint or _joint_of_column(one)
+    joint = one.joint or ("" if one.topic else joint_of_column(one.said, one.side))
     return Meaning(quantity, commanded, forcing, base, joint, reason.removeprefix("; "), certain)
 
 
@@ -227,10 +228,8 @@ def _one(words: list[str], known: frozenset[str]) -> str:
     return next(word for word in words if word in known)
 
 
-def _joint_of_column(one: Recorded) -> str:
-    """What tells a column from others of the same quantity: `3` of dof_pos[3], `knee` of knee_pos; empty for messages."""
-    if one.topic:
-        return ""
+def joint_of_column(said: str, side: str = "", names: Collection[str] = ()) -> str:
+    """What tells a column from others of the same quantity: `3` of dof_pos[3], `knee` of knee_pos; `names` are words that are names here."""
     known = (
         COMMANDED
         | MEASURED
@@ -239,7 +238,7 @@ def _joint_of_column(one: Recorded) -> str:
         | BASE
         | SHAKEN
         | DRIVING
-        | frozenset().union(*WORDS.values(), DEVICES)
+        | frozenset().union(*WORDS.values(), DEVICES, LETTERS)
     )
-    left = [word for word in words_of(one.said) if word not in known and word not in LETTERS]
-    return "_".join([*([one.side] if one.side else []), *left])
+    left = [word for word in words_of(said) if word in names or word not in known]
+    return "_".join([*([side] if side else []), *left])

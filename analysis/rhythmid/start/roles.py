@@ -50,7 +50,8 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
         raise InputError(f"{found.path}: holds nothing that could be a motion")
     said = [(one.one, one.meaning) for one in known]
     carried = carried_motion(said) if joint is None else None
-    chosen = joint_of(said, joint, ask, str(found.path)) if carried is None else Joint()
+    still = [(one, meaning_of(one)) for one in found.constant]
+    chosen = joint_of(said, still, joint, ask, str(found.path)) if carried is None else Joint()
     everything = known
     known = [one for one in known if chosen.includes(one.one, one.meaning)]
     if carried is not None:
