@@ -107,7 +107,7 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
     if head is not None and lvm is not None:
         head = lvm.names(head, len(cells))
     if head is None:
-        head = _remark(lines[: used[place][0]], separator, len(cells)) or [str(n) for n in range(len(cells))]
+        head = _unnamed(lines[: used[place][0]], separator, split[place:])
     if not head[-1] and not cells[-1]:
         head = head[:-1]
     if len(head) == len(cells) - 1 and not cells[-1]:  # every row ends with a separator
@@ -165,6 +165,18 @@ def _names_above(above: list[list[str]], last: str, count: int) -> list[list[str
         return [] if any(letter.isalnum() for letter in last) else _names_above(above[:-1], "", count)
     broken = len(above[-1]) < count and all(not cell or is_number(cell, ".") for cell in above[-1])
     return above[:-1] if broken else above
+
+
+def _unnamed(before: list[str], separator: str | None, rows: list[list[str]]) -> list[str]:
+    """Names of columns in a comment before the rows, else their numbers; a separator behind every row makes no column."""
+    count = len(rows[0])
+    ended = not any(row[-1] for row in rows if len(row) == count)
+    filled = count - 1 if ended and count > 1 else count
+    return (
+        _remark(before, separator, count)
+        or _remark(before, separator, filled)
+        or [str(number) for number in range(filled)]
+    )
 
 
 def _remark(lines: list[str], separator: str | None, count: int) -> list[str] | None:
