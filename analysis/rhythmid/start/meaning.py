@@ -26,6 +26,7 @@ WORDS: dict[Quantity, frozenset[str]] = {
 }  # fmt: skip
 DEVICES: dict[str, Quantity] = {
     "encoder": "position",
+    "encoders": "position",
     "enc": "position",
     "load": "effort",  # a load cell's; the angle of a load is no effort
 }  # what a device measures, where no word says what it is of
@@ -39,9 +40,12 @@ COMMANDED = frozenset(
 )
 COMMANDED_LETTERS = frozenset("u r".split())
 MEASURED = frozenset(
-    "meas measured act actual state states feedback fb est estimated present real raw filt filtered smoothed response".split()
+    "meas measured act actual state states feedback fb est estimated present real raw filt filtered smoothed response "
+    "encoder encoders enc".split()
 )
-PLACES = frozenset("motor link gear rotor shaft sensor imu camera vicon mocap optitrack laser lidar".split())
+PLACES = frozenset(
+    "motor load link gear rotor shaft sensor imu camera vicon mocap optitrack laser lidar".split()
+)
 FORCING = frozenset("forcing pump pumping disturbance perturbation external".split())
 BASE = frozenset(
     "base table ground shaker platform floor road terrain foundation seismic earthquake quake".split()
@@ -176,7 +180,7 @@ def says_base(one: Recorded) -> bool:
 
 def names_a_place(one: Recorded) -> bool:
     """Whether its name says where or by what it was measured."""
-    return bool({*words_of(one.said), *words_of(one.topic)} & (PLACES | DEVICES.keys()))
+    return bool({*words_of(one.said), *words_of(one.topic)} & PLACES)
 
 
 def letter_of(one: Recorded) -> str:

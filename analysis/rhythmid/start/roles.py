@@ -18,6 +18,7 @@ from rhythmid.start.known import Ask, Choice, Known, pick, ranked_by_worth
 from rhythmid.start.meaning import Quantity, is_ignored, is_lone_v, meaning_of, rotary_of, says_who_asks
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along
 from rhythmid.start.step_before import BEFORE, step_before
+from rhythmid.start.unnamed_reference import with_reference
 
 INTEGRAL = 0.9  # correlation from which a position and a velocity belong together
 MEASURED: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
@@ -62,7 +63,8 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
         output, known, exchanged = by_direction(output, known)
         notes = [*exchanged]
     choices = {"output": output}
-    measured = next(one for one in known if one.one is output.recorded).quantity or "position"
+    own = next(one for one in known if one.one is output.recorded)
+    measured = own.quantity or "position"
     rest = [
         one
         for one in known
@@ -84,6 +86,12 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     if step is not None:
         more = {"input": Choice(step, "the only effort, and nothing else drives", doubts=(BEFORE,))}
     choices |= {role: _doubted(choice, copies) for role, choice in more.items()}
+    if not more:
+        rest, told = with_reference(own, rest)
+        notes += told
+        if told:
+            more, kind, reference_of = drivers(rest, output.recorded, measured, ask)
+            choices |= more
     if not more:
         more, idle = _idle(rest, output.recorded, ask)
         choices |= more
