@@ -7,10 +7,11 @@ import numpy as np
 
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Inventory, Recorded
+from rhythmid.record.output_copy import doubt_of_copy
 from rhythmid.record.signals import InputKind, OutputKind
 from rhythmid.start.by_data import by_data, note_of_unknown, output_by_data
 from rhythmid.start.carried import carried_motion
-from rhythmid.start.copies import correlation_of_copy, doubt_of_copy, note_of_copy
+from rhythmid.start.copies import copies_output, note_of_copy
 from rhythmid.start.direction import by_direction, notes_of_other_joints
 from rhythmid.start.drivers import drivers
 from rhythmid.start.joint import Joint, joint_of
@@ -122,7 +123,7 @@ def _without_copies(rest: list[Known], output: Recorded) -> tuple[list[Known], d
     A copy is kept where its name says that it drives or is asked for, and nothing else that says so is there: a controller whose
     reference stands still makes such an effort.
     """
-    correlation = {id(one.one): correlation_of_copy(one.one, output) for one in rest}
+    correlation = {id(one.one): copies_output(one.one, output) for one in rest}
     copies = [
         one for one in rest
         if correlation[id(one.one)] != 0.0 and (one.quantity == "effort" or not one.meaning.commanded)
