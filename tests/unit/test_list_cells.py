@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rhythmid.errors import InputError
+from rhythmid.record.broken_lines import unbroken
 from rhythmid.record.inventory import inventory
 from rhythmid.record.read import read_record
 from rhythmid.record.signals import Signals
@@ -86,3 +87,28 @@ def test_a_line_of_units_in_brackets_is_no_row(tmp_path):
     rows = "".join(f'{k},"[{k}, 2]"\n' for k in range(5))
     (tmp_path / "run.csv").write_text(f"t,q\n[s],[1]\n{rows}")
     assert list(Table.load(tmp_path / "run.csv").columns) == ["t [s]", "q"]
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_a_list_that_numpy_has_broken_into_lines_is_whole(tmp_path, end):
+    values = np.random.default_rng(0).standard_normal((300, 2, 9))
+    rows = [f'{k},"{first}","{second}",7' for k, (first, second) in enumerate(values)]
+    assert "\n" in rows[0]
+    (tmp_path / "run.csv").write_text("\n".join(["t,q,dq,n", *rows, ""]), newline=end)
+    found = Table.load(tmp_path / "run.csv")
+    np.testing.assert_allclose(found.columns["q"], values[:, 0], atol=1e-7)
+    np.testing.assert_allclose(found.columns["dq"], values[:, 1], atol=1e-7)
+    np.testing.assert_array_equal(found.column("n"), 7.0)
+
+
+def test_lines_behind_a_broken_list_keep_their_numbers(tmp_path):
+    (tmp_path / "run.csv").write_text('t,q\n0,"[1\n 2]"\n1,"[1\n 2]"\n2,"[1 2 3]"\n')
+    with pytest.raises(InputError, match="line 6 .* holds a list of 3"):
+        Table.load(tmp_path / "run.csv")
+
+
+def test_a_quotation_mark_that_opens_no_list_breaks_nothing():
+    lines = ['5" [mm],x\n', *(f"{k},1\n" for k in range(200))]
+    assert list(unbroken(lines)) == lines
+    opened = ['0,"[1, 2\n', *(f"{k},1\n" for k in range(200))]
+    assert list(unbroken(opened)) == opened

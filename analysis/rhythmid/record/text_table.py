@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from rhythmid.errors import InputError
+from rhythmid.record.broken_lines import unbroken
 from rhythmid.record.clock_time import seconds
 from rhythmid.record.list_cells import list_of, lists_of
 from rhythmid.record.lvm_head import lvm_head
@@ -58,10 +59,10 @@ def read_text(path: Path) -> dict[str, Any]:
     is damaged.
     """
     with opened(path) as file:
-        begin = list(islice(file, LOOKED_AT))
+        begin = list(islice(unbroken(file), LOOKED_AT))
     dialect, lvm = dialect_of(begin, str(path)), lvm_head(begin)
     with opened(path) as file:
-        lines = islice(file, dialect.first, None)
+        lines = islice(unbroken(file), dialect.first, None)
         rows = rows_in(lines, dialect.first, dialect.separator, dialect.head)
     count = len(dialect.names)
     words = [place for place in range(count) if place not in dialect.numeric]
