@@ -186,3 +186,22 @@ def test_a_model_that_is_wrong_or_does_not_fit_the_records_is_refused_after_the_
     answer = command("check", "run.csv", "--signals", "signals.yaml", "--model", "model.yaml")
     assert answer.code == 2 and words in answer.err and answer.err.count("\n") == 1
     assert "columns read" in answer.out
+
+
+def test_an_effort_that_a_holding_controller_makes_of_the_output_is_noted(tmp_path):
+    rng = np.random.default_rng(5)
+    place = 1e-6 * np.cumsum(rng.standard_normal(N))
+    held = 3.0 - 9000.0 * place + 1e-5 * rng.standard_normal(N)
+    report = quality_report(table(tmp_path, held, place), tmp_path / "signals.yaml")
+    (note,) = [
+        one for one in report.notes if one.startswith("input: it is a copy of the output (correlation -")
+    ]
+    assert "what a controller makes while its reference stands still" in note
+    assert not any(line.endswith("flawless") for line in report.lines())
+
+
+@pytest.mark.parametrize("stiffness", [9000.0, 0.0])
+def test_a_spring_that_the_effort_stretches_and_a_free_motion_are_not(tmp_path, stiffness):
+    effort = stiffness * Y if stiffness else U
+    report = quality_report(table(tmp_path, effort, Y), tmp_path / "signals.yaml")
+    assert not any("copy" in one for one in report.notes)

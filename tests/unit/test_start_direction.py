@@ -137,3 +137,40 @@ def test_a_base_that_moves_beside_a_force_is_told(tmp_path):
         line.startswith("CHECK input: a motion of the base was recorded, too (road [mm])")
         for line in found.lines()
     )
+
+
+def slow(asked: np.ndarray, lag: float = 0.2) -> np.ndarray:
+    """What a servo makes of what it is asked for that comes a time constant [s] later and does not reach it."""
+    answer = np.zeros(len(asked))
+    for k, wanted in enumerate(asked[:-1]):
+        answer[k + 1] = answer[k] + foreign.STEP * (wanted - answer[k]) / lag
+    return answer
+
+
+ASKED = 600.0 * tones(4, np.arange(20000) * foreign.STEP, 1.0, 0.2, 0.9)
+SLOW = slow(ASKED)
+
+
+def test_an_encoder_is_a_measurement_and_what_its_motion_follows_is_the_reference(tmp_path):
+    topics = {
+        "/servo/position_data": [(1.7e9 + foreign.STEP * k, foreign.array([ASKED[k]])) for k in range(0, 20000, 10)],
+        "/servo/encoder_data": [(1.7e9 + foreign.STEP * k, foreign.array([SLOW[k]])) for k in range(7, 20000, 150)],
+    }  # fmt: skip
+    bag = foreign.write(tmp_path / "bag", topics)
+    assert roles_of(bag) == {"input": "/servo/position_data data[0]", "output": "/servo/encoder_data data[0]"}
+    found = guess(bag)
+    assert found.roles.input_kind == "reference"
+    (line,) = [line for line in found.lines() if line.startswith("CHECK")]
+    assert "no name says that /servo/position_data data[0] was asked for" in line
+
+
+@pytest.mark.parametrize("measured", ["encoder", "pos_feedback", "pos_actual", "pos_state"])
+def test_a_motion_without_a_word_leads_one_that_is_called_measured(tmp_path, measured):
+    columns = {"pos": ASKED[::20], measured: SLOW[::20] + NOISE[:1000]}
+    np.savez(tmp_path / "run.npz", t=0.02 * np.arange(1000), **columns)
+    assert roles_of(tmp_path / "run.npz") == {"input": "pos", "output": measured}
+
+
+def test_a_second_sensor_that_does_not_lead_the_encoder_is_no_reference(tmp_path):
+    for second in (X + NOISE, np.roll(X, 1) + NOISE):
+        assert roles_of(write(tmp_path, encoder=X, pos=second)) == {"output": "encoder"}

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from foreign import array, joint_state, moved, tones
 
-from rhythmid.start.start import guess
+from rhythmid.start.start import guess, start
 
 TIME = np.arange(4000) * foreign.STEP
 FORCE = tones(1, TIME)
@@ -68,3 +68,33 @@ def test_volts_of_a_position_sensor_are_no_effort_and_its_scale_is_asked_for(tmp
     assert "CHECK: its heading says V, and m is needed: scale:" in found.signals
     np.savez(tmp_path / "fed.npz", t=TIME, position=X, **{"motor voltage [V]": FORCE})
     assert str(guess(tmp_path / "fed.npz").roles.choices["input"].recorded) == "motor voltage [V]"
+
+
+CURRENT = FORCE / 0.1  # A, of a motor of 0.1 N m/A
+
+
+def test_of_commands_in_several_units_the_one_of_the_measured_torque_is_the_input(tmp_path):
+    rough = FORCE + 3.0 * tones(7, TIME)  # goes less well with the motion
+    asked = {"iq cmd [A]": CURRENT, "torque cmd [Nm]": rough}
+    np.savez(tmp_path / "run.npz", t=TIME, **{"angle [rad]": X, "sensor torque [Nm]": FORCE}, **asked)
+    begun = start([tmp_path / "run.npz"])
+    chosen = {role: str(one.recorded) for role, one in begun.guess.roles.choices.items()}
+    assert chosen == {"output": "angle [rad]", "input": "torque cmd [Nm]", "effort": "sensor torque [Nm]"}
+    assert begun.nominal.model.units.force == "N*m"
+    assert begun.nominal.model.value("inertia.mass") == pytest.approx(0.05, rel=0.05)
+
+
+def test_beside_a_command_in_another_unit_the_model_is_in_that_of_the_measured_effort(tmp_path):
+    columns = {"angle [rad]": X, "iq cmd [A]": CURRENT, "sensor torque [Nm]": FORCE}
+    np.savez(tmp_path / "run.npz", t=TIME, **columns)
+    begun = start([tmp_path / "run.npz"])
+    assert begun.nominal.model.units.force == "N*m"
+    assert begun.nominal.model.value("inertia.mass") == pytest.approx(0.05, rel=0.05)
+    (doubt,) = [line for line in begun.lines() if line.startswith("CHECK input")]
+    assert "it is in A, the measured effort and the model in N*m: give it the scale" in doubt
+
+
+def test_a_command_and_an_effort_of_one_unit_are_not_doubted(tmp_path):
+    columns = {"angle [rad]": X, "tau_cmd": FORCE, "torque [Nm]": FORCE + 0.1 * V}
+    np.savez(tmp_path / "run.npz", t=TIME, **columns)
+    assert not any(line.startswith("CHECK input") for line in start([tmp_path / "run.npz"]).lines())

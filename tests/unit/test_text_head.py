@@ -1,8 +1,10 @@
 """Titles, names, units and types above the rows of a text table, in the orders in which programs write them."""
 
+import numpy as np
 import pytest
 
 from rhythmid.record.table import Table
+from rhythmid.record.text_table import read_text
 
 PLAIN = ["Time", "Position", "Torque"]
 SI = ["Time [s]", "Position [rad]", "Torque [Nm]"]
@@ -49,3 +51,17 @@ def test_they_are_found_whatever_separates_the_columns(tmp_path, separator):
 def test_a_first_row_with_a_cell_that_is_empty_is_a_row(tmp_path):
     (tmp_path / "run.csv").write_text("Time,Position,Torque\n0.000,,\n" + ROWS)
     assert len(Table.load(tmp_path / "run.csv").column("Position")) == 60
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_a_separator_behind_every_row_makes_no_column_where_no_line_names_them(tmp_path, separator):
+    rows = "".join(separator.join([f"{0.01 * k:.2f}", f"{k * k}", ""]) + "\n" for k in range(9))
+    (tmp_path / "run.txt").write_text(rows)
+    assert list(read_text(tmp_path / "run.txt")) == ["0", "1"]
+    (tmp_path / "run.txt").write_text(f"# t{separator}x\n{rows}")
+    assert list(read_text(tmp_path / "run.txt")) == ["t", "x"]
+
+
+def test_a_last_column_that_is_empty_in_some_rows_is_one(tmp_path):
+    (tmp_path / "run.txt").write_text("0\t1\t\n1\t2\t\n2\t3\t7\n")
+    np.testing.assert_array_equal(read_text(tmp_path / "run.txt")["2"], [np.nan, np.nan, 7.0])

@@ -17,6 +17,7 @@ from rhythmid.record.gaps import Cut, cut_at_gaps
 from rhythmid.record.joint_record import JointSignals, names_joints, read_joint_record
 from rhythmid.record.message_types import stamp_path
 from rhythmid.record.other_lengths import read_length_notes
+from rhythmid.record.output_copy import copy_notes
 from rhythmid.record.quality import ChannelQuality
 from rhythmid.record.read import read_record
 from rhythmid.record.record import Record
@@ -188,6 +189,7 @@ def quality_report(
         for begin, one in parts.items():
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             notes += [note for note in one.quality.notes if note not in notes]
+            notes += [f"{begin}{note}" for note in copy_notes(one)]
         duration = max(one.duration for one in parts.values())
     except InputError as error:
         if not is_bag(source) or not source.exists():

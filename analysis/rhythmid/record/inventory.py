@@ -83,8 +83,8 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Inventory:
-    """All numbers of a source that change, how its times are told and why, what was left out, of that what stands still at
-    another value than zero, and what a user should know."""
+    """All numbers of a source that change, how its times are told and why, what was left out, of that what never changes, and
+    what a user should know."""
 
     path: Path
     recorded: tuple[Recorded, ...]
@@ -163,7 +163,7 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
         else:
             found.append(one)
     notes = length_notes(table, count)
-    return Inventory(table.path, tuple(found), clock, reason, tuple(left), _not_zero(constant), notes)
+    return Inventory(table.path, tuple(found), clock, reason, tuple(left), tuple(constant), notes)
 
 
 def _rows_of(columns: list[tuple[str, Array]]) -> int:
@@ -171,11 +171,6 @@ def _rows_of(columns: list[tuple[str, Array]]) -> int:
     lengths = [len(value) for _, value in columns]
     timed = {len(value) for name, value in columns if is_time(name, value)}
     return max(lengths, key=lambda count: (count in timed and lengths.count(count) > 1, lengths.count(count)))
-
-
-def _not_zero(constant: list[Recorded]) -> tuple[Recorded, ...]:
-    """Those of a known value, which is not zero; one that no row has is none."""
-    return tuple(one for one in constant if np.isfinite(one.value).all() and one.value[:1].any())
 
 
 def _of_bag(bag: Bag) -> Inventory:
@@ -217,7 +212,7 @@ def _of_bag(bag: Bag) -> Inventory:
         raise InputError(
             f"{bag.path}: no topic holds a number that changes; topics: {', '.join(sorted(bag.topics)) or 'none'}"
         )
-    still = _not_zero([one for one in constant if len(one.value) > 1])
+    still = tuple(one for one in constant if len(one.value) > 1)
     return Inventory(bag.path, tuple(moving), Clock("receive"), "", tuple(left), still)
 
 

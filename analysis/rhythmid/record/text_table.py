@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 
 from rhythmid.errors import InputError
+from rhythmid.record.broken_lines import unbroken
 from rhythmid.record.clock_time import seconds
+from rhythmid.record.list_cells import list_of, lists_of
 from rhythmid.record.lvm_head import lvm_head
 from rhythmid.record.text_cells import COMMENTS, cells_of, content, is_number, number_of
 from rhythmid.record.text_file import opened
 from rhythmid.record.text_head import names_of
-from rhythmid.record.text_rows import numbers_of, rows_in
+from rhythmid.record.text_rows import Rows, numbers_of, rows_in
 
 TEXT = (".csv", ".tsv", ".txt", ".dat", ".lvm", ".log")
 SEPARATORS = ("\t", ";", ",", None)  # None: any number of spaces; in this order where two do equally well
@@ -50,16 +52,17 @@ class Dialect:
 
 
 def read_text(path: Path) -> dict[str, Any]:
-    """Columns of a text table by name: float64[n] each, dates and times of day in seconds, text[n] where a column holds words.
+    """Columns of a text table by name: float64[n] each, float64[n, k] where cells are lists, dates and times of day in seconds, text[n]
+    where a column holds words.
 
     Raises InputError where the file is empty, its names are not unique or do not belong to the rows; ValueError where a row
     is damaged.
     """
     with opened(path) as file:
-        begin = list(islice(file, LOOKED_AT))
+        begin = list(islice(unbroken(file), LOOKED_AT))
     dialect, lvm = dialect_of(begin, str(path)), lvm_head(begin)
     with opened(path) as file:
-        lines = islice(file, dialect.first, None)
+        lines = islice(unbroken(file), dialect.first, None)
         rows = rows_in(lines, dialect.first, dialect.separator, dialect.head)
     count = len(dialect.names)
     words = [place for place in range(count) if place not in dialect.numeric]
@@ -72,7 +75,7 @@ def read_text(path: Path) -> dict[str, Any]:
     }
     if words:
         cells = [cells_of(text, dialect.separator) for text in rows.texts]
-        found |= {dialect.names[place]: _words([row[place] for row in cells]) for place in words}
+        found |= {dialect.names[place]: _words([row[place] for row in cells], rows, place) for place in words}
     if lvm is not None and lvm.step > 0.0:
         found[dialect.names[0]] = lvm.times(len(rows))
     return {name: found[name] for name in dialect.names}
@@ -94,13 +97,18 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
     split = [cells_of(line, separator) for _, line in used]
     place = _first_row(split, rows, decimal)
     cells = split[place]
-    numeric = tuple(index for index, cell in enumerate(cells) if number_of(cell, decimal) is not None)
+    lists = {index for row in split[place:] for index, cell in enumerate(row) if list_of(cell)}
+    numeric = tuple(
+        index
+        for index, cell in enumerate(cells)
+        if number_of(cell, decimal) is not None and index not in lists
+    )
     above = _names_above(split[:place], used[place - 1][1] if place else "", len(cells))
     head = names_of(above, len(cells))
     if head is not None and lvm is not None:
         head = lvm.names(head, len(cells))
     if head is None:
-        head = _remark(lines[: used[place][0]], separator, len(cells)) or [str(n) for n in range(len(cells))]
+        head = _unnamed(lines[: used[place][0]], separator, split[place:])
     if not head[-1] and not cells[-1]:
         head = head[:-1]
     if len(head) == len(cells) - 1 and not cells[-1]:  # every row ends with a separator
@@ -124,10 +132,18 @@ def _readings(lines: list[str]) -> Iterator[tuple[str | None, str, list[int]]]:
     for separator in SEPARATORS:
         split = [cells_of(line, separator) for line in lines]
         for decimal in (".",) if separator == "," and not any('"' in line for line in lines) else (".", ","):
-            count = [sum(is_number(cell, decimal) for cell in row) for row in split]
+            count = [sum(_count(cell, decimal) for cell in row) for row in split]
             usual = Counter(len(row) for row, numbers in zip(split, count) if numbers).most_common(1)
             width = usual[0][0] if usual else 0
             yield separator, decimal, [n if len(row) == width else 0 for row, n in zip(split, count)]
+
+
+def _count(cell: str, decimal: str) -> int:
+    """How many numbers a cell holds, of which a list has several; [1] may be a unit."""
+    if is_number(cell, decimal):
+        return 1
+    found = list_of(cell) or ()
+    return len(found) if len(found) > 1 else 0
 
 
 def _worth(rows: list[int]) -> tuple[int, int]:
@@ -150,6 +166,18 @@ def _names_above(above: list[list[str]], last: str, count: int) -> list[list[str
         return [] if any(letter.isalnum() for letter in last) else _names_above(above[:-1], "", count)
     broken = len(above[-1]) < count and all(not cell or is_number(cell, ".") for cell in above[-1])
     return above[:-1] if broken else above
+
+
+def _unnamed(before: list[str], separator: str | None, rows: list[list[str]]) -> list[str]:
+    """Names of columns in a comment before the rows, else their numbers; a separator behind every row makes no column."""
+    count = len(rows[0])
+    ended = not any(row[-1] for row in rows if len(row) == count)
+    filled = count - 1 if ended and count > 1 else count
+    return (
+        _remark(before, separator, count)
+        or _remark(before, separator, filled)
+        or [str(number) for number in range(filled)]
+    )
 
 
 def _remark(lines: list[str], separator: str | None, count: int) -> list[str] | None:
@@ -185,7 +213,9 @@ def _begins_with_word(row: list[str], below: list[list[str]], decimal: str) -> b
     return 2 * sum(there) > len(there)
 
 
-def _words(cells: list[str]) -> np.ndarray:
-    """A column of seconds where its cells are times, of words else."""
-    found = seconds(cells)
+def _words(cells: list[str], rows: Rows, place: int) -> np.ndarray:
+    """A column of lists or of seconds where its cells are lists or times, of words else."""
+    found = lists_of(cells, rows, place)
+    if found is None:
+        found = seconds(cells)
     return np.array(cells, dtype=object) if found is None else found  # fixed-width text would take much more

@@ -16,12 +16,11 @@ from rhythmid.start.meaning import (
     poses,
     says_that_it_drives,
 )
-from rhythmid.start.relation import GOES_ALONG, RATIO, coherent, derivative, drives, follows, predicts
+from rhythmid.start.relation import GOES_ALONG, HARDLY, RATIO, coherent, derivative, drives, follows, predicts
 
 SURE_INTEGRAL = (
     0.98  # correlation from which a position and a velocity belong together, where no name says so
 )
-HARDLY = 0.3  # coherence with the output below which a number without a name is not taken for what drives
 OR_ELSE = "a base that moves is  kind: base_displacement, what a controller is asked for  kind: reference"
 NAMED = 8  # numbers that a note names
 

@@ -30,7 +30,7 @@ def by_direction(output: Choice, known: list[Known]) -> tuple[Choice, list[Known
     may lead as a motor leads its load, and axes of one body are left as they are.
     """
     own = next(one for one in known if one.one is output.recorded)
-    able = [one for one in known if one is not own and _is_alike(own, one)]
+    able = [one for one in known if one is not own and may_be_one_motion(own, one)]
     leading = [(told.correlation, told, one) for one in able if (told := leads(one.one, own.one)) is not None]
     if leading:
         _, told, first = max(leading, key=lambda each: each[0])
@@ -48,7 +48,7 @@ def by_direction(output: Choice, known: list[Known]) -> tuple[Choice, list[Known
     return Choice(last.one, reason, others), _asked_for(own, known, told), [_note(own.one, last.one, told)]
 
 
-def _is_alike(own: Known, other: Known) -> bool:
+def may_be_one_motion(own: Known, other: Known) -> bool:
     """Whether no name tells which of the two was asked for, and they may be one motion."""
     meaning = other.meaning
     if other.quantity != own.quantity or meaning.commanded is not None or meaning.forcing or meaning.base:

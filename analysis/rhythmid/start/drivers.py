@@ -5,9 +5,10 @@ from dataclasses import replace
 from rhythmid.record.inventory import Recorded
 from rhythmid.record.signals import InputKind
 from rhythmid.start.direction import COPY, doubt_of_direction
+from rhythmid.start.force_unit import doubt_of_units, matching, of_one_unit
 from rhythmid.start.known import Ask, Choice, Known, chosen, pick, ranked_by_worth, strongest
 from rhythmid.start.meaning import Quantity, meaning_of, says_base
-from rhythmid.start.relation import coherent, follows
+from rhythmid.start.relation import HARDLY, coherent, follows
 
 
 def drivers(
@@ -31,11 +32,13 @@ def drivers(
     if forcing:
         found["forcing"] = strongest(forcing, "moves most of what pushes from outside")
     reference, of = _reference(rest, output, measured)
+    if reference is not None:
+        commanded = [one for one in commanded if not _is_hardly_effort(one, output)]
     base = [one for one in rest if one.meaning.base and one.quantity in ("position", "acceleration")]
-    if commanded:
+    if commanded and sensed:
+        found["input"], found["effort"] = _commanded_and_measured(commanded, sensed, output, ask)
+    elif commanded:
         found["input"] = _driving(commanded, output, "an effort that was asked for", ask)
-        if sensed:
-            found["effort"] = _measured_effort(sensed, found["input"].recorded, output, ask)
     elif sensed and reference is not None:
         found["effort"] = _driving(sensed, output, "an effort that was measured", ask)
     elif sensed:
@@ -54,6 +57,11 @@ def drivers(
             found["input"] = reference
             return found, "reference", of
     return found, "force", of
+
+
+def _is_hardly_effort(one: Known, output: Recorded) -> bool:
+    """Whether no name says that a command is an effort, and it hardly goes with the output."""
+    return meaning_of(one.one).quantity is None and coherent(one.one, output) < HARDLY
 
 
 def _beside_base(choice: Choice, base: list[Known]) -> Choice:
@@ -88,13 +96,20 @@ def _driving(able: list[Known], output: Recorded, reason: str, ask: Ask) -> Choi
     return chosen(picked, f"{reason}: {picked.meaning.reason}; {along}", others)
 
 
-def _measured_effort(sensed: list[Known], command: Recorded, output: Recorded, ask: Ask) -> Choice:
-    choice = _driving(sensed, output, "an effort that was measured", ask)
-    told = follows(command, choice.recorded)
+def _commanded_and_measured(
+    commanded: list[Known], sensed: list[Known], output: Recorded, ask: Ask
+) -> tuple[Choice, Choice]:
+    """The measured effort that goes best with the output, and the command in its unit that does."""
+    commanded, sensed = of_one_unit(commanded, sensed)
+    effort = _driving(sensed, output, "an effort that was measured", ask)
+    command = _driving(matching(commanded, effort.recorded), output, "an effort that was asked for", ask)
+    told = follows(command.recorded, effort.recorded)
     if told.correlation > COPY and not told.is_copy:
         doubt = f"it is {told.ratio:.3g} times the command: one of them is in another unit, or behind a gear"
-        return replace(choice, doubts=(*choice.doubts, doubt))
-    return choice
+        effort = replace(effort, doubts=(*effort.doubts, doubt))
+    if doubt := doubt_of_units(command.recorded, effort.recorded):
+        command = replace(command, doubts=(*command.doubts, doubt))
+    return command, effort
 
 
 def _reference(rest: list[Known], output: Recorded, measured: Quantity) -> tuple[Choice | None, Quantity]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Recorded
-from rhythmid.start.meaning import Meaning, words_of
+from rhythmid.start.meaning import Meaning, Quantity, words_of
 
 CLOSE = 0.7  # of the motion of the joint that moves most, from which another one is worth a question
 
@@ -40,21 +40,22 @@ class Joint:
 
 def joint_of(
     known: Sequence[tuple[Recorded, Meaning]],
+    still: Sequence[tuple[Recorded, Meaning]],
     wanted: str | None,
     ask: Callable[[str, Sequence[str]], int],
     place: str,
 ) -> Joint:
-    """The joint to look at. Raises InputError where none is called `wanted`."""
+    """The joint to look at; of `still` nothing moves. Raises InputError where none is called `wanted`, or that one stands still."""
     motion: dict[str, float] = {}
-    order = ("position", "velocity", "acceleration")
+    order: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
     for quantity in order:
-        able = [
-            (one, meaning) for one, meaning in known
-            if meaning.quantity == quantity and meaning.commanded is not True and meaning.joint and meaning.joint[0] != "#"
-        ]  # fmt: skip
+        able = _measured(known, quantity)
         if able and not motion:
+            motion = {meaning.joint: 0.0 for _, meaning in _measured(still, quantity)}
             for one, meaning in able:
                 motion[meaning.joint] = max(motion.get(meaning.joint, 0.0), float(np.nanstd(one.value)))
+    if wanted is not None and motion.get(wanted) == 0.0:
+        raise InputError(f"{place}: joint {wanted!r} stands still")
     if wanted is not None:
         if wanted not in motion:
             raise InputError(
@@ -67,3 +68,13 @@ def joint_of(
     close = [name for name in ranked if motion[name] >= CLOSE * motion[ranked[0]]]
     number = ask("Which joint is looked at?", close) if len(close) > 1 else 0
     return Joint(close[number], motion)
+
+
+def _measured(
+    known: Sequence[tuple[Recorded, Meaning]], quantity: Quantity
+) -> list[tuple[Recorded, Meaning]]:
+    """Measured motions of named joints."""
+    return [
+        (one, meaning) for one, meaning in known
+        if meaning.quantity == quantity and meaning.commanded is not True and meaning.joint and meaning.joint[0] != "#"
+    ]  # fmt: skip

@@ -1,6 +1,7 @@
 """What a recorded number means by its name, unit and message type: which quantity, and whether it was asked for or measured."""
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
@@ -25,6 +26,7 @@ WORDS: dict[Quantity, frozenset[str]] = {
 }  # fmt: skip
 DEVICES: dict[str, Quantity] = {
     "encoder": "position",
+    "encoders": "position",
     "enc": "position",
     "load": "effort",  # a load cell's; the angle of a load is no effort
 }  # what a device measures, where no word says what it is of
@@ -38,9 +40,12 @@ COMMANDED = frozenset(
 )
 COMMANDED_LETTERS = frozenset("u r".split())
 MEASURED = frozenset(
-    "meas measured act actual state states feedback fb est estimated present real raw filt filtered smoothed response".split()
+    "meas measured act actual state states feedback fb est estimated present real raw filt filtered smoothed response "
+    "encoder encoders enc".split()
 )
-PLACES = frozenset("motor link gear rotor shaft sensor imu camera vicon mocap optitrack laser lidar".split())
+PLACES = frozenset(
+    "motor load link gear rotor shaft sensor imu camera vicon mocap optitrack laser lidar".split()
+)
 FORCING = frozenset("forcing pump pumping disturbance perturbation external".split())
 BASE = frozenset(
     "base table ground shaker platform floor road terrain foundation seismic earthquake quake".split()
@@ -110,7 +115,7 @@ def meaning_of(one: Recorded) -> Meaning:
         and not (one.unit or "m").startswith("rad")
     ):
         base, commanded = True, None
-    joint = one.joint or _joint_of_column(one)
+    joint = one.joint or ("" if one.topic else joint_of_column(one.said, one.side))
     return Meaning(quantity, commanded, forcing, base, joint, reason.removeprefix("; "), certain)
 
 
@@ -175,7 +180,7 @@ def says_base(one: Recorded) -> bool:
 
 def names_a_place(one: Recorded) -> bool:
     """Whether its name says where or by what it was measured."""
-    return bool({*words_of(one.said), *words_of(one.topic)} & (PLACES | DEVICES.keys()))
+    return bool({*words_of(one.said), *words_of(one.topic)} & PLACES)
 
 
 def letter_of(one: Recorded) -> str:
@@ -227,10 +232,8 @@ def _one(words: list[str], known: frozenset[str]) -> str:
     return next(word for word in words if word in known)
 
 
-def _joint_of_column(one: Recorded) -> str:
-    """What tells a column from others of the same quantity: `3` of dof_pos[3], `knee` of knee_pos; empty for messages."""
-    if one.topic:
-        return ""
+def joint_of_column(said: str, side: str = "", names: Collection[str] = ()) -> str:
+    """What tells a column from others of the same quantity: `3` of dof_pos[3], `knee` of knee_pos; `names` are words that are names here."""
     known = (
         COMMANDED
         | MEASURED
@@ -239,7 +242,7 @@ def _joint_of_column(one: Recorded) -> str:
         | BASE
         | SHAKEN
         | DRIVING
-        | frozenset().union(*WORDS.values(), DEVICES)
+        | frozenset().union(*WORDS.values(), DEVICES, LETTERS)
     )
-    left = [word for word in words_of(one.said) if word not in known and word not in LETTERS]
-    return "_".join([*([one.side] if one.side else []), *left])
+    left = [word for word in words_of(said) if word in names or word not in known]
+    return "_".join([*([side] if side else []), *left])

@@ -22,6 +22,7 @@ GAP = 10.0  # of the median sample period: a longer step is a gap, across which 
 MAIN_PART = 0.5  # of a record: a stretch without gaps that is at least so long tells enough alone
 SURE = 5.0  # times what chance makes of a prediction's gain, from which it is none: of 12 lags beyond 1 in ten millions
 GOES_ALONG = 0.5  # coherence from which two plainly have to do with each other
+HARDLY = 0.3  # coherence with the output below which a number without a name is not taken for what drives
 RATIO = 0.3  # by which the slope of a position may differ from the velocity, before their units are doubted
 SAME_SIZE = (0.5, 2.0)  # ratio within which an answer is of its command's size
 

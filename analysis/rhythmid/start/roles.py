@@ -7,10 +7,11 @@ import numpy as np
 
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Inventory, Recorded
+from rhythmid.record.output_copy import doubt_of_copy
 from rhythmid.record.signals import InputKind, OutputKind
 from rhythmid.start.by_data import by_data, note_of_unknown, output_by_data
 from rhythmid.start.carried import carried_motion
-from rhythmid.start.copies import correlation_of_copy, doubt_of_copy, note_of_copy
+from rhythmid.start.copies import copies_output, note_of_copy
 from rhythmid.start.direction import by_direction, notes_of_other_joints
 from rhythmid.start.drivers import drivers
 from rhythmid.start.joint import Joint, joint_of
@@ -18,6 +19,7 @@ from rhythmid.start.known import Ask, Choice, Known, pick, ranked_by_worth
 from rhythmid.start.meaning import Quantity, is_ignored, is_lone_v, meaning_of, rotary_of, says_who_asks
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along
 from rhythmid.start.step_before import BEFORE, step_before
+from rhythmid.start.unnamed_reference import with_reference
 
 INTEGRAL = 0.9  # correlation from which a position and a velocity belong together
 MEASURED: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
@@ -50,7 +52,8 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
         raise InputError(f"{found.path}: holds nothing that could be a motion")
     said = [(one.one, one.meaning) for one in known]
     carried = carried_motion(said) if joint is None else None
-    chosen = joint_of(said, joint, ask, str(found.path)) if carried is None else Joint()
+    still = [(one, meaning_of(one)) for one in found.constant]
+    chosen = joint_of(said, still, joint, ask, str(found.path)) if carried is None else Joint()
     everything = known
     known = [one for one in known if chosen.includes(one.one, one.meaning)]
     if carried is not None:
@@ -61,7 +64,8 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
         output, known, exchanged = by_direction(output, known)
         notes = [*exchanged]
     choices = {"output": output}
-    measured = next(one for one in known if one.one is output.recorded).quantity or "position"
+    own = next(one for one in known if one.one is output.recorded)
+    measured = own.quantity or "position"
     rest = [
         one
         for one in known
@@ -83,6 +87,12 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     if step is not None:
         more = {"input": Choice(step, "the only effort, and nothing else drives", doubts=(BEFORE,))}
     choices |= {role: _doubted(choice, copies) for role, choice in more.items()}
+    if not more:
+        rest, told = with_reference(own, rest)
+        notes += told
+        if told:
+            more, kind, reference_of = drivers(rest, output.recorded, measured, ask)
+            choices |= more
     if not more:
         more, idle = _idle(rest, output.recorded, ask)
         choices |= more
@@ -113,7 +123,7 @@ def _without_copies(rest: list[Known], output: Recorded) -> tuple[list[Known], d
     A copy is kept where its name says that it drives or is asked for, and nothing else that says so is there: a controller whose
     reference stands still makes such an effort.
     """
-    correlation = {id(one.one): correlation_of_copy(one.one, output) for one in rest}
+    correlation = {id(one.one): copies_output(one.one, output) for one in rest}
     copies = [
         one for one in rest
         if correlation[id(one.one)] != 0.0 and (one.quantity == "effort" or not one.meaning.commanded)

@@ -12,8 +12,10 @@ from rhythmid.model import Model
 from rhythmid.record.inventory import Inventory, inventory
 from rhythmid.record.read import load_records, read_record
 from rhythmid.record.signals import Clock, Signals
+from rhythmid.start.force_unit import MODELLED
 from rhythmid.start.known import Ask
 from rhythmid.start.meaning import driving_unit_of
+from rhythmid.start.named_joints import with_joints
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
 from rhythmid.start.roles import Roles, first_answer, guess_roles
 from rhythmid.start.sides import with_sides
@@ -65,7 +67,7 @@ def guess(
     source: str | Path, joint: str | None = None, rate: float | None = None, ask: Ask = first_answer
 ) -> Guess:
     """Look at one recording and guess which channel is what; parameters and errors as of `start`."""
-    found = with_sides(inventory(source, rate))
+    found = with_joints(with_sides(inventory(source, rate)))
     roles = guess_roles(found, joint, ask)
     units = _units(roles)
     clock, reason = clock_of(found, roles)
@@ -110,7 +112,7 @@ def start(
 
 def _units(roles: Roles) -> Units:
     """Units of the machine's force, position and inertia."""
-    forces = [roles.choices[role] for role in ("input", "effort", "forcing") if role in roles.choices]
+    forces = [roles.choices[role] for role in MODELLED if role in roles.choices]
     if roles.input_kind != "force" or not forces:
         return per_inertia(units_of(roles, ""))
     return units_of(roles, driving_unit_of(forces[0].recorded))

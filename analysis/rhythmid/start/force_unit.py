@@ -1,0 +1,41 @@
+"""The unit of what drives: a model has one, so that the commanded and the measured effort should be of the same."""
+
+from collections.abc import Sequence
+
+from rhythmid.record.inventory import Recorded
+from rhythmid.start.known import Known
+from rhythmid.start.meaning import ELECTRICAL, driving_unit_of
+
+MODELLED = (
+    "effort",
+    "input",
+    "forcing",
+)  # roles whose unit the model has, as the balance of forces takes them
+
+
+def of_one_unit(commanded: Sequence[Known], sensed: Sequence[Known]) -> tuple[list[Known], list[Known]]:
+    """Those commanded and measured efforts that have one of their unit on the other side; all of them where none has."""
+    pairs = [(first, second) for first in commanded for second in sensed if _agree(first.one, second.one)]
+    if not pairs:
+        return list(commanded), list(sensed)
+    asked, measured = ({id(one) for one in side} for side in zip(*pairs, strict=True))
+    return [one for one in commanded if id(one) in asked], [one for one in sensed if id(one) in measured]
+
+
+def matching(able: Sequence[Known], picked: Recorded) -> list[Known]:
+    """Those of the unit of what was picked; all of them where none is."""
+    return [one for one in able if _agree(one.one, picked)] or list(able)
+
+
+def doubt_of_units(command: Recorded, effort: Recorded) -> str:
+    """What is doubtful about a command that is not in the measured effort's unit, which is the model's; empty where it is."""
+    if _agree(command, effort):
+        return ""
+    asked, measured = (driving_unit_of(one) or "no known unit" for one in (command, effort))
+    return f"it is in {asked}, the measured effort and the model in {measured}: give it the scale between them, or leave one of the two out"
+
+
+def _agree(first: Recorded, second: Recorded) -> bool:
+    """Whether two efforts are of one unit; one that nothing tells is that of a force or torque."""
+    units = {driving_unit_of(one) for one in (first, second)}
+    return len(units) == 1 or ("" in units and not units & ELECTRICAL.keys())

@@ -1,0 +1,78 @@
+"""Columns of joints that are called by a word that also says a quantity: `velocity_Rotation` is a velocity, of the joint `rotation`."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from rhythmid.record.inventory import Inventory, Recorded
+from rhythmid.start.meaning import COMMANDED, LETTERS, WORDS, Quantity, joint_of_column, words_of
+
+NAMING: tuple[Quantity, ...] = (
+    "position",
+    "effort",
+)  # said beside a word of motion, they tell that it is a name
+
+
+def with_joints(found: Inventory) -> Inventory:
+    """The inventory with the joint of every column that bears the name of one that could be taken for a quantity."""
+    every = (*found.recorded, *found.constant)
+    names = _joints_among(one.said for one in every if one.column)
+    if not names:
+        return found
+    recorded, constant = (
+        tuple(_named(one, names) for one in part) for part in (found.recorded, found.constant)
+    )
+    return replace(found, recorded=recorded, constant=constant)
+
+
+def _joints_among(headings: Iterable[str]) -> frozenset[str]:
+    """Words of motion that are names.
+
+    Such a word stands beside words of several quantities, as in position_Rotation and torque_Rotation, or in the place of a word that
+    is a name only, as in command_Rotation and command_Pitch.
+    """
+    split = [words_of(one) for one in headings]
+    known = {tuple(words) for words in split}
+    return frozenset(
+        word for word in WORDS["position"] if _beside_several(word, split) or _in_place_of_name(word, known)
+    )
+
+
+def _beside_several(word: str, split: list[list[str]]) -> bool:
+    beside = {quantity for words in split if word in words for quantity in _said(words, word)}
+    return len(beside) > 1 and bool(beside & set(NAMING))
+
+
+def _in_place_of_name(word: str, known: set[tuple[str, ...]]) -> bool:
+    for words in known:
+        for place, one in enumerate(words):
+            if one != word or not (_said(words, word) or set(words) & COMMANDED):
+                continue
+            peers = (other for other in known if len(other) == len(words))
+            if any(
+                _is_name(other[place]) and other == (*words[:place], other[place], *words[place + 1 :])
+                for other in peers
+            ):
+                return True
+    return False
+
+
+def _is_name(word: str) -> bool:
+    """Whether a word says nothing else than which joint it is."""
+    return not word.isdigit() and word not in LETTERS and bool(joint_of_column(word))
+
+
+def _said(words: Iterable[str], but: str) -> set[Quantity]:
+    """Quantities that the other words say."""
+    return {quantity for quantity, known in WORDS.items() for one in words if one != but and one in known}
+
+
+def _named(one: Recorded, names: frozenset[str]) -> Recorded:
+    """The column with its joint, and without the joint's name in what is said of it where another word says the quantity."""
+    words = words_of(one.said)
+    own = names & set(words)
+    if not one.column or not own:
+        return one
+    rest = [word for word in words if word not in own]
+    joint = joint_of_column(one.said, one.side, own)
+    said = " ".join(rest) if _said(rest, "") else one.said
+    return replace(one, said=said, joint=joint)
