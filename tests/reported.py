@@ -62,7 +62,7 @@ def result(
             {"hypothesis": ["inertia.mass"], "name": "share_of_rest", "statistic": None, "threshold": 0.2, "reason": "so small a part belongs to something else"},
         ],
         "remainder": {"share": 0.0, "significant": False, "goes_with": None, "curve": None},
-        "scoring": {"kind": "free_run", "bandwidth": None, "reason": "the model follows the machine in free run"},
+        "scoring": {"kind": "free_run", "bandwidth": None, "reason": "the model follows the records of the fit in free run"},
         "assumptions": ["the forcing acts undelayed on the mass"],
         "notes": [],
     }  # fmt: skip

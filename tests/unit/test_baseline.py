@@ -1,7 +1,7 @@
 """Calibration of the nominal model: what the records do not determine is kept, and said."""
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
+from rhythmid.record.timing import nominal_period
 from rhythmid.simulation.transport import INPUT_DELAY
 from rhythmid.value import Prior
 
@@ -86,3 +87,48 @@ def test_a_delay_far_from_its_start_is_taken_where_it_lowers_the_error_by_far(mo
     monkeypatch.setattr(baseline, "estimate", lambda model, *_, **__: fitted(model, ratio))
     found = baseline._scan_delays(fitted(model, 1.0), [driven(0.05)], None)
     assert (found.model.value(INPUT_DELAY) > 0.0) is moved
+
+
+def held(tick: float, period: float, kind: Literal["force", "reference"] = "force") -> Series:
+    """A series with a held command of one sample period that comes in pairs where it is a reference, measured with another."""
+    stamps, time = np.arange(0.0, 4.0, tick), np.arange(0.0, 4.0, period)
+    if kind == "reference":
+        stamps[1::2] -= 0.98 * tick
+    command = Channel(stamps, np.cos(9.0 * stamps), "N" if kind == "force" else "m")
+    output = Channel(time, np.sin(9.0 * time), "m")
+    return prepare([Record("held", output, command, hold="zero", input_kind=kind)])[0]
+
+
+def test_a_reference_in_pairs_is_held_before_the_record_at_its_own_period():
+    stamps = held(0.01, 0.05, "reference").inputs.stamps
+    assert nominal_period(np.diff(stamps)) == pytest.approx(0.01, rel=0.02)
+    assert np.count_nonzero(stamps < 0.0) == pytest.approx(100, abs=2)
+
+
+def noticed(monkeypatch, delay: float, tick: float, period: float) -> tuple[baseline.Calibration, list[str]]:
+    """What is made of a delay that came out so, and what was told meanwhile."""
+    model = with_delays(Model.from_text(NOMINAL.format(fixed="")), [held(tick, period)], CATALOGUE)
+
+    def fitted(value: float) -> Any:
+        return SimpleNamespace(
+            model=model.with_values({INPUT_DELAY: value}), names=[INPUT_DELAY], std={INPUT_DELAY: 1e-5}, nrmse=lambda: 0.01,
+            noise=SimpleNamespace(std=1.0),
+        )  # fmt: skip
+
+    monkeypatch.setattr(baseline, "estimate", lambda *_, **__: fitted(0.0))
+    told: list[str] = []
+    return baseline._hold(fitted(delay), [held(tick, period)], None, told.append), told
+
+
+@pytest.mark.parametrize(("tick", "period"), [(0.01, 0.05), (0.01, 0.01), (0.01, 0.004)])
+def test_how_late_a_held_input_acts_is_told_in_samples_of_its_own(monkeypatch, tick, period):
+    found, told = noticed(monkeypatch, -0.5 * tick, tick, period)
+    assert found.late_by == pytest.approx(0.5) and found.reconstructed
+    assert told == ["the held input is late by 0.50 sample; reconstructing it between its samples"]
+
+
+def test_a_delay_of_many_samples_of_the_input_is_not_put_down_to_holding(monkeypatch):
+    found, told = noticed(monkeypatch, -0.06, 0.01, 0.05)
+    (note,) = found.notes
+    assert found.late_by is None and not found.reconstructed and told == []
+    assert "-60.000" in note and "(-6.0 of its samples)" in note and "clocks" in note

@@ -64,7 +64,7 @@ def test_a_record_that_lost_rows_in_bursts_gives_the_verdict_of_the_whole_one(co
     force, exact = (one.model.value("coulomb_friction.force") for one in (found, complete))
     assert force == pytest.approx(exact, rel=0.03)
     (note,) = [one for one in found.diagnosis.notes if "bridged" in one]
-    assert note.startswith(f"axis 0: {BURSTS} gaps of at most 0.03")
+    assert note.startswith(f"axis 0: {BURSTS} gaps of at most {(BURST + 1) / RATE:.2g} s")
     assert not any("cut where" in one for one in found.diagnosis.notes)
 
 
@@ -139,3 +139,34 @@ def test_a_gap_at_an_end_of_what_the_channels_share_is_left_out(at_the_end):
         else (record.output.time[8], record.output.time[-1])
     )
     assert (found.time[0], found.time[-1]) == pytest.approx(ends, abs=1.0 / RATE) and found.bridged == ()
+
+
+def alternating(phase: float) -> Record:
+    """A record of whose rows every other one is lost in two seconds; the output begins `phase` of a period before the input."""
+    record = axis()
+    assert record.input is not None
+    lost = np.arange(1000, 1000 + int(2.0 * RATE), 2)
+    output = replace(
+        record.output,
+        time=np.delete(record.output.time - phase / RATE, lost),
+        value=np.delete(record.output.value, lost),
+    )
+    kept = replace(
+        record.input, time=np.delete(record.input.time, lost), value=np.delete(record.input.value, lost)
+    )
+    return replace(record, output=output, input=kept)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.3])
+def test_gaps_with_a_sample_between_them_are_not_made_one(phase):
+    (found,) = stretches([alternating(phase)], axis_model(), longest=4.0 / RATE)
+    assert max(end - begin for begin, end in found.bridged) < 3.5 / RATE
+    assert len(found.bridged) == pytest.approx(2.0 * RATE / 2.0, abs=2)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.3, 0.7])
+def test_what_was_measured_between_gaps_is_kept(phase):
+    """Also where the gaps of both channels together leave no time at which both were sampled."""
+    (found,) = stretches([alternating(phase)], axis_model(), longest=4.0 / RATE)
+    complete = np.interp(found.time, axis().output.time - phase / RATE, axis().output.value)
+    assert np.abs(found.output - complete).max() < 0.01 * np.std(complete)

@@ -170,6 +170,18 @@ def test_a_delay_of_more_than_ten_samples_is_a_warning(sliding):
     assert warning["value"] == pytest.approx(0.15, abs=0.02)
 
 
+def test_a_delay_below_zero_is_a_warning_that_says_what_it_may_mean(sliding):
+    output = sliding.output
+    early = replace(sliding, output=replace(output, time=output.time - 0.01))
+    (warning,) = identify(early, slide(True)).to_dict()["warnings"]
+    assert warning["name"] == "negative_delay" and warning["parameter"] == "delay: sum"
+    assert warning["value"] == pytest.approx(-0.01, abs=0.002)
+    assert (
+        "no machine answers before it is asked: the fit may be absorbing missing physics" in warning["text"]
+    )
+    assert all(word in warning["question"] for word in ("clocks", "held", "limit or other physics"))
+
+
 def test_a_sound_record_is_usable_without_a_warning_and_says_why_there_are_no_transfer_functions(sliding):
     found = identify(sliding, slide(True, stiffness=70.0)).to_dict()
     assert (found["usable"], found["warnings"], found["harmonics"]) == (True, [], [])

@@ -12,7 +12,16 @@ from rhythmid.diagnose import diagnosis as module
 from rhythmid.diagnose import scoring
 from rhythmid.diagnose.answer.result import FitQuality
 from rhythmid.diagnose.diagnosis import Answer, diagnose
-from rhythmid.diagnose.scoring import DISTURBED_FREE_RUN, FOLLOWS, FREE_RUN, INTEGRATES, Scoring, settle
+from rhythmid.diagnose.scoring import (
+    DISTURBED_FREE_RUN,
+    FOLLOWS,
+    FREE_RUN,
+    FREE_RUN_BESIDE,
+    FREE_RUN_IN_PART,
+    INTEGRATES,
+    Scoring,
+    settle,
+)
 from rhythmid.identify.multiple_shooting import forgets
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
@@ -149,8 +158,8 @@ def test_what_the_first_scoring_leaves_without_a_name_is_tried_in_the_second(mon
     assert len(left) == (1 if kept == 0 and verdicts[0] == "missing_physics" else 0)
 
 
-def tried(monkeypatch: pytest.MonkeyPatch, *errors: float) -> tuple[list[float], list[float]]:
-    """Errors, as shares of the motion, of the ways to score that come out of a free run and ever shorter windows of these errors; and
+def tried(monkeypatch: pytest.MonkeyPatch, *errors: float) -> tuple[list[Scoring], list[float]]:
+    """The ways to score that come out of a free run and ever shorter windows of these errors, as shares of the motion; and the errors of
     those that were tried."""
     asked: list[float] = []
 
@@ -162,7 +171,9 @@ def tried(monkeypatch: pytest.MonkeyPatch, *errors: float) -> tuple[list[float],
     def ladder(*_):
         for number, error in enumerate(errors):
             yield SimpleNamespace(
-                kind="windows" if number else "free_run", reason="", of=lambda _, error=error: error
+                kind="windows" if number else "free_run",
+                reason="" if number else FREE_RUN,
+                of=lambda _, error=error: error,
             )
 
     monkeypatch.setattr(scoring, "_ladder", ladder)
@@ -172,8 +183,7 @@ def tried(monkeypatch: pytest.MonkeyPatch, *errors: float) -> tuple[list[float],
     monkeypatch.setattr(
         scoring, "with_zeros", lambda calibration, _, unseen, *__: (calibration, list(unseen))
     )
-    found = settle(hopper(), [], [], CATALOGUE)
-    return [one.error for one in found], asked
+    return list(settle(hopper(), [], [], CATALOGUE)), asked
 
 
 @pytest.mark.parametrize(
@@ -201,7 +211,18 @@ def test_windows_are_made_shorter_as_long_as_that_lowers_the_error(monkeypatch, 
 def test_windows_are_the_way_to_score_where_they_lower_the_error_to_less_than_60_percent(
     monkeypatch, errors, kept
 ):
-    assert tried(monkeypatch, *errors)[0] == kept
+    assert [one.error for one in tried(monkeypatch, *errors)[0]] == kept
+
+
+@pytest.mark.parametrize(
+    ("errors", "reason"),
+    [((0.25,), FREE_RUN), ((0.7, 0.5), FREE_RUN_IN_PART), ((0.7, 0.4), FREE_RUN_BESIDE)],
+)
+def test_the_reason_for_a_free_run_says_how_far_it_follows_the_records_of_the_fit(
+    monkeypatch, errors, reason
+):
+    (one,) = [one for one in tried(monkeypatch, *errors)[0] if one.kind == "free_run"]
+    assert one.reason == reason and "the records of the fit" in reason and "machine" not in reason
 
 
 def asked(monkeypatch: pytest.MonkeyPatch, means: bool, share: float, error: float = 0.2) -> list[str]:

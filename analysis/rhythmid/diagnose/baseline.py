@@ -21,6 +21,7 @@ from rhythmid.identify.record_scales import REST_LENGTH
 from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
+from rhythmid.record.timing import nominal_period
 from rhythmid.simulation.signal import OVERSAMPLING, band_limited, first_order_hold
 from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 from rhythmid.value import Prior
@@ -46,7 +47,9 @@ class Calibration:
     fit: Fit
     series: tuple[Series, ...]
     notes: tuple[str, ...]
-    late_by: float | None  # [samples] how late a held input acts, where that shows it is not held
+    late_by: (
+        float | None
+    )  # [samples of the input] how late a held input acts, where that shows it is not held
     reconstructed: bool = False
 
 
@@ -194,16 +197,24 @@ def _hold(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None, t
     """Notice an input that acts earlier than its samples: it was not held, and is reconstructed.
 
     No machine answers before it is asked, so a delay that comes out negative speaks against holding; which of the two
-    predicts the next sample better decides, as far as a model can that may lack something.
+    predicts the next sample better decides, as far as a model can that may lack something. Holding delays by half a sample of the
+    command, so that one of many samples has another cause.
     """
     kept = Calibration(fit, tuple(series), (), None)
     held = [one for one in series if one.command is not None and one.command.c.shape[0] == 1]
     if INPUT_DELAY not in fit.names or not held or fit.nrmse() > FOLLOWS:
         return kept
-    delay, std, period = fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY], held[0].period
+    period = nominal_period(np.diff(held[0].inputs.stamps))
+    delay, std = fit.model.value(INPUT_DELAY), fit.std[INPUT_DELAY]
     if not math.isfinite(std) or delay > -max(NOT_HELD * std, NOT_HELD_LEAST * period):
         return kept
     late = -delay / period
+    if late > EARLIEST:
+        note = (
+            f"A free delay of the input comes out at {delay * 1e3:.3f} ± {std * 1e3:.3f} ms ({-late:.1f} of its samples): more than an "
+            "input that is not held explains. The clocks of command and measurement differ, or the model lacks something."
+        )
+        return replace(kept, notes=(note,))
     tell(f"the held input is late by {late:.2f} sample; reconstructing it between its samples")
     note = (
         f"Input about {'half a' if 0.35 < late < 0.65 else f'{late:.2f}'} sample late when held: a free delay comes out "

@@ -7,7 +7,7 @@ until the model follows the machine through them. (Recorded effort is scored by 
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -30,17 +30,23 @@ SHORTER = 2.0  # factor from one length of windows to the next
 INTEGRATES = (
     "the model integrates or is unstable, so that a long free run would add up every small disturbance"
 )
-FREE_RUN = "the model follows the machine in free run"
+FREE_RUN = "the model follows the records of the fit in free run"
+FREE_RUN_IN_PART = (
+    "the model follows the records of the fit in free run in part only, and in windows not much better"
+)
 LOSES = "in free run the nominal model does not follow the machine"
+FREE_RUN_BESIDE = (
+    "windows hide what is slow, and in free run the model follows the records of the fit in part"
+)
 DISTURBED_FREE_RUN = (
-    "the model follows the machine in free run, although every small disturbance adds up there"
+    "the model follows the records of the fit in free run, although every small disturbance adds up there"
 )
 
 
 @dataclass(frozen=True)
 class Scoring:
     """The calibrated nominal model, `unseen` held-out series where they are separate ones, and how all is scored: in free run or
-    in windows, of what length and why."""
+    in windows, of what length and why. The reason tells of the records of the fit; what is held out is judged by its own."""
 
     calibration: Calibration
     unseen: tuple[Series, ...]
@@ -107,10 +113,11 @@ def settle(
     if longest.kind != "free_run":
         chosen = longest if best.error >= BETTER_TOGETHER * longest.error else best
         return (chosen, *_disturbed_free_run(model, series, separate, catalogue, pool, tell))
+    error = longest.calibration.fit.nrmse()
     if best.error >= BETTER_TOGETHER * longest.error:
-        return (longest,)
-    near = longest.calibration.fit.nrmse() < HOPELESS
-    return (best, longest) if near and best is not longest else (best,)
+        return (longest if error < FOLLOWS else replace(longest, reason=FREE_RUN_IN_PART),)
+    near = error < HOPELESS
+    return (best, replace(longest, reason=FREE_RUN_BESIDE)) if near and best is not longest else (best,)
 
 
 def _disturbed_free_run(

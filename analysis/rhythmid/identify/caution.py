@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-Name = Literal["not_identified", "other_unit", "large_shift", "value_at_zero", "long_delay"]
+Name = Literal["not_identified", "other_unit", "large_shift", "value_at_zero", "long_delay", "negative_delay"]
 
 
 @dataclass(frozen=True)

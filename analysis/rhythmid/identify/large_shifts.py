@@ -1,4 +1,4 @@
-"""Values that have left the nominal ones by far: there a fit may be absorbing physics that the model lacks."""
+"""Values that have left the nominal ones by far, or what is possible: there a fit may be absorbing physics that the model lacks."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -14,6 +14,9 @@ SAMPLES = (
     10.0  # sample periods by which a delay may exceed the nominal one: a longer one is seldom transport alone
 )
 PASSED_BY = 2.0  # standard deviations by which a limit has to be passed
+# standard deviations, and a share of a sample, by which a delay has to come out negative to be told: a machine without any delay
+# would be accused once in 40 times at two of them
+EARLY, EARLY_LEAST = 4.0, 0.05
 AGREES = 5.0  # standard deviations of the closure within which limit cycle and response see the same delays
 ABSORBING = "the fit may be absorbing missing physics"
 
@@ -21,8 +24,12 @@ ABSORBING = "the fit may be absorbing missing physics"
 def large_shifts(
     nominal: Model, parameters: Mapping[str, Estimate], delays: Delays, period: float
 ) -> tuple[Caution, ...]:
-    """Values that have left the nominal ones by far; `period` [s] is the time between samples."""
-    return (*_values(nominal, parameters), *_delays(nominal, delays, period))
+    """Values that have left the nominal ones by far, and negative delays; `period` [s] is the time between samples."""
+    return (
+        *_values(nominal, parameters),
+        *_negative_delays(nominal, delays, period),
+        *_long_delays(nominal, delays, period),
+    )
 
 
 def _values(nominal: Model, parameters: Mapping[str, Estimate]) -> Iterator[Caution]:
@@ -53,30 +60,56 @@ def _values(nominal: Model, parameters: Mapping[str, Estimate]) -> Iterator[Caut
             )
 
 
-def _delays(nominal: Model, delays: Delays, period: float) -> Iterator[Caution]:
+def _negative_delays(nominal: Model, delays: Delays, period: float) -> Iterator[Caution]:
+    """Delays by which the machine would answer before it is asked."""
+    for side, found, expected in _estimated(nominal, delays):
+        if found.value is None or found.std is None:
+            continue
+        if found.value >= -max(EARLY * found.std, EARLY_LEAST * period):
+            continue
+        yield Caution(
+            "negative_delay",
+            f"{_named(side)} at {rounded(1e3 * found.value, 1e3 * found.std)} ± {number(1e3 * found.std, 2)} ms, but no machine answers before "
+            f"it is asked: {ABSORBING}",
+            "Do the clocks of command and measurement agree, and is the input held from its stamps on (hold: in signals.yaml)? If so, "
+            "`rhythmid diagnose` names the limit or other physics that the model lacks.",
+            f"delay: {side}", found.value, expected, "s",
+        )  # fmt: skip
+
+
+def _long_delays(nominal: Model, delays: Delays, period: float) -> Iterator[Caution]:
     """Delays that are long; not where the limit cycle, which sees them another way than the response does, agrees."""
     if delays.separable and delays.closure is not None and abs(delays.closure) <= AGREES:
         return
-    given = {side: nominal.parameters.get(f"{side}_delay.delay") for side in ("input", "measurement")}
-    known = {side: 0.0 if one is None else one.value for side, one in given.items()}
-    pairs = [
-        ("input", delays.input, known["input"]),
-        ("measurement", delays.measurement, known["measurement"]),
-    ]
-    if not delays.separable:
-        pairs = [("sum", delays.sum, sum(known.values()))]
-    for side, found, expected in pairs:
+    for side, found, expected in _estimated(nominal, delays):
         if found.value is None or found.std is None:
             continue
         if found.value - expected - PASSED_BY * found.std <= SAMPLES * period:
             continue
-        what = "the delays of command and measurement together" if side == "sum" else f"the {side} delay"
         samples = math.floor((found.value - expected) / period)
         yield Caution(
             "long_delay",
-            f"{what} comes out at {rounded(1e3 * found.value, 1e3 * found.std)} ms, {samples} samples more than the nominal "
+            f"{_named(side)} at {rounded(1e3 * found.value, 1e3 * found.std)} ms, {samples} samples more than the nominal "
             f"{1e3 * expected:g} ms: {ABSORBING}",
             "Is so long a delay known from the bus, the network or the drive? If not, `rhythmid diagnose` weighs it against lags, "
             "play and friction.",
             f"delay: {side}", found.value, expected, "s",
         )  # fmt: skip
+
+
+def _named(side: str) -> str:
+    if side == "sum":
+        return "the delays of command and measurement together come out"
+    return f"the {side} delay comes out"
+
+
+def _estimated(nominal: Model, delays: Delays) -> list[tuple[str, Estimate, float]]:
+    """Each delay that the records determine, or their sum, by name with its estimate and nominal value [s]."""
+    given = {side: nominal.parameters.get(f"{side}_delay.delay") for side in ("input", "measurement")}
+    known = {side: 0.0 if one is None else one.value for side, one in given.items()}
+    if not delays.separable:
+        return [("sum", delays.sum, sum(known.values()))]
+    return [
+        ("input", delays.input, known["input"]),
+        ("measurement", delays.measurement, known["measurement"]),
+    ]

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 # share of a sensitivity, below which what the projection leaves of it is taken for error of the differences: these move the motion by a
 # ten-thousandth, and an angle at rest that the start of a pendulum makes up for leaves up to 1.2e-3 of its effect
 DEAD = 3e-3
+SEEN = 1e-15  # of the motion, below which a difference is rounding: what does nothing does no more for a larger step, which would grow for ever
 
 
 @dataclass(frozen=True)
@@ -210,6 +211,7 @@ class Problem:
             place += len(white)
         target = 1e-4 * self.spread
         ratio = np.clip(target / np.maximum(moved, 1e-30), 1e-3, 1e3)
+        ratio[moved < SEEN * self.spread] = 1.0
         linearisation = Linearisation(
             np.concatenate(rows), np.concatenate(columns), tuple(bases), tuple(places), signed, state_steps
         )

@@ -219,7 +219,7 @@ def _spline_of(time: Array, value: Array) -> PPoly:
 
 def _held_before(time: Array, value: Array) -> tuple[Array, Array]:
     """A reference that held its first value before the record, too: the machine was there already."""
-    step = float(np.median(np.diff(time)))
+    step = nominal_period(np.diff(time))
     count = int(np.clip(np.ceil(1.0 / step), 1, 10_000))
     earlier = time[0] + step * np.arange(-count, 0)
     return np.concatenate([earlier, time]), np.concatenate([np.full(count, value[0]), value])

@@ -51,6 +51,7 @@ class TopicReport:
             "jitter_std": timing.jitter_std,
             "gaps": timing.gaps,
             "lost": timing.lost,
+            "usual_range": timing.usual_range,
             "longest_gap": timing.longest_gap,
             "duplicates": timing.duplicates,
             "late": timing.late,
@@ -141,7 +142,7 @@ class BagReport:
                 if topic.lateness_max is not None else ""
             )  # fmt: skip
             found.append(
-                f"  {topic.name:{width}}  {topic.type}  {timing.count} messages, {timing.rate:.4g} Hz, "
+                f"  {topic.name:{width}}  {topic.type}  {timing.count} messages, {timing.told_rate}, "
                 f"jitter {1e6 * timing.jitter_std:.3g} us, {timing.gaps} gaps, {timing.duplicates} duplicates{late}"
             )
         for role, channel in self.channels.items():

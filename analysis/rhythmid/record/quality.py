@@ -63,10 +63,10 @@ class ChannelQuality:
         return {"source": values.pop("source"), "rate": self.timing.rate, **values.pop("timing"), **values}
 
     def facts(self) -> list[str]:
-        """Rate, jitter of its times and of its arrival, and rounding, one phrase each."""
+        """Rate, jitter of its times (of irregular ones their usual steps) and of its arrival, and rounding, one phrase each."""
         timing = self.timing
-        found = [f"{timing.rate:.4g} Hz"] if timing.rate > 0.0 else []
-        if timing.jitter_std > 0.0:
+        found = [timing.told_rate] if timing.rate > 0.0 else []
+        if timing.jitter_std > 0.0 and timing.usual_range is None:
             found.append(f"jitter of its times {timing.jitter_std:.2g} s")
         if self.lateness_std is not None:
             found.append(f"jitter of its arrival {self.lateness_std:.2g} s")

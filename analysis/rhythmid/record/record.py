@@ -331,10 +331,12 @@ def _on_grid(time: Array, anchor: float, period: float) -> NDArray[np.bool_]:
 
 
 def _within_gap(channel: Channel, grid: Array, held: bool) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Whether grid times lie strictly within a gap of the channel, and within one that its neighbours do not tell.
+    """Whether grid times lie in a gap of the channel, and in one that its neighbours do not tell.
 
-    They tell it where a cubic through them is nearly as good as the samples themselves, and where a `held` value is the same
-    before and after.
+    A time within half a period of a sample is told by it, one of a `held` value within a whole period after it, as between samples
+    that are there: so a gap is as many periods long as samples are lost, and a sample between two gaps keeps them apart wherever the
+    grid lies. The neighbours tell a gap where a cubic through them is nearly as good as the samples themselves, and where a held
+    value is the same before and after.
     """
     missing, untold = np.zeros(len(grid), dtype=bool), np.zeros(len(grid), dtype=bool)
     first, lost = gaps_between(channel.time)
@@ -343,9 +345,10 @@ def _within_gap(channel: Channel, grid: Array, held: bool) -> tuple[NDArray[np.b
         first, lost = first[changed], lost[changed]
     if len(first) == 0:
         return missing, untold
+    after, before = (channel.period - SAME, SAME) if held else (0.5 * channel.period + SAME,) * 2
     error_of_one, *errors = interpolation_errors(channel.value, np.append(1, lost))
     for at, error in zip(first, errors, strict=True):
-        within = (grid > channel.time[at] + SAME) & (grid < channel.time[at + 1] - SAME)
+        within = (grid > channel.time[at] + after) & (grid < channel.time[at + 1] - before)
         missing |= within
         if error > AS_GOOD * error_of_one:
             untold |= within

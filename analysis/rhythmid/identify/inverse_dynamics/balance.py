@@ -143,8 +143,15 @@ class Balance:
             else f"{len(gaps)} gaps of at most {max(gaps):.2g} s ({sum(gaps):.3g} s in all) are"
             for name, gaps in found.items()
         }
+        short = "short beside the effort's shortest period"
+        why = {
+            name: short
+            if max(gaps) <= QUARTER / self.bandwidth.effort
+            else f"{short} or told by the samples beside them"
+            for name, gaps in found.items()
+        }
         return [
-            f"{name}: {said} bridged, short beside the effort's shortest period; what lies within counts neither in fits nor in scores"
+            f"{name}: {said} bridged, {why[name]}; what lies within counts neither in fits nor in scores"
             for name, said in counted.items()
         ]
 

@@ -129,8 +129,11 @@ def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> 
         else:
             assert grid.input is not None
             drive = grid.input if grid.forcing is None else grid.input + grid.forcing
-        bridged = short_gaps(grid.missing, int(longest / grid.period)) | (grid.missing & grid.valid)
-        output, drive = (across(signal, ~grid.missing, bridged) for signal in (grid.output, drive))
+        short = short_gaps(grid.missing, int(longest / grid.period))
+        bridged = short | (
+            grid.missing & grid.valid
+        )  # where the neighbours tell a gap, the grid has its values
+        output, drive = (across(signal, ~grid.missing, short) for signal in (grid.output, drive))
         for joined in runs(~grid.missing | bridged):
             measured = joined.start + np.flatnonzero(~grid.missing[joined])
             if not len(measured):

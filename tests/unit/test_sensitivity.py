@@ -1,0 +1,55 @@
+"""Differences by which sensitivities are taken: steps that move the outputs a little, and do not grow where nothing moves them."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from rhythmid.identify.descent import WHITE, first_guess
+from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.sensitivity import Problem
+from rhythmid.identify.series import prepare
+from rhythmid.model import Model
+from rhythmid.record.record import Channel, Record
+
+CREEPING = """
+inertia: {{mass: {{value: 1.0, unit: kg}}}}
+force:
+  - linear_spring: {{stiffness: {{value: 100.0, unit: N/m}}}}
+  - viscous_damper: {{damping: {{value: 0.4, unit: N*s/m}}}}
+  - viscoelastic_relaxation: {{stiffness: {{value: {creep}, unit: N/m}}, time_constant: {{value: 0.1, unit: s}}}}
+"""
+
+
+def settled(creep: float, times: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Steps of the parameters and states, and the sensitivities, after so many linearisations of a free decay."""
+    model = Model.from_text(CREEPING.format(creep=creep))
+    time = np.arange(0.0, 4.0, 0.01)
+    series = prepare([Record("decay", Channel(time, np.exp(-0.2 * time) * np.cos(10.0 * time), "m"))])
+    run = prepare_run(model, series)
+    problem, starts = Problem(run, model.free, WHITE, None), first_guess(model, run)
+    problem.learn_hidden(model, starts)
+    residuals = problem.residuals(model, starts)
+    assert residuals is not None
+    steps, states = np.full(len(model.free), 1e-4), np.full(run.states, 1e-4)
+    jacobian = np.empty(0)
+    for _ in range(times):
+        found, _, steps, states = problem.linearise(model, starts, residuals, steps, states)
+        jacobian = found.jacobian
+    return steps, states, jacobian
+
+
+def test_steps_of_what_nothing_shows_do_not_grow_for_ever():
+    """A creep without stiffness: neither its time constant nor its state does anything."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        steps, states, jacobian = settled(0.0, 80)
+    assert steps.max() < 1.0 and states.max() < 1.0 and np.isfinite(jacobian).all()
+
+
+@pytest.mark.parametrize("creep", [1.0, 20.0])
+def test_steps_settle_where_each_moves_the_outputs_by_a_ten_thousandth(creep):
+    steps, states, _ = settled(creep, 12)
+    again = settled(creep, 13)
+    np.testing.assert_allclose(again[0], steps, rtol=0.2)
+    np.testing.assert_allclose(again[1], states, rtol=0.2)
