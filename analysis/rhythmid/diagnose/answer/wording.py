@@ -1,6 +1,7 @@
 """A diagnosis in sentences: where, what, how much better, and which nominal values the records contradict."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from rhythmid.diagnose.answer.result import FitQuality, Location, MissingEffect
@@ -112,8 +113,11 @@ def summary_of(
 
 
 def listed(names: Sequence[str], word: str = "and") -> str:
-    """Names in words: "a", "a and b", "a, b and c"; with "or" where one of them is meant."""
-    said = [in_words(name) for name in names]
+    """Names in words: "a", "a and b", "a, b and c"; with "or" where one of them is meant. One that comes again is told with its number."""
+    said = [
+        in_words(name) if count == 1 else f"{in_words(name)} ({count} of them)"
+        for name, count in Counter(names).items()
+    ]
     return f" {word} ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
 
 
