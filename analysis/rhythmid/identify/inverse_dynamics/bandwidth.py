@@ -10,6 +10,7 @@ from scipy.signal import detrend, welch
 
 from rhythmid.identify.inverse_dynamics.free_map import FreeMap
 from rhythmid.identify.inverse_dynamics.motion import Motion, Stretch, high_pass, low_pass, motion_of
+from rhythmid.identify.position_lines import strongest_wavelengths
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
@@ -19,6 +20,8 @@ HALF = 0.5  # share of the effort's power that a free map has to explain in the 
 SEGMENTS = 8  # of a record in Welch's spectra, at least
 RIDGE = 1e-6  # of the columns' power, against columns that the data do not tell apart
 FLOORLESS = 1e-12  # of the strongest line, below which what looks like a floor is the window's leakage
+LINES = 3  # over position beside a free map
+SLOW_QUARTER = 0.25  # quantile of the speed at which a wave still passes below the cut-off
 SLOW = 4.0  # times below its strongest frequency that a motion is integrated from an acceleration
 LOWEST = 4.0  # times the strongest frequency of the motion: less would round off what a friction does at each reversal
 
@@ -59,9 +62,10 @@ def bandwidth_of(raw: Sequence[Stretch], model: Model) -> Bandwidth:
 
 def bandwidth_below(motions: Sequence[Motion], motion: float, dominant: float, low: float = 0.0) -> Bandwidth:
     """The bandwidth at which the effort of these motions is explained, which are known below `motion` [Hz]."""
-    effort = _of_effort(motions, motion / 2.0, dominant, low)
+    lines = _lines(motions, motion / 2.0, low)
+    effort = _of_effort(motions, motion / 2.0, dominant, low, lines)
     effort = max(effort, min(LOWEST * dominant, motion / 2.0))
-    return Bandwidth(motion, effort, _explained(motions, effort, low), dominant, low)
+    return Bandwidth(motion, effort, _explained(motions, effort, low, lines), dominant, low)
 
 
 def _of_motion(raw: Stretch) -> tuple[float, float]:
@@ -79,22 +83,42 @@ def _of_motion(raw: Stretch) -> tuple[float, float]:
     return min(float(frequency[last]), HIGHEST * rate), float(strongest)
 
 
-def _residuals(motions: Sequence[Motion], frequency: float, low: float) -> tuple[list[Array], list[Array]]:
-    """Efforts below the frequency, and what a free map leaves of them."""
+def _lines(motions: Sequence[Motion], frequency: float, low: float) -> tuple[float, ...]:
+    """Wavelengths of what is left over position: a free map is too smooth for a ripple of many waves, which would be taken for noise."""
+    _, left = _residuals(motions, frequency, low, ())
+    kept = [_kept(motion, frequency) for motion in motions]
+    position, velocity = (
+        np.concatenate([one[part] for one, part in zip(signals, kept, strict=True)])
+        for signals in ([m.leg_position for m in motions], [m.leg_velocity for m in motions])
+    )
+    shortest = float(np.quantile(np.abs(velocity), SLOW_QUARTER)) / frequency
+    return strongest_wavelengths(position, np.concatenate(left), shortest, LINES)
+
+
+def _kept(motion: Motion, frequency: float) -> slice:
+    """Samples of a motion without the filter's start and end."""
+    margin = min(math.ceil(1.0 / (frequency * motion.period)), len(motion.time) // 4)
+    return slice(margin, len(motion.time) - margin)
+
+
+def _residuals(
+    motions: Sequence[Motion], frequency: float, low: float, lines: Sequence[float]
+) -> tuple[list[Array], list[Array]]:
+    """Efforts below the frequency, and what a free map with these lines over position leaves of them."""
     free = FreeMap(list(motions))
     efforts, columns = [], []
     for motion in motions:
         made = [free.columns(motion, np.zeros(len(motion.time))), motion.leg_position, motion.leg_velocity]
         if not motion.driven_by_base:
             made.append(motion.acceleration)
+        turns = [2.0 * math.pi * motion.leg_position / wavelength for wavelength in lines]
+        made += [wave(turn) for turn in turns for wave in (np.cos, np.sin)]
         made = np.column_stack(made)
         both = low_pass(np.column_stack([motion.effort, made]), motion.period, frequency)
         both = high_pass(both, motion.period, low)
-        margin = min(
-            math.ceil(1.0 / (frequency * motion.period)), len(both) // 4
-        )  # the filter's start and end
-        efforts.append(both[margin : len(both) - margin, 0])
-        columns.append(both[margin : len(both) - margin, 1:])
+        both = both[_kept(motion, frequency)]
+        efforts.append(both[:, 0])
+        columns.append(both[:, 1:])
     matrix = np.vstack(columns)
     norms = np.linalg.norm(matrix, axis=0)
     norms[norms == 0.0] = 1.0
@@ -104,9 +128,11 @@ def _residuals(motions: Sequence[Motion], frequency: float, low: float) -> tuple
     return efforts, [effort - made @ coefficients for effort, made in zip(efforts, columns, strict=True)]
 
 
-def _of_effort(motions: Sequence[Motion], most: float, dominant: float, low: float) -> float:
+def _of_effort(
+    motions: Sequence[Motion], most: float, dominant: float, low: float, lines: Sequence[float]
+) -> float:
     """Upper end [Hz] of the highest half-octave in which a free map explains half of the effort's power."""
-    efforts, left = _residuals(motions, most, low)
+    efforts, left = _residuals(motions, most, low, lines)
     edges = most / np.sqrt(2.0) ** np.arange(64)
     edges = edges[edges >= dominant]
     total, remains = np.zeros(max(len(edges) - 1, 0)), np.zeros(max(len(edges) - 1, 0))
@@ -122,8 +148,8 @@ def _of_effort(motions: Sequence[Motion], most: float, dominant: float, low: flo
     return float(edges[explained[0]]) if len(explained) else float(edges[-1] if len(edges) else most)
 
 
-def _explained(motions: Sequence[Motion], frequency: float, low: float) -> float:
+def _explained(motions: Sequence[Motion], frequency: float, low: float, lines: Sequence[float]) -> float:
     """Share of the effort's power below the frequency that a free map explains."""
-    efforts, left = _residuals(motions, frequency, low)
+    efforts, left = _residuals(motions, frequency, low, lines)
     total = sum(float(np.sum((one - np.mean(one)) ** 2)) for one in efforts)
     return 1.0 - sum(float(one @ one) for one in left) / total if total > 0.0 else 0.0
