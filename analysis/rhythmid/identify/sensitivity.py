@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 # share of a sensitivity, below which what the projection leaves of it is taken for error of the differences: these move the motion by a
 # ten-thousandth, and an angle at rest that the start of a pendulum makes up for leaves up to 1.2e-3 of its effect
 DEAD = 3e-3
-SEEN = 1e-15  # of the motion, below which a difference is rounding: what does nothing does no more for a larger step, which would grow for ever
+SEEN = 1e-15  # of the motion, below which a difference is rounding; such a step grows to the size of what it is a step of, and not for ever
 
 
 @dataclass(frozen=True)
@@ -211,7 +211,14 @@ class Problem:
             place += len(white)
         target = 1e-4 * self.spread
         ratio = np.clip(target / np.maximum(moved, 1e-30), 1e-3, 1e3)
-        ratio[moved < SEEN * self.spread] = 1.0
+        unseen = (
+            moved < SEEN * self.spread
+        )  # a tick of a clock shows once a step passes it; what does nothing never does
+        most = np.append(
+            [abs(model.value(name)) or self.spread for name in self.names], np.full(q, self.spread)
+        )
+        larger = np.maximum(most / np.append(np.abs(steps), np.abs(state_steps)), 1.0)
+        ratio[unseen] = np.minimum(ratio, larger)[unseen]
         linearisation = Linearisation(
             np.concatenate(rows), np.concatenate(columns), tuple(bases), tuple(places), signed, state_steps
         )
