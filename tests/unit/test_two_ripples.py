@@ -9,6 +9,8 @@ from contests import contest, decided, predicted, supposed
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.answer.wording import listed
 from rhythmid.diagnose.diagnosis import diagnose
+from rhythmid.diagnose.probability import joint_probability, weights_of
+from rhythmid.diagnose.selection import select
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.elements.element import Scales
@@ -78,11 +80,16 @@ def test_the_second_of_two_alike_is_as_probable_as_hypotheses_with_both_of_them(
             supposed(elements, prediction), names=tuple(one.split("#")[0] for one in elements.split())
         )
 
-    one, two = predicted(0.02, seed=1), predicted(0.0195, score=predicted(0.02).score + 1.0, seed=2)
-    made = contest(supposed("", predicted(1.0)), both("ripple", one), both("ripple ripple#2", two))
-    _, decision = decided(made)
-    if "ripple#2" in decision.probability:
-        assert decision.probability["ripple#2"] <= decision.probability["ripple"]
+    score = predicted(0.2).score
+    nominal, one = supposed("", predicted(1.0)), both("ripple", predicted(0.2, seed=1))
+    rivals = [
+        both(f"ripple {other}", predicted(0.02, score + 300.0, seed=2)) for other in ("ripple#2", "drag")
+    ]
+    names = ["ripple", "ripple"]
+    made = contest(nominal, one, *rivals)
+    weights = weights_of(made, select(made))
+    assert joint_probability(names[:1], made, rivals[0], weights) == pytest.approx(1.0, abs=0.01)
+    assert joint_probability(names, made, rivals[0], weights) == pytest.approx(0.5, abs=0.2)
     clear = contest(
         supposed("", predicted(1.0)), both("ripple", predicted(0.2)), both("ripple ripple#2", predicted(0.02))
     )

@@ -47,9 +47,8 @@ class Calibration:
     fit: Fit
     series: tuple[Series, ...]
     notes: tuple[str, ...]
-    late_by: (
-        float | None
-    )  # [samples of the input] how late a held input acts, where that shows it is not held
+    # [samples of the input] how late a held input acts, where that shows it is not held
+    late_by: float | None
     reconstructed: bool = False
 
 

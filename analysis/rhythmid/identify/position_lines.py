@@ -10,9 +10,16 @@ Array = NDArray[np.float64]
 FEWEST = 2.0  # waves in the travel: what has fewer is a smooth law of the position
 FINER = 4  # bins in the shortest wave
 MOST_BINS = 1 << 20
-PADDED = (
-    2  # times the travel over which the spectrum is taken, so that a line stands in more than one of its bins
-)
+# times the travel over which the spectrum is taken, so that a line stands in more than one of its bins
+PADDED = 2
+SLOW = 0.25  # quantile of the speed at which a wave still passes below a cut-off
+LINES = 3  # that are told: of poles, of slots, of one turn
+
+
+def lines_below(position: Array, velocity: Array, signal: Array, cut_off: float) -> tuple[float, ...]:
+    """Wavelengths of the strongest lines of a signal (n,) over position (n,) that come below a `cut_off` [Hz] in the slow parts of the motion."""
+    shortest = float(np.quantile(np.abs(velocity), SLOW)) / cut_off
+    return strongest_wavelengths(position, signal, shortest, LINES)
 
 
 def strongest_wavelengths(position: Array, signal: Array, shortest: float, count: int) -> tuple[float, ...]:

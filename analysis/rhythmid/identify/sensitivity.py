@@ -211,9 +211,8 @@ class Problem:
             place += len(white)
         target = 1e-4 * self.spread
         ratio = np.clip(target / np.maximum(moved, 1e-30), 1e-3, 1e3)
-        unseen = (
-            moved < SEEN * self.spread
-        )  # a tick of a clock shows once a step passes it; what does nothing never does
+        # a tick of a clock shows once a step passes it; what does nothing never does
+        unseen = moved < SEEN * self.spread
         most = np.append(
             [abs(model.value(name)) or self.spread for name in self.names], np.full(q, self.spread)
         )

@@ -4,12 +4,8 @@ from typing import Any
 
 import numpy as np
 
-SPANS = (
-    2.0**16,
-    2.0**32,
-    2.0**32 * 1e-3,
-    2.0**32 * 1e-6,
-)  # of the counts, and of counts of µs that are written in ms or s
+# of the counts, and of counts of µs that are written in ms or s
+SPANS = (2.0**16, 2.0**32, 2.0**32 * 1e-3, 2.0**32 * 1e-6)
 LONGEST = 3.0  # usual steps that the one over the end may be, a lost sample among them
 
 

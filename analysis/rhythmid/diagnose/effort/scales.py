@@ -6,9 +6,8 @@ import numpy as np
 
 from rhythmid.elements.element import Scales
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.bandwidth import LINES, SLOW_QUARTER
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit
-from rhythmid.identify.position_lines import strongest_wavelengths
+from rhythmid.identify.position_lines import lines_below
 from rhythmid.identify.record_scales import NO_SPRING, REST_LENGTH
 from rhythmid.model import Model
 
@@ -16,8 +15,7 @@ from rhythmid.model import Model
 def scales_at(balance: Balance, fit: EffortFit) -> Scales:
     """The same as `scales_of`, and the lines over position that a fit leaves."""
     position, velocity, _ = balance.mechanical.T
-    shortest = float(np.quantile(np.abs(velocity), SLOW_QUARTER)) / balance.bandwidth.effort
-    lines = strongest_wavelengths(position, fit.residual, shortest, LINES)
+    lines = lines_below(position, velocity, fit.residual, balance.bandwidth.effort)
     return replace(scales_of(balance, fit.model), residual_wavelengths=lines)
 
 

@@ -10,7 +10,7 @@ from scipy.signal import detrend, welch
 
 from rhythmid.identify.inverse_dynamics.free_map import FreeMap
 from rhythmid.identify.inverse_dynamics.motion import Motion, Stretch, high_pass, low_pass, motion_of
-from rhythmid.identify.position_lines import strongest_wavelengths
+from rhythmid.identify.position_lines import lines_below
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
@@ -20,8 +20,6 @@ HALF = 0.5  # share of the effort's power that a free map has to explain in the 
 SEGMENTS = 8  # of a record in Welch's spectra, at least
 RIDGE = 1e-6  # of the columns' power, against columns that the data do not tell apart
 FLOORLESS = 1e-12  # of the strongest line, below which what looks like a floor is the window's leakage
-LINES = 3  # over position beside a free map
-SLOW_QUARTER = 0.25  # quantile of the speed at which a wave still passes below the cut-off
 SLOW = 4.0  # times below its strongest frequency that a motion is integrated from an acceleration
 LOWEST = 4.0  # times the strongest frequency of the motion: less would round off what a friction does at each reversal
 
@@ -91,8 +89,7 @@ def _lines(motions: Sequence[Motion], frequency: float, low: float) -> tuple[flo
         np.concatenate([one[part] for one, part in zip(signals, kept, strict=True)])
         for signals in ([m.leg_position for m in motions], [m.leg_velocity for m in motions])
     )
-    shortest = float(np.quantile(np.abs(velocity), SLOW_QUARTER)) / frequency
-    return strongest_wavelengths(position, np.concatenate(left), shortest, LINES)
+    return lines_below(position, velocity, np.concatenate(left), frequency)
 
 
 def _kept(motion: Motion, frequency: float) -> slice:
