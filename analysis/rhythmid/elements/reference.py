@@ -82,7 +82,7 @@ similar one. Its fields, besides names, equation, parameters and reference:
   this motion does not show the effect. Without `starts` the guesses follow from the units: {guesses}. A parameter with a
   default keeps it. An element without a guess is not tried, and the answer says why.
 - `ranges`: bounds, from the scales, within which the name of the effect applies; `confusable`, `special_case_of`, `needless_with`:
-  effects with which it could be confused.
+  effects with which it could be confused. With `repeats=True` a machine may lack several of it, each with parameters of its own.
 
 | slot | `acts` | the kernel is given | x and v are |
 | --- | --- | --- | --- |
