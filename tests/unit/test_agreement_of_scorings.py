@@ -116,7 +116,7 @@ def test_where_neither_motion_nor_effort_can_be_scored_both_reasons_are_told(mon
         raise InputError("the model diverges")
         yield
 
-    refused = SimpleNamespace(applies=False, balance=object(), reason="no map explains it")
+    refused = SimpleNamespace(applies=False, recorded=True, reason="no map explains it")
     monkeypatch.setattr(module, "applicable", lambda *_: refused)
     monkeypatch.setattr(module, "_answers", answers)
     with pytest.raises(InputError, match=r"diverges\. The recorded effort .* no map explains it"):

@@ -266,7 +266,7 @@ def _warning(case: Case, untried: list[Untried]) -> str | None:
 
 def _refused(error: InputError, effort: Applicability) -> InputError:
     """Why no way to score could be gone: what the motion lacks, and what the recorded effort does."""
-    if effort.balance is None:
+    if not effort.recorded:
         return error
     return InputError(f"{error}. The recorded effort cannot be scored either: {effort.reason}")
 
@@ -281,8 +281,7 @@ def _answers(
     Effort is scored on the `whole` case, whose records nothing cuts. With an answer in hand no further way begins once the budget
     is spent; what the next one would have been joins `untried`.
     """
-    bridged = () if effort.balance is None else effort.balance.notes
-    effort_notes = (*given.whole_notes, *bridged)
+    effort_notes = (*given.whole_notes, *effort.notes)
     driven = effort.applies and effort.effort_share >= DRIVES_IT
 
     def late(way: str) -> bool:

@@ -35,6 +35,7 @@ from rhythmid.identify.student import autocorrelation_time, scale_of, weights_of
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 UNSEEN = -1  # fold of blocks that no fit sees
+PART = 50_000  # rows of a sum that are weighted at once
 
 
 @dataclass(frozen=True)
@@ -138,25 +139,35 @@ class CrossValidated:
 
 def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
     """Predict every block from the others."""
-    error, scale = fit.residual.copy(), np.ones(len(fit.residual))
-    norms = np.linalg.norm(fit.jacobian, axis=0)
+    residual, jacobian = fit.residual, fit.jacobian
+    error, scale = residual.copy(), np.ones(len(residual))
+    norms = np.linalg.norm(jacobian, axis=0)
     norms[norms == 0.0] = 1.0
-    jacobian = fit.jacobian / norms
-    precision, pull = fit.precision / norms**2, fit.precision * fit.departure / norms
+    precision, pull = np.diag(fit.precision / norms**2), fit.precision * fit.departure / norms
     for fold in np.unique(blocks.fold):
         out, seen = blocks.left_out(int(fold))
-        left, columns = fit.residual[seen], jacobian[seen]
-        step = np.zeros(columns.shape[1])
-        now, spread = left, max(scale_of(left), blocks.least)
-        for _ in range(REWEIGHTED if columns.shape[1] else 0):
-            weight = weights_of(now, spread) / spread**2
-            normal = (columns * weight[:, None]).T @ columns + np.diag(precision)
-            step = -np.linalg.lstsq(normal, columns.T @ (weight * left) + pull, rcond=1e-12)[0]
-            now = left + columns @ step
-            spread = max(scale_of(now), blocks.least)
-        error[out] += jacobian[out] @ step
+        change = np.zeros(len(residual))
+        spread = max(scale_of(residual[seen]), blocks.least)
+        for _ in range(REWEIGHTED if jacobian.shape[1] else 0):
+            weight = np.where(seen, weights_of(residual + change, spread) / spread**2, 0.0)
+            normal, right = _normal_equations(jacobian, weight, residual)
+            normal = normal / np.outer(norms, norms) + precision
+            change = -jacobian @ (np.linalg.lstsq(normal, right / norms + pull, rcond=1e-12)[0] / norms)
+            spread = max(scale_of((residual + change)[seen]), blocks.least)
+        error[out] += change[out]
         scale[out] = spread
     return CrossValidated(error, scale)
+
+
+def _normal_equations(jacobian: Array, weight: Array, residual: Array) -> tuple[Array, Array]:
+    """JᵀWJ (p, p) and JᵀWr (p,), summed over parts of the rows: a weighted copy of all rows of long records would be large."""
+    normal, right = np.zeros((jacobian.shape[1],) * 2), np.zeros(jacobian.shape[1])
+    for first in range(0, len(jacobian), PART):
+        part = slice(first, first + PART)
+        weighted = jacobian[part] * weight[part, None]
+        normal += weighted.T @ jacobian[part]
+        right += weighted.T @ residual[part]
+    return normal, right
 
 
 def prediction(

@@ -120,22 +120,24 @@ def following(base: Linearised, rows: Rows, reach: Sequence[Reach]) -> Linearise
 
 def beside(fit: Fit, base: Linearised, one: FreeMap, rows: Rows, reach: Sequence[Reach]) -> Linearised:
     """The fit, which reaches the hidden rows, with a free map beside it, to first order."""
-    seen, hidden = [], []
+    known, count = base.jacobian.shape[1], len(one.columns)
+    jacobian = np.zeros((len(base.residual), known + count))
+    jacobian[:, :known] = base.jacobian
+    added = jacobian[:, known:]
     bases = fit.linearisation.bases
+    first, below = 0, rows.fitted  # where the next seen rows, and the next hidden ones, go
     for index, (series, parts) in enumerate(zip(fit.run.series, _parts(rows))):
         columns = np.column_stack([column[index] for column in one.columns])
         white, unseen = (_white(rows, series, columns, which) for which in parts)
         if index < len(bases):
-            seen.append(white - bases[index] @ (bases[index].T @ white))
-        hidden.append(reach[index].refitted(white, unseen))
-    added = np.concatenate([*seen, *hidden])
-    wide = np.zeros((len(base.residual), added.shape[1]))
-    wide[: len(added)] = added
-    information = np.sum(added[: rows.fitted] ** 2, axis=0)
-    count = added.shape[1]
+            added[first : first + len(white)] = white - bases[index] @ (bases[index].T @ white)
+            first += len(white)
+        added[below : below + len(unseen)] = reach[index].refitted(white, unseen)
+        below += len(unseen)
+    information = np.einsum("ij,ij->j", added[: rows.fitted], added[: rows.fitted])
     return Linearised(
         base.residual,
-        np.hstack([base.jacobian, wide]),
+        jacobian,
         np.concatenate([base.precision, RIDGE * np.maximum(information, 1e-300)]),
         np.concatenate([base.departure, np.zeros(count)]),
     )
@@ -151,8 +153,8 @@ def dependences(known: Trajectories, rows: Rows, pool: ThreadPoolExecutor | None
     alone = cross_validate(base, rows.blocks)
     before = float(np.sum(alone.error**2))
     n = len(alone.error)
-    found: list[Dependence] = []
-    for one in free_maps(known, pool):
+
+    def dependence(one: FreeMap) -> Dependence:
         wide = beside(fit, base, one, rows, reach)
         predicted = cross_validate(wide, rows.blocks)
         coefficients = _coefficients(wide, rows.fitted)[-len(one.columns) :]
@@ -161,8 +163,10 @@ def dependences(known: Trajectories, rows: Rows, pool: ThreadPoolExecutor | None
         whole = max(before - floor, 1e-9 * before, 5.0 * math.sqrt(2.0 * n))
         drawn = coefficients @ one.basis if one.basis.size else np.empty(0)
         explained = float(np.clip((before - left) / whole, -1.0, 1.0))
-        found.append(Dependence(one.quantity, explained, one.grid, drawn, predicted))
-    return sorted(found, key=lambda d: -d.explained)
+        return Dependence(one.quantity, explained, one.grid, drawn, predicted)
+
+    # by `map`, which lets go of each map before the next one is made
+    return sorted(map(dependence, free_maps(known, pool)), key=lambda found: -found.explained)
 
 
 def _coefficients(fit: Linearised, fitted: int) -> Array:
@@ -170,7 +174,6 @@ def _coefficients(fit: Linearised, fitted: int) -> Array:
     jacobian, residual = fit.jacobian[:fitted], fit.residual[:fitted]
     norms = np.linalg.norm(jacobian, axis=0)
     norms[norms == 0.0] = 1.0
-    scaled = jacobian / norms
-    normal = scaled.T @ scaled + np.diag(fit.precision / norms**2)
+    normal = jacobian.T @ jacobian / np.outer(norms, norms) + np.diag(fit.precision / norms**2)
     pull = fit.precision * fit.departure / norms
-    return -np.linalg.lstsq(normal, scaled.T @ residual + pull, rcond=1e-12)[0] / norms
+    return -np.linalg.lstsq(normal, jacobian.T @ residual / norms + pull, rcond=1e-12)[0] / norms

@@ -79,7 +79,7 @@ def _applicable(balance: Balance, model: Model) -> Applicability:
     chosen = balance.bandwidth
     reason = f"the effort of each joint is predicted, below {chosen.effort:.3g} Hz at this one"
     return Applicability(
-        True, reason, chosen.effort, math.nan, chosen.explained, math.nan, True, False, balance
+        True, reason, chosen.effort, math.nan, chosen.explained, math.nan, True, False, balance=balance
     )
 
 

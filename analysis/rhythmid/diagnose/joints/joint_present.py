@@ -61,9 +61,7 @@ def parents_of(body: MujocoBody) -> dict[str, str | None]:
 def _curves(results: Mapping[str, JointResult], machine: Machine) -> dict[str, JointCurves]:
     found = {}
     for joint, one in results.items():
-        balance = one.result.applicability.balance
-        if balance is None:
-            continue
+        balance = one.result.search.balance
         first = len(balance.places[0])  # the rows of the first motion
         time = balance.motions[0].time[np.asarray(balance.places[0], dtype=int)]
         measured = balance.measured[:first]

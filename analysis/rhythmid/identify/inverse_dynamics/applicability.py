@@ -33,7 +33,8 @@ class Applicability:
     `condition` is that of the scaled columns, `explained` the share of the effort's power that a free map explains, `effort_share`
     the effort's variation as a share of the inertial force. `restoring` says whether the model holds what is measured anywhere,
     `closed` whether a controller does: of a machine with a restoring force and without a controller a long free run means
-    something. `balance` holds the rows, where there are any.
+    something. `recorded` says whether there are rows of effort at all, `notes` what was interpolated of them. `balance` holds the rows;
+    it is None where a free run comes first: those of long records are large, and a search makes them again where it has to.
     """
 
     applies: bool
@@ -44,6 +45,8 @@ class Applicability:
     effort_share: float
     restoring: bool
     closed: bool
+    recorded: bool = True
+    notes: tuple[str, ...] = ()
     balance: Balance | None = None
 
     @property
@@ -59,7 +62,7 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
     try:
         balance = Balance.of(records, model)
     except InputError as error:
-        return Applicability(False, str(error), 0.0, np.inf, 0.0, 0.0, True, closed)
+        return Applicability(False, str(error), 0.0, np.inf, 0.0, 0.0, True, closed, recorded=False)
     chosen = balance.bandwidth
     fit = fit_effort(balance, model, steps=3)
     condition = condition_of(fit)
@@ -82,9 +85,10 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
             False,
             f"the motion does not tell the parameters apart (condition number {condition:.3g})",
         )
+    restoring = restores(balance, model, records[0].output_kind)
     return Applicability(
         applies, reason, chosen.effort, condition, chosen.explained, share,
-        restores(balance, model, records[0].output_kind), closed, balance,
+        restoring, closed, True, tuple(balance.notes), None if restoring and not closed else balance,
     )  # fmt: skip
 
 
