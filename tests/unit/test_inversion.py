@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.inversion import inverted
+from rhythmid.identify.inverse_dynamics.inversion import Inversions, followed, inverted
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 
@@ -19,7 +19,35 @@ def test_what_goes_in_brings_out_what_is_wanted(gain, bend, offset):
     def comes_out(signal):
         return gain * signal + bend * np.tanh(3.0 * (signal - offset))
 
-    np.testing.assert_allclose(comes_out(inverted(comes_out, WAVE, remembers=False)), WAVE, atol=1e-4)
+    np.testing.assert_allclose(comes_out(inverted(comes_out, WAVE, remembers=False).into), WAVE, atol=1e-4)
+
+
+@given(st.floats(0.3, 3.0), st.floats(0.0, 0.5), st.floats(-1.0, 1.0))
+def test_a_small_change_of_what_is_inverted_is_followed_in_one_run(gain, bend, offset):
+    runs = 0
+
+    def comes_out(signal, change=0.0):
+        nonlocal runs
+        runs += 1
+        return (gain + change) * signal + (bend + change) * np.tanh(3.0 * (signal - offset))
+
+    step, wanted = 1e-4, WAVE + 1e-4 * np.cos(WAVE)
+    known = inverted(comes_out, WAVE, remembers=False, with_slope=True)
+    runs = 0
+    found = followed(known, lambda signal: comes_out(signal, step), wanted, remembers=False).into
+    assert runs == 1
+    anew = inverted(lambda signal: comes_out(signal, step), wanted, remembers=False).into
+    np.testing.assert_allclose((found - known.into) / step, (anew - known.into) / step, atol=0.05)
+
+
+def test_what_cannot_be_followed_is_inverted_anew():
+    def dead(signal, band):
+        return signal - np.clip(signal, -band, band)
+
+    known = inverted(lambda signal: dead(signal, 0.2), WAVE, False, with_slope=True)
+    by = Inversions({"dead": known})
+    found = by.inverted("dead", lambda signal: dead(signal, 0.21), WAVE, False)
+    np.testing.assert_array_equal(found, inverted(lambda signal: dead(signal, 0.21), WAVE, False).into)
 
 
 def test_in_a_dead_band_and_beyond_a_limit_it_is_what_goes_in_to_first_order():
@@ -30,9 +58,11 @@ def test_in_a_dead_band_and_beyond_a_limit_it_is_what_goes_in_to_first_order():
         return signal - np.clip(signal, -0.2, 0.2)
 
     beyond = np.abs(WAVE) > 0.51
-    np.testing.assert_allclose(inverted(limited, WAVE, False)[beyond], (2 * WAVE - limited(WAVE))[beyond])
+    np.testing.assert_allclose(
+        inverted(limited, WAVE, False).into[beyond], (2 * WAVE - limited(WAVE))[beyond]
+    )
     within, clear = np.abs(WAVE) < 0.19, np.abs(WAVE) > 0.21
-    found = inverted(dead, WAVE, False)
+    found = inverted(dead, WAVE, False).into
     np.testing.assert_allclose(found[within], (2 * WAVE - dead(WAVE))[within])
     np.testing.assert_allclose(dead(found)[clear], WAVE[clear], atol=1e-4)
 

@@ -182,7 +182,7 @@ def effect_along(
         states[:] = element.initial(float(first), float(path.velocity[0]), float(signal), **given)
     known = [path.position, path.velocity, path.effort, path.leg, path.signal]
     if element.acts == "transmission":
-        known.append(_load(model, path) if path.load is None else path.load)
+        known.append(load_along(model, path))
     rows = np.ascontiguousarray(np.vstack(known), dtype=float)
     out = np.empty(len(path.time))
     _run_of(element)(
@@ -192,8 +192,11 @@ def effect_along(
     return out
 
 
-def _load(model: Model, path: Path) -> Array:
-    """Sum (n,) of the model's forces along the path that are neither the actuator's nor losses."""
+def load_along(model: Model, path: Path) -> Array:
+    """The load (n,) that a gear carries besides the actuator force: that of the path, or else the sum of the model's forces along it
+    that are no losses."""
+    if path.load is not None:
+        return path.load
     total = np.zeros(len(path.time))
     for term in model.terms:
         element = term.element

@@ -6,8 +6,8 @@ itself requires. One zero-phase filter acts on the recorded effort and on all th
 """
 
 import math
-from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
-from rhythmid.identify.inverse_dynamics.inversion import inverted
+from rhythmid.identify.inverse_dynamics.inversion import Inversions
 from rhythmid.identify.inverse_dynamics.motion import (
     Motion,
     Stretch,
@@ -27,7 +27,7 @@ from rhythmid.identify.inverse_dynamics.motion import (
 from rhythmid.identify.noise import runs
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.record.record import Record
-from rhythmid.simulation.effect import MAX_STEP, Path, effect_along
+from rhythmid.simulation.effect import MAX_STEP, Path, effect_along, load_along
 from rhythmid.simulation.transport import MEASUREMENT, delays
 
 Array = NDArray[np.float64]
@@ -172,7 +172,20 @@ class Balance:
 
     def required(self, model: Model) -> list[Array]:
         """Effort (n,) that the model requires along each motion, unfiltered."""
-        return [self._required(index, model) for index in range(len(self.motions))]
+        return [self._required(index, model, Inversions()) for index in range(len(self.motions))]
+
+    def sensitive(self, model: Model, steps: Mapping[str, float]) -> tuple[list[Array], list[list[Array]]]:
+        """The effort (n,) that the model requires along each motion, and for each named parameter its change (n,) for a unit of that, by
+        a difference over a step."""
+        chains = [Inversions(with_slopes=True) for _ in self.motions]
+        required = [self._required(index, model, chain) for index, chain in enumerate(chains)]
+        known = [replace(chain, known=chain.made) for chain in chains]
+        changes = []
+        for name, step in steps.items():
+            moved = model.with_values({name: model.value(name) + step})
+            found = [self._required(index, moved, replace(one, made={})) for index, one in enumerate(known)]
+            changes.append([(new - old) / step for new, old in zip(found, required, strict=True)])
+        return required, changes
 
     def predicted(self, model: Model, alignment: float = 0.0) -> Array:
         """The effort (rows,) that the model predicts, `alignment` [s] beyond the model's own delays."""
@@ -217,7 +230,7 @@ class Balance:
             slot == "command" and term.element.acts != "feedback" and not controlled(model)
         )
 
-    def _required(self, index: int, model: Model) -> Array:
+    def _required(self, index: int, model: Model, by: Inversions) -> Array:
         motion = self.motions[index]
         zero = np.zeros(len(motion.time))
         forces = [t for t in model.terms if t.element.slot == "force" and self._counts(t, model)]
@@ -240,40 +253,48 @@ class Balance:
         if late and motion.driven_by_base:
             required = required - sum(self._along(motion, t, model, zero, leg, zero) for t in late)
         elif late:
-            required = self._with_load(motion, late, model, required, leg)
+            required = self._with_load(motion, late, model, required, leg, by)
         for slot in ("actuator", "command"):
             for term in reversed([t for t in model.terms if t.element.slot == slot]):
                 if self._counts(term, model):
-                    required = self._before(motion, term, model, required, leg)
+                    required = self._before(motion, term, model, required, leg, by)
         return required
 
     def _with_load(
-        self, motion: Motion, terms: Sequence[Term], model: Model, without: Array, leg: Array
+        self, motion: Motion, terms: Sequence[Term], model: Model, without: Array, leg: Array, by: Inversions
     ) -> Array:
         """The effort (n,) that makes up for the forces of elements that it is the load of; `without` them it is known."""
         zero = np.zeros(len(motion.time))
+        load = load_along(model, motion.path(zero, leg, zero, True))
 
         def left_over(effort: Array) -> Array:
-            return effort + np.sum([self._along(motion, t, model, effort, leg, zero) for t in terms], axis=0)
+            forces = [self._along(motion, t, model, effort, leg, zero, load) for t in terms]
+            return effort + np.sum(forces, axis=0)
 
-        return inverted(left_over, without, any(term.element.own for term in terms))
+        return by.inverted("", left_over, without, any(term.element.own for term in terms))
 
-    def _before(self, motion: Motion, term: Term, model: Model, after: Array, leg: Array) -> Array:
+    def _before(
+        self, motion: Motion, term: Term, model: Model, after: Array, leg: Array, by: Inversions
+    ) -> Array:
         """The signal (n,) that went into an actuator or command element for `after` to come out."""
 
         def comes_out(into: Array) -> Array:
             return into + self._along(motion, term, model, after, leg, into)
 
-        return inverted(comes_out, after, bool(term.element.own))
+        return by.inverted(term.label, comes_out, after, bool(term.element.own))
 
     def _along(
-        self, motion: Motion, term: Term, model: Model, effort: Array, leg: Array, signal: Array
-    ) -> Array:
+        self, motion: Motion, term: Term, model: Model, effort: Array, leg: Array, signal: Array,
+        load: Array | None = None,
+    ) -> Array:  # fmt: skip
         values = {name: value.value for name, value in term.values.items()}
         of_leg = term.element.acts not in ("body", "drive")
         # a motion without anything fast moves an element's states smoothly; what has none takes the simulator's own step
         step = max(MAX_STEP, motion.period / SUBSTEPS) if term.element.states else MAX_STEP
-        return effect_along(term.element, values, model, motion.path(effort, leg, signal, of_leg), step)
+        path = motion.path(effort, leg, signal, of_leg)
+        if load is not None:
+            path = replace(path, load=load)
+        return effect_along(term.element, values, model, path, step)
 
     def _force(self, index: int, term: Term, model: Model) -> Array:
         """Force (n,) of an element that sees nothing but the motion; kept, for most refits change but one."""

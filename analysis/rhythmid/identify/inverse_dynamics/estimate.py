@@ -110,17 +110,13 @@ def priors_of(balance: Balance, model: Model, names: Sequence[str], columns: Arr
 
 def linearise(balance: Balance, model: Model, names: Sequence[str], alignment: float) -> tuple[Array, Array]:
     """Residual (n,), and its derivatives (n, 1 + p) with respect to the alignment and the named parameters."""
-    required = balance.required(model)
-    steps, moved = [], []
     parameters = model.parameters
+    steps = {}
     for name in names:
         value = parameters[name]
         step = DIFFERENCE * (abs(value.value) or 1.0)
-        if value.value + step > value.bounds[1]:
-            step = -step
-        changed = balance.required(model.with_values({name: value.value + step}))
-        steps.append(step)
-        moved.append([(new - old) / step for new, old in zip(changed, required, strict=True)])
+        steps[name] = -step if value.value + step > value.bounds[1] else step
+    required, moved = balance.sensitive(model, steps)
     signals = [
         np.column_stack([old, *(column[index] for column in moved)]) for index, old in enumerate(required)
     ]
