@@ -81,3 +81,10 @@ def test_an_output_that_never_changes_is_refused(given):
     )
     with pytest.raises(InputError, match="the output never changes"):
         check_comparable(prepare([still]))
+
+
+def test_an_effort_that_a_holding_controller_makes_of_the_output_is_told():
+    place = 1e-6 * np.cumsum(np.random.default_rng(5).standard_normal(len(TIME)))
+    held = Record("held", Channel(TIME, place, "m"), Channel(TIME, 3.0 - 9000.0 * place, "N"))
+    (note,) = [one for one in admitted([held], [], FREE).notes if "copy" in one]
+    assert note.startswith("held: input: it is a copy of the output (correlation -1.00000 at once)")

@@ -14,6 +14,7 @@ from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.gaps import cut_at_gaps
+from rhythmid.record.output_copy import copy_notes
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.record import Record
 
@@ -50,7 +51,7 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
     cut = [cut_at_gaps(record) for record in given]
     said = (
         remark,
-        *(f"{one.name}: {note}" for one in whole for note in punctuality_notes(one.run)),
+        *(f"{one.name}: {note}" for one in whole for note in (*punctuality_notes(one.run), *copy_notes(one))),
         *(note for one in clean for note in one.notes),
         *(drive_of(one.record, b) for one, b in zip(clean, given)),
     )

@@ -7,6 +7,7 @@ import numpy as np
 
 from rhythmid.identify.paper import PaperResult
 from rhythmid.identify.paper_conditions import LEAKAGE
+from rhythmid.record.output_copy import copy_notes
 from rhythmid.record.record import Record
 
 MISFIT = 0.1  # of the magnitudes above which the fit is called into question
@@ -14,7 +15,7 @@ MISFIT = 0.1  # of the magnitudes above which the fit is called into question
 
 def notes_of(record: Record, result: PaperResult | None) -> Iterator[str]:
     """What should make a user doubt the record, or the paper's method where its `result` is shown."""
-    yield from (f"{record.name}: {note}" for note in record.quality.notes)
+    yield from (f"{record.name}: {note}" for note in (*record.quality.notes, *copy_notes(record)))
     if result is None:
         return
     window, operator = result.spectra.window, result.estimate.operator
