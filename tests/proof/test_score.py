@@ -187,9 +187,15 @@ def test_a_name_is_stood_by_from_a_probability_of_four_fifths():
     hesitant = judged(truth("backlash"), answer("missing_physics", "coulomb_friction", probability=0.79))
     assert hesitant.outcome == "wrong" and hesitant.stated_wrong == ()
     sure = judged(truth("backlash"), answer("missing_physics", "coulomb_friction", probability=0.8))
-    assert sure.stated_wrong == ("coulomb_friction",)
+    assert sure.stated_wrong == ("coulomb_friction",) == sure.stated_unrelated
     declared = answer("missing_physics", "delay_drift", families=[("delay_drift", "clock_skew")])
     assert judged(truth("clock_skew"), declared).stated_wrong == ()
+
+
+def test_a_wrong_name_of_the_concealed_law_s_family_is_related():
+    said = answer("missing_physics", "coulomb_friction")
+    akin = judged(truth("stribeck_friction"), said)
+    assert akin.stated_wrong == ("coulomb_friction",) and akin.stated_unrelated == ()
 
 
 def test_an_error_in_units_of_force_is_not_held_against_the_noise_of_the_motion():

@@ -52,11 +52,15 @@ def _rates(kind: str, scores: Sequence[Score]) -> dict[str, Rate]:
         found["undecided"] = rate(scores, lambda s: s.outcome == "undecided")
         return found | sure
     if kind == "left-out":
-        return {
-            "unknown, undecided or a declared family": rate(scores, lambda s: s.honest),
-            "of these unknown": rate(scores, lambda s: s.outcome == "unknown"),
-            "a confident wrong name": rate(scores, lambda s: s.outcome == "wrong" and not s.families),
-        } | sure
+        return (
+            {
+                "unknown, undecided or a declared family": rate(scores, lambda s: s.honest),
+                "of these unknown": rate(scores, lambda s: s.outcome == "unknown"),
+                "a confident wrong name": rate(scores, lambda s: s.outcome == "wrong" and not s.families),
+            }
+            | sure
+            | {"the same of another family": rate(scores, lambda s: bool(s.stated_unrelated))}
+        )
     found = {
         "exact name" if kind == "single" else "exact names": rate(scores, lambda s: s.outcome == "exact"),
         "exact, or in a declared family of two": rate(scores, lambda s: s.right_within_family),

@@ -40,11 +40,12 @@ class Estimated:
 class Stated:
     """A name that an answer states, with its probability, and whether it is right: concealed; or declared indistinguishable from
     that, in a family of two or as its special case; or clutter that is really there, or of the same family of the catalogue as such clutter, for much
-    of which there is no name."""
+    of which there is no name. `related`: of the catalogue's family of something that was concealed."""
 
     name: str
     probability: float
     right: bool
+    related: bool = False
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,13 @@ class Score:
     def stated_wrong(self) -> tuple[str, ...]:
         """Names that the answer stands by and that are wrong."""
         return tuple(one.name for one in self.stated if one.probability >= SURE and not one.right)
+
+    @property
+    def stated_unrelated(self) -> tuple[str, ...]:
+        """Of these names those of another family than all that was concealed."""
+        return tuple(
+            one.name for one in self.stated if one.probability >= SURE and not (one.right or one.related)
+        )
 
     @property
     def group(self) -> str:
@@ -140,6 +148,7 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
                 effect["element"],
                 float(effect["probability"]),
                 effect["element"] in kin or bool(stands_for[effect["element"]] & set(true)),
+                effect["element"] in _kin_of(true, catalogue),
             )
             for effect in ranked
             if effect.get("probability") is not None
