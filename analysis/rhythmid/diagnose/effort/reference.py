@@ -1,7 +1,5 @@
 """Unknown physics as a competitor: a model with a free map of the motion beside its own elements."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,12 +19,13 @@ PASSES = 8  # of reweighted least squares
 
 
 def map_columns(
-    balance: Balance, fitted: Fitted, drawn_on: Balance | None = None
+    balance: Balance, fitted: Fitted, drawn_on: Balance | None = None, beside: str | None = None
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Columns (n, q) of the free map at the rows, and which of them are bends (q,); its load is the effort that the model
-    predicts, never the measured one. The map's pieces lie where the motions of `drawn_on` are, by default the balance's own."""
+    predicts, never the measured one. The map's pieces lie where the motions of `drawn_on` are, by default the balance's own; it is
+    one of the motion of the joint `beside` this one, too."""
     drawn_on = drawn_on or balance
-    free = FreeMap(list(drawn_on.motions))
+    free = FreeMap(list(drawn_on.motions), beside)
     loads = balance.required(fitted.fit.model)
     made = [free.columns(motion, load) for motion, load in zip(balance.motions, loads, strict=True)]
     shift = balance.shift(fitted.fit.model) + fitted.fit.alignment
@@ -60,20 +59,20 @@ def with_map(
     return Linearised(residual, jacobian, precision, departure)
 
 
-def residual_with_map(heldout: Balance, balance: Balance, fitted: Fitted, found: Linearised) -> Array:
+def residual_with_map(
+    heldout: Balance, balance: Balance, fitted: Fitted, found: Linearised, beside: str | None = None
+) -> Array:
     """Predicted less recorded effort (n,) of held-out rows, by a fit with a free map that was `found` on a balance."""
     residual, jacobian = linearise(heldout, fitted.fit.model, fitted.fit.names, fitted.fit.alignment)
     own = jacobian[:, ~fitted.fit.at_limit]
     step = found.departure[: own.shape[1]] - fitted.linearised.departure
-    mapped = map_columns(heldout, fitted, balance)[0] @ found.departure[own.shape[1] :]
+    mapped = map_columns(heldout, fitted, balance, beside)[0] @ found.departure[own.shape[1] :]
     return residual + own @ step + mapped
 
 
-def reference_of(
-    balance: Balance, fitted: Fitted, blocks: Blocks, others: Sequence[Linearised] = ()
-) -> Linearised:
-    """The map whose ridge predicts best what it has not seen; the autocorrelation is that of the best among these and `others`."""
-    columns = map_columns(balance, fitted)
+def reference_of(balance: Balance, fitted: Fitted, blocks: Blocks, beside: str | None = None) -> Linearised:
+    """The map whose ridge predicts best what it has not seen; with the motion of the joint `beside` this one, where one is named."""
+    columns = map_columns(balance, fitted, beside=beside)
     made = [with_map(balance, fitted, ridge, columns) for ridge in RIDGES]
-    found = predict([*made, *others], blocks, balance.record)[: len(made)]
+    found = predict(made, blocks, balance.record)
     return made[int(np.argmax([one.score for one in found]))]

@@ -1,6 +1,6 @@
 """What an explanation of the effort leaves: with which quantity it goes, and the curve that it draws over that."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,14 @@ BINS = 16  # of equal numbers of rows: enough for a curve, each with enough rows
 @dataclass(frozen=True, eq=False)
 class Curve:
     """Mean residual effort (b,) with its standard error (b,) over values (b,) of a quantity; `share` of its power is explained
-    by the curve beyond what bins explain by chance."""
+    by the curve beyond what bins explain by chance. `joint` is the other one whose speed the quantity is."""
 
     quantity: str
     value: Array
     mean: Array
     error: Array
     share: float
+    joint: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +46,15 @@ class Remainder:
         """The quantity of which the remainder is most nearly a function."""
         return self.curves[0].quantity
 
+    @property
+    def of_the_motion(self) -> str:
+        """The same among the joint's own motion, its load and time."""
+        return next(curve.quantity for curve in self.curves if curve.joint is None)
+
 
 def remainder_of(balance: Balance, fitted: Fitted) -> Remainder:
-    """What a hypothesis leaves of the recorded effort, over speed, position, acceleration, load and time."""
+    """What a hypothesis leaves of the recorded effort, over speed, position, acceleration, load and time, and over the speeds of other
+    joints."""
     left = -fitted.fit.residual
     mechanical = balance.mechanical
     time = np.concatenate([m.time[p] for m, p in zip(balance.motions, balance.places, strict=True)])
@@ -60,6 +67,11 @@ def remainder_of(balance: Balance, fitted: Fitted) -> Remainder:
         "time": time,
     }
     curves = [_curve(name, value, left) for name, value in quantities.items()]
+    for joint in balance.motions[0].others:
+        speed = np.concatenate(
+            [m.others[joint][p] for m, p in zip(balance.motions, balance.places, strict=True)]
+        )
+        curves.append(replace(_curve(f"the velocity of {joint}", speed, left), joint=joint))
     return Remainder(
         float(np.sqrt(np.mean(left**2))) / variation_of(balance), tuple(sorted(curves, key=lambda one: -one.share)),
         balance.record, time, balance.measured, predicted,

@@ -13,7 +13,7 @@ from rhythmid.diagnose.discrepancy import mean_product
 from rhythmid.diagnose.effort.candidate import columns_of, screen, starts_of
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.held_out import HeldOut
-from rhythmid.diagnose.effort.reference import residual_with_map
+from rhythmid.diagnose.effort.reference import reference_of, residual_with_map
 from rhythmid.diagnose.effort.remainder import Remainder, remainder_of
 from rhythmid.diagnose.effort.scales import scales_at
 from rhythmid.diagnose.effort.search import GAP, MOST_EFFECTS, EffortSearch, search_effort
@@ -69,16 +69,21 @@ class _Rows:
     heldout: HeldOut | None
 
     def predicted(
-        self, found: EffortSearch, fitted: Fitted, with_map: Linearised | None = None
+        self,
+        found: EffortSearch,
+        fitted: Fitted,
+        with_map: Linearised | None = None,
+        beside: str | None = None,
     ) -> CrossValidated:
-        """Errors of prediction of a fit, or of one `with_map`: a free map beside its parameters."""
+        """Errors of prediction of a fit, or of one `with_map`: a free map beside its parameters, of the motion of the joint `beside` this
+        one, too."""
         seen = with_map or fitted.linearised
         if self.heldout is None:
             return cross_validate(seen, self.blocks)
         if with_map is None:
             other = self.heldout.residual(fitted)
         else:
-            other = residual_with_map(self.heldout.balance, found.balance, fitted, with_map)
+            other = residual_with_map(self.heldout.balance, found.balance, fitted, with_map, beside)
         residual = np.concatenate([seen.residual, other])
         jacobian = np.vstack([seen.jacobian, np.zeros((len(other), seen.jacobian.shape[1]))])
         return cross_validate(Linearised(residual, jacobian, seen.precision, seen.departure), self.blocks)
@@ -127,9 +132,11 @@ def effort_run(
     size = variation_of(found.balance)
     predicted = {one.elements: rows.predicted(found, one) for one in found.hypotheses}
     ruled_out = {one.elements: rows.predicted(found, one) for one in found.ruled_out}
-    mapped = {
-        "the motion and the load": rows.predicted(found, found.chosen, found.beyond),
-    }
+    left = remainder_of(found.balance, found.chosen)
+    mapped = {left.of_the_motion: rows.predicted(found, found.chosen, found.beyond)}
+    if (beside := left.curves[0].joint) is not None:
+        coupled = reference_of(found.balance, found.chosen, found.blocks, beside)
+        mapped[left.goes_with] = rows.predicted(found, found.chosen, coupled, beside)
     every = [*predicted.values(), *mapped.values()]
     best = min(every, key=lambda one: float(np.sum(one.error**2)))
     time = autocorrelation_time(best.error, rows.record)
@@ -145,8 +152,7 @@ def effort_run(
     def claimed(one: Fitted, errors_of: CrossValidated) -> Hypothesis:
         return one.claimed(made(errors_of), errors[tuple(sorted(one.elements))] / size)
 
-    left = remainder_of(found.balance, found.chosen)
-    maps = {left.goes_with: made(mapped["the motion and the load"])}
+    maps = {quantity: made(one) for quantity, one in mapped.items()}
     contest = Contest(
         tuple(claimed(one, predicted[one.elements]) for one in found.hypotheses),
         maps,

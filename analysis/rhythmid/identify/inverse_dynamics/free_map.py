@@ -48,30 +48,46 @@ class Spline:
 
 class FreeMap:
     """Columns of a free map over the motions: a spline of the speed for each direction, one of the position, and
-    sgn(v) times the position, its square, and the load. `bends` (q,) marks those whose size is curvature."""
+    sgn(v) times the position, its square, and the load. `bends` (q,) marks those whose size is curvature.
 
-    def __init__(self, motions: list[Motion]) -> None:
-        velocity = np.concatenate([motion.leg_velocity for motion in motions])
+    With a joint `beside` this one there are splines of its speed, too, and of the sum and the difference of the two speeds: a belt or a
+    differential gear on the way to the motor makes that turn with both.
+    """
+
+    def __init__(self, motions: list[Motion], beside: str | None = None) -> None:
         position = np.concatenate([motion.leg_position for motion in motions])
-        sides = ((velocity[velocity > 0.0], 1.0), (-velocity[velocity < 0.0], -1.0))
-        self._speeds = [
-            (Spline(speed, PIECES), direction) for speed, direction in sides if len(speed) > 4 * PIECES
-        ]
+        self._beside = beside
+        speeds = zip(*(self._speeds_of(motion) for motion in motions), strict=True)
+        self._speeds = [_two_sided(np.concatenate(one)) for one in speeds]
         self._position = Spline(position, PLACES)
         self._centre, self._width = float(np.mean(position)), float(np.std(position)) or 1.0
-        bends = [np.arange(spline.count) > 1 for spline, _ in self._speeds]
-        self._first = 1 if self._speeds else 0  # the constant is there already, in two halves
+        bends = [np.arange(spline.count) > 1 for sides in self._speeds for spline, _ in sides]
+        self._first = 1 if bends else 0  # the constant is there already, in two halves
         bends += [(np.arange(self._position.count) > 1)[self._first :], np.zeros(3, bool)]
         self.bends = np.concatenate(bends)
 
+    def _speeds_of(self, motion: Motion) -> list[Array]:
+        own = motion.leg_velocity
+        if self._beside is None:
+            return [own]
+        other = motion.others[self._beside]
+        return [own, other, own + other, own - other]
+
     def columns(self, motion: Motion, load: Array) -> Array:
         """Columns (n, q) of one motion; `load` (n,) is the effort that a model predicts, never the measured one."""
-        velocity, sign = motion.leg_velocity, np.sign(motion.leg_velocity)
+        sign = np.sign(motion.leg_velocity)
         found = [
-            spline(direction * velocity) * (direction * velocity > 0.0)[:, None]
-            for spline, direction in self._speeds
+            spline(direction * speed) * (direction * speed > 0.0)[:, None]
+            for speed, sides in zip(self._speeds_of(motion), self._speeds, strict=True)
+            for spline, direction in sides
         ]
         found.append(self._position(motion.leg_position)[:, self._first :])
         place = np.clip((motion.leg_position - self._centre) / self._width, -3.0, 3.0)
         found.append(np.column_stack([sign * place, sign * place**2, sign * np.abs(load)]))
         return np.hstack(found)
+
+
+def _two_sided(speed: Array) -> list[tuple[Spline, float]]:
+    """A spline of the speed (n,) for each direction in which there are samples enough."""
+    sides = ((speed[speed > 0.0], 1.0), (-speed[speed < 0.0], -1.0))
+    return [(Spline(one, PIECES), direction) for one, direction in sides if len(one) > 4 * PIECES]

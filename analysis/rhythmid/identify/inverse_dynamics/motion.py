@@ -45,7 +45,8 @@ class Motion:
     d'Alembert's −m a, and `driven_by_base` says so. `leg_position`, `leg_velocity` are relative to the base where that
     moves. `coupling` (n,) is, at a joint of several, the force beside its own inertia times its acceleration that the body asks
     for; `links` are its derivatives with respect to the body's parameters, by name, and the values at which they were taken.
-    `bridged` are the gaps, from and until [s], across which nothing was recorded but interpolated: no row of effort lies there.
+    `bridged` are the gaps, from and until [s], across which nothing was recorded but interpolated: no row of effort lies there. `others`
+    are the speeds of the other joints, by name.
     """
 
     record: int
@@ -62,6 +63,7 @@ class Motion:
     coupling: Array | None = None
     links: Mapping[str, tuple[float, Array]] = field(default_factory=dict)
     bridged: tuple[tuple[float, float], ...] = ()
+    others: Mapping[str, Array] = field(default_factory=dict)
 
     def recorded(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
         """Those of the rows that lie in no gap."""

@@ -263,9 +263,12 @@ def _motion(
         f"{BODY}.{link}": (known[link], np.ascontiguousarray(column[:, own.velocity]))
         for link, column in columns.items()
     }
+    others = {
+        name: body.rate[:, machine.body.joints[name].velocity] for name in machine.joints if name != joint
+    }
     return Motion(
         stretch.record, stretch.name, body.time, x, v, a, x, v, effort, body.period,
-        coupling=body.force[:, own.velocity] - model.mass.value * a, links=found,
+        coupling=body.force[:, own.velocity] - model.mass.value * a, links=found, others=others,
     )  # fmt: skip
 
 
