@@ -195,3 +195,12 @@ def test_a_wrong_table_is_refused_with_its_line(content, words, tmp_path):
     with pytest.raises(InputError) as refused:
         build({"type": "samples", "file": "u.csv"}, tmp_path)
     assert f"u.csv{words}" in str(refused.value)
+
+
+@given(some.integers(0, 1000), some.floats(0.5, 40.0), some.floats(0.0, 1.0))
+def test_the_peak_of_a_multisine_is_the_largest_of_its_values(seed, period, late):
+    multisine = build({
+        "type": "multisine", "rms": 0.3, "period": period, "band": [2.0, 9.0], "select": "all", "seed": seed, "start_delay": late,
+    })  # fmt: skip
+    dense = np.abs(multisine(late + np.linspace(0.0, period, 20_000, endpoint=False))).max()
+    assert multisine.peak == pytest.approx(dense, rel=2e-3)

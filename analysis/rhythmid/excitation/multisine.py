@@ -8,9 +8,12 @@ from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.fft import next_fast_len
 
 from rhythmid.errors import InputError
 from rhythmid.excitation.excitation import Array, Excitation
+
+FINENESS = 64  # samples in the shortest period, among which the largest is found: it is short by a thousandth at most (1 - cos(pi/64))
 
 
 class Multisine(Excitation):
@@ -70,15 +73,29 @@ class Multisine(Excitation):
     def duration(self) -> float:
         return self.start_delay + self.period * self.periods
 
-    def shape(self, time: Array) -> Array:
+    def _lines(self) -> tuple[np.ndarray, Array, Array]:
+        """Multiples k of 1/period, amplitudes and phases of the lines, (n,) each."""
         k = self.harmonics
         weight = np.array(self.weights) if self.weights else np.ones(len(k))
-        amplitude = self.rms * math.sqrt(2.0) * weight / np.linalg.norm(weight)
         phase = (
             np.array(self.phases)
             if self.phases
             else np.random.default_rng(self.seed).uniform(0, 2 * np.pi, len(k))
         )
+        return k, self.rms * math.sqrt(2.0) * weight / np.linalg.norm(weight), phase
+
+    @property
+    def peak(self) -> float:
+        """Largest |u| [N] of a period: by a Fourier transform, for a long period has thousands of lines."""
+        k, amplitude, phase = self._lines()
+        least = FINENESS * int(k.max())
+        count = next_fast_len(least, real=True) or least
+        spectrum = np.zeros(count // 2 + 1, dtype=complex)
+        np.add.at(spectrum, k, 0.5 * count * amplitude * np.exp(1j * phase))
+        return float(np.abs(np.fft.irfft(spectrum, count)).max())
+
+    def shape(self, time: Array) -> Array:
+        k, amplitude, phase = self._lines()
         t = np.asarray(time) - self.start_delay
         value = np.zeros(len(t))
         for number, size, angle in zip(k, amplitude, phase):
