@@ -73,6 +73,15 @@ def test_a_held_command_is_told_and_half_its_period_taken_out_of_the_delay():
     assert near(found, U, DELAYS[0]) and found.fit.std[U] < 1e-3
 
 
+def test_a_hold_with_which_the_machine_would_answer_before_it_is_asked_is_none():
+    made = concealing("command_hold", period=0.0333)
+    assert made.input is not None
+    late = replace(made.input, time=made.input.time + 0.05)  # stamps: the delay beside a hold is -0.01 s
+    joint = fitted(replace(made, input=late))
+    found, told = command_hold(joint)
+    assert told.value is None and found is joint
+
+
 def test_good_timing_is_left_alone():
     joint = fitted(record(hopper(), SPEC, delays=DELAYS, std=5e-6))
     found, notes = compensated(joint)

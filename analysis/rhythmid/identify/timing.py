@@ -272,7 +272,8 @@ def command_hold(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tup
         return joint, none
     spread = 6.0 * smear[1] / rough
     best, period = _refitted(*_received(fit, rough), pool), Estimate(rough, spread, "s")
-    if best.chi2 > fit.chi2 - HOLD_GAIN:
+    early = best.model.value(name) < -step  # what rolls off without being late was not held
+    if best.chi2 > fit.chi2 - HOLD_GAIN or early:
         return joint, none
     own = step / math.sqrt(12.0)  # a tick cannot tell the age of a command that is itself held
     best = _widened(best, name, math.hypot(0.5 * spread, own))
