@@ -31,16 +31,24 @@ ELEMENT = Element(
     parameters=(
         Parameter("force", "N", "friction force F_c while sliding", bounds=(0.0, math.inf)),
         Parameter(
-            "transition", "m/s", "speed v_t of the fastest creep under it", bounds=(0.0, math.inf), default=1e-3
+            "transition",
+            "m/s",
+            "speed v_t of the fastest creep under it",
+            bounds=(0.0, math.inf),
+            default=1e-3,
         ),
         Parameter(
-            "lead", "s", "time τ by which its sign turns before the velocity's", bounds=(0.0, 0.1), default=LEAD
+            "lead",
+            "s",
+            "time τ by which its sign turns before the velocity's",
+            bounds=(0.0, 0.1),
+            default=LEAD,
         ),
     ),
     kernel=kernel,
     size="force",
     starts=lambda s: [
-        {"force": 0.02 * s.force, "transition": w * s.velocity, "lead": LEAD} for w in (0.02, 0.2)
+        {"force": 0.02 * s.force, "transition": w * s.velocity, "lead": LEAD} for w in (0.02, 0.1, 0.5)
     ],
     ranges=lambda s: {"transition": s.turning},
     candidate=False,
