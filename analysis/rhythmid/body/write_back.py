@@ -1,8 +1,8 @@
 """A machine back into the body's own format: MJCF or URDF with the identified values in place.
 
-MJCF has masses, rotors' inertias, viscous damping, dry friction (a soft constraint there, a smooth law here), and an actuator for each
-path with the controller's gains, a lag and a delay; URDF has masses and the two losses. What a file cannot express is told by name. The
-MJCF holds the paths themselves, too: `rhythmid.mujoco.apply` makes them act in a loop of the user's own.
+MJCF has masses, rotors' inertias, viscous damping, dry friction (a soft constraint there; here a smooth law, or that constraint), and an
+actuator for each path with the controller's gains, a lag and a delay; URDF has masses and the two losses. What a file cannot express is
+told by name. The MJCF holds the paths themselves, too: `rhythmid.mujoco.apply` makes them act in a loop of the user's own.
 """
 
 import os
