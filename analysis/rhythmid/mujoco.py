@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from rhythmid.body import soft_constraint
 from rhythmid.body.body import Array, Joint
 from rhythmid.body.embedded import paths_in
 from rhythmid.body.live_source import ARRAYS, generate_live, numbers_of, rows_of
@@ -32,7 +33,7 @@ def apply(model: Any, data: Any, elements: tuple[str, ...] = ()) -> Array:
     """Put the forces of the joints' paths into `data`, before `mj_step`.
 
     Delays, lags, controllers, friction laws and all else of the command, actuator and force slots act from then on as in
-    `rhythmid simulate`; MuJoCo's own actuators, damping and dry friction of these joints rest. `data.ctrl` holds the commands: a
+    `rhythmid simulate`; MuJoCo's own actuators, damping and, but for friction that is a constraint, dry friction of these joints rest. `data.ctrl` holds the commands: a
     reference where the path has a controller, else a force. States and pasts lie in `data.userdata`: a reset begins anew.
 
     Parameters
@@ -77,6 +78,7 @@ class _Bound:
         data.userdata[:2] = 1.0, data.time
         data.userdata[2 : 2 + len(states)] = states
         rest(model, self.joints, self.control)
+        soft_constraint.put(model, self.joints, self.paths)
 
 
 def rest(model: Any, joints: dict[str, Joint], control: list[int]) -> None:

@@ -62,6 +62,10 @@ DRY = """\
 inertia: {mass: {value: 0.8, unit: kg}}
 force: [{linear_spring: {stiffness: 200.0}}, {viscous_damper: {damping: 1.0}}, {coulomb_friction: {force: 1.0, transition: 0.005}}]
 """
+SOFT = DRY.replace(
+    "coulomb_friction: {force: 1.0, transition: 0.005}",
+    "soft_constraint_friction: {force: 1.0, transition: 0.02, lead: 0.015}",
+)
 HANGING = """\
 inertia: {mass: {value: 0.5, unit: kg}}
 force: [{gravity: {acceleration: 3.0}}, {linear_spring: {stiffness: 50.0, rest_length: 0.03}}, {viscous_damper: {damping: 0.4}}]
@@ -134,6 +138,17 @@ def test_dry_friction_in_mujoco_is_nearly_that_of_rhythmid(tmp_path):
     ]
     assert errors[0] < 0.05  # frictionloss is a constraint and no law of the speed
     assert errors[1] > 4.0 * errors[0]
+
+
+def test_dry_friction_that_is_a_constraint_moves_in_mujoco_as_in_rhythmid_and_is_friction_in_a_urdf(tmp_path):
+    command, expected = run(tmp_path, SOFT, 8.0)
+    found, _ = moved(mujoco.MjModel.from_xml_string(exported([joint(SOFT)], "mujoco")), command)
+    assert error(found, expected) < 0.003
+    urdf = exported([joint(SOFT)], "urdf")
+    assert 'friction="1.0"' in urdf
+    assert "not expressed: friction_transition 0.02 m/s" in urdf
+    both = SOFT.replace("force: [", "force: [{coulomb_friction: {force: 0.5}}, ")
+    assert "two dry frictions" in exported([joint(both)], "mujoco")
 
 
 def test_the_urdf_swings_in_mujoco_as_the_mjcf_does():

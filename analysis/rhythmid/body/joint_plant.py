@@ -10,6 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.body import soft_constraint
 from rhythmid.body.body import Array
 from rhythmid.body.held_means import held_means
 from rhythmid.body.live_source import rows_of
@@ -63,6 +64,7 @@ class JointPlant:
         self._machine, self._period, self._step = machine, period_ns, step
         self._stepping = compile_machine(machine)
         self._model, self._data = machine.body.worker()
+        soft_constraint.put(self._model, machine.body.joints, machine.paths)
         first = np.zeros(1)
         earliest = min(float(physical_times(model, first)[0]) for model in machine.paths.values())
         self._begin = begin_of(0.0, earliest, step)

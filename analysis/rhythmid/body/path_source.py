@@ -3,7 +3,7 @@
 At the begin of a step every joint's path gives a force along it, which the step holds. Damping and friction, forces F(x, v) that
 oppose the motion, are coupled by their secant: with D = (F(x, 0) - F(x, v)) / v >= 0 the step takes F(x, 0) as force and D as the
 joint's damping, which MuJoCo integrates implicitly in the new velocity. So they stay stable however strong they are. Elements with
-states take one explicit step with their rates at its begin.
+states take one explicit step with their rates at its begin. A constraint is no part of a path here: MuJoCo has it, see `soft_constraint`.
 """
 
 from collections.abc import Mapping

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
+from rhythmid.body import soft_constraint
 from rhythmid.body.body import Array, Joint
 from rhythmid.body.held_means import held_means
 from rhythmid.body.machine import Machine
@@ -210,6 +211,7 @@ def run_steps(
     )
     forcings = np.column_stack([means((forcing or {}).get(j), begin, step, count) for j in names])
     model, data = machine.body.worker() if worker is None else worker
+    soft_constraint.put(model, machine.body.joints, machine.paths)
     pose, rate = _start(machine, start)
     data.qpos[:], data.qvel[:], data.time = pose, rate, begin
     data.qacc_warmstart[:] = 0.0

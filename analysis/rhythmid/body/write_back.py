@@ -1,8 +1,8 @@
 """A machine back into the body's own format: MJCF or URDF with the identified values in place.
 
-MJCF has masses, rotors' inertias, viscous damping, dry friction (a soft constraint there, a smooth law here), and an actuator for each
-path with the controller's gains, a lag and a delay; URDF has masses and the two losses. What a file cannot express is told by name. The
-MJCF holds the paths themselves, too: `rhythmid.mujoco.apply` makes them act in a loop of the user's own.
+MJCF has masses, rotors' inertias, viscous damping, dry friction (a soft constraint there; here a smooth law, or that constraint), and an
+actuator for each path with the controller's gains, a lag and a delay; URDF has masses and the two losses. What a file cannot express is
+told by name. The MJCF holds the paths themselves, too: `rhythmid.mujoco.apply` makes them act in a loop of the user's own.
 """
 
 import os
@@ -24,7 +24,7 @@ from rhythmid.output import write_text
 
 MJCF, URDF = ".xml", ".urdf"
 SMALL = 1e-3  # [m] radius of gyration of a payload in a URDF, which has no inertia of zero
-LOSSES = ("viscous_damper", "coulomb_friction")
+LOSSES = ("viscous_damper", "coulomb_friction", "soft_constraint_friction")
 KEPT = (
     "name",
     "class",
@@ -37,7 +37,7 @@ WRITTEN = {"ipos": "pos", "iquat": "quat", "inertia": "diaginertia"}  # of an in
 IN_PLACE = frozenset(
     (
         "inertia", "damping", "friction", "position_gain", "velocity_gain", "command_delay", "command_lag", "gain", "actuator_lag",
-        "actuator_delay", "effort_limit", "constant_force",
+        "actuator_delay", "effort_limit", "constant_force", "friction_transition", "friction_lead",
     )
 )  # fmt: skip
 
@@ -101,7 +101,7 @@ def mjcf_of(machine: Machine, folder: Path) -> str:
     for kind in (one for one, files in folders.items() if files):  # relative to the file that is written
         known = machine.body.path.resolve().parent / getattr(spec, kind)
         _section(root, "compiler").set(kind, os.path.relpath(known, folder.resolve()))
-    _values(root, machine)
+    _values(root, machine, step)
     if not machine.body.contacts:
         _section(_section(root, "option"), "flag").set("contact", "disable")
     _actuators(root, machine, step)
@@ -110,7 +110,7 @@ def mjcf_of(machine: Machine, folder: Path) -> str:
     return tree.tostring(root, encoding="unicode") + "\n"
 
 
-def _values(root: tree.Element, machine: Machine) -> None:
+def _values(root: tree.Element, machine: Machine, step: float) -> None:
     """Inertials and joints with all digits of the machine's values; MuJoCo itself writes fewer."""
     model, body = machine.body.model, machine.body
     world = _section(root, "worldbody")
@@ -125,8 +125,11 @@ def _values(root: tree.Element, machine: Machine) -> None:
         name = str(joint.get("name"))
         joint.set("armature", repr(float(model.dof_armature[body.joints[name].velocity])))
         if name in machine.paths:
-            for word, value in zip(("damping", "frictionloss"), losses_of(machine, name)):
-                joint.set(word, repr(value))
+            weight = float(model.dof_invweight0[body.joints[name].velocity])
+            described = _described(machine, name)
+            joint.set("damping", repr(described.damping))
+            for word, value in mjcf.friction(described, weight, step).items():
+                joint.set(word, value)
 
 
 def _section(root: tree.Element, name: str) -> tree.Element:

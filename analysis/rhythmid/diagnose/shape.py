@@ -98,7 +98,10 @@ def _met(known: Trajectories, element: Element) -> Path:
     elif element.slot == "command":
         paths = [replace(path, signal=command) for path, command in zip(paths, known.commands)]
     names = ("time", "position", "velocity", "effort", "leg", "signal")
-    return Path(*(np.concatenate([getattr(path, name) for path in paths]) for name in names))
+    met = Path(*(np.concatenate([getattr(path, name) for path in paths]) for name in names))
+    if element.acts != "constraint":
+        return met
+    return replace(met, acceleration=np.concatenate([path.slope for path in paths]))
 
 
 def _instants(met: Path, times: float) -> Path:
@@ -112,4 +115,5 @@ def _instants(met: Path, times: float) -> Path:
     return Path(
         np.linspace(met.time.min(), met.time.max(), INSTANTS),
         *(drawn(values) for values in (met.position, met.velocity, met.effort, met.leg, met.signal)),
+        acceleration=None if met.acceleration is None else drawn(met.acceleration),
     )

@@ -10,11 +10,15 @@ A file in `elements/<slot>/` defines one `ELEMENT`. Exactly one of these says wh
                force               (x, v, t, f, <parameters>, …)                         -> force on the mass
                force, `acts="transmission"`  (load, x, v, t, f, <parameters>, …)         -> force on the mass
                force, `acts="modifier"`      (leg, x, v, t, f, <parameters>, …)          -> new sum of the leg's forces
+               force, `acts="constraint"`    (acceleration, yielding, x, v, t, f, <parameters>, …) -> force on the mass
                force, `acts="drive"`         (t, <parameters>, …)                        -> added to f before the actuator
                sensor              (y, t, <parameters>, …)                               -> new y
              `acts` says which motion x and v are, where the input displaces the base: of the mass relative to the base
-             ("leg", the default, "transmission", "modifier", "transducer"), or in the room ("body"). "load" is the sum of
+             ("leg", the default, "transmission", "modifier", "constraint", "transducer"), or in the room ("body"). "load" is the sum of
              the forces on the mass but for the actuator's and for friction and damping: what a gear carries besides f.
+             A constraint's force depends on the acceleration that it takes part in: in a simulation it is given the `acceleration`
+             that there would be without it and the `yielding`, by which a unit of its force changes that; along a motion that was
+             measured the whole acceleration, and a yielding of 0.
              A kernel with states or memories returns (result, dstate/dt, …, new memory, …). It may use `math` and nothing
              else. A memory is what an operator (play, a limit of rate) remembers: it takes the kernel's new value
              where an integration step begins and where it ends, and keeps it between. `ELAPSED` is the time since it began.
@@ -40,7 +44,9 @@ STEP = "simulation.step"  # borrowed under this name: the largest integration st
 LONGEST_DEAD_TIME = 1.0  # [s] of an element with a history: what is kept of the past grows with it
 ELAPSED = "simulation.elapsed"  # borrowed under this name: the time [s] since the integration step began
 SLOTS: tuple[Slot, ...] = ("command", "actuator", "force", "sensor", "timing")
-Acts = Literal["body", "leg", "transmission", "modifier", "drive", "feedback", "observation", "transducer"]
+Acts = Literal[
+    "body", "leg", "transmission", "modifier", "constraint", "drive", "feedback", "observation", "transducer"
+]
 Against = Literal["base", "room"]
 DISSIPATIVE = ("friction", "damping")  # families whose forces are no load that a gear carries, but losses
 LEADING: Mapping[tuple[Slot, Acts], tuple[str, ...]] = {  # what a kernel is given before its parameters
@@ -53,6 +59,7 @@ LEADING: Mapping[tuple[Slot, Acts], tuple[str, ...]] = {  # what a kernel is giv
     ("force", "body"): ("x", "v", "t", "f"),
     ("force", "transmission"): ("load", "x", "v", "t", "f"),
     ("force", "modifier"): ("leg", "x", "v", "t", "f"),
+    ("force", "constraint"): ("acceleration", "yielding", "x", "v", "t", "f"),
     ("force", "drive"): ("t",),
     ("sensor", "leg"): ("y", "t"),
 }

@@ -24,6 +24,7 @@ class _Reading:
     control: Control = "force"
     back_emf: float = 0.0  # damping that a motor's back-EMF makes, as later gains scale it
     springs: int = 0
+    soft_friction: float = 0.0  # the part of the dry friction that is a constraint
 
     def get(self, name: str, absent: float = 0.0) -> float:
         return self.numbers.get(name, absent)
@@ -89,6 +90,10 @@ def _described(term: Term) -> str:
 def _finish(reading: _Reading) -> None:
     if reading.back_emf:
         reading.add("damping", reading.back_emf)
+    if reading.soft_friction and reading.get("friction") != reading.soft_friction:
+        reading.remarks.append(
+            "only nearly expressed: two dry frictions; both turn as the one that is a constraint does"
+        )
     curved = reading.get("quadratic_stiffness") or reading.get("cubic_stiffness")
     if curved and reading.springs > 1:
         reading.remarks.append(
@@ -148,6 +153,12 @@ def _falling_friction(reading: _Reading, term: Term, values: Values) -> None:
             values["static_ratio"] - 1.0
         )
     reading.nearly(term, "friction takes the force while sliding, and that at rest where the target has one")
+
+
+def _soft_friction(reading: _Reading, term: Term, values: Values) -> None:
+    reading.add("friction", values["force"])
+    reading.soft_friction = values["force"]
+    reading.numbers |= {"friction_transition": values["transition"], "friction_lead": values["lead"]}
 
 
 def _sum_into(name: str, parameter: str) -> Callable[[_Reading, Term, Values], None]:
@@ -226,6 +237,7 @@ READERS: Mapping[str, Callable[[_Reading, Term, Values], None]] = {
     "quadratic_damping": _sum_into("quadratic_damping", "coefficient"),
     "coulomb_friction": _sum_into("friction", "force"),
     "asymmetric_coulomb_friction": _asymmetric_friction,
+    "soft_constraint_friction": _soft_friction,
     "stribeck_friction": _falling_friction,
     "lugre_friction": _falling_friction,
     "input_delay": _sum_into("command_delay", "delay"),

@@ -12,6 +12,8 @@ NONLINEAR = frozenset(
     (
         "quadratic_damping",
         "friction",
+        "friction_transition",
+        "friction_lead",
         "static_friction",
         "quadratic_stiffness",
         "cubic_stiffness",

@@ -1,13 +1,14 @@
 """MuJoCo: an MJCF model with one body a joint, that loads as it is.
 
 Delays need MuJoCo 3.5, nonlinear springs and dampers 4.0; they are written only where the joint has them.
-`frictionloss` is a soft constraint: friction that creeps where the identified law sticks.
+`frictionloss` is a soft constraint: friction that creeps where another identified law sticks.
 """
 
 import math
 import xml.etree.ElementTree as tree
 from collections.abc import Sequence
 
+from rhythmid.body.soft_constraint import SoftConstraint
 from rhythmid.export.joint import Joint, number
 from rhythmid.export.link import link_of, world_gravity
 from rhythmid.export.xml_text import add, comment, document, vector
@@ -18,6 +19,7 @@ EXPRESSED = frozenset(
         "inertia", "gravity", "weight_moment", "hanging_position", "damping", "quadratic_damping", "friction", "stiffness",
         "spring_reference", "quadratic_stiffness", "cubic_stiffness", "constant_force", "position_gain", "velocity_gain",
         "command_delay", "command_lag", "gain", "actuator_lag", "actuator_delay", "effort_limit", "measurement_delay",
+        "friction_transition", "friction_lead",
     )
 )  # fmt: skip
 
@@ -51,7 +53,7 @@ def _body(world: tree.Element, joint: Joint) -> None:
         f"inertia {joint.inertia:.6g} {joint.unit('inertia')} is link and rotor together: in a robot whose link has an inertia of "
         "its own, write the difference as armature of the joint",
     )
-    if joint.friction:
+    if joint.friction and not joint.friction_transition:
         comment(
             body,
             "frictionloss is a soft constraint: at rest it creeps, where the identified friction holds or turns smoothly",
@@ -64,13 +66,23 @@ def _body(world: tree.Element, joint: Joint) -> None:
         "axis": vector(link.axis),
         "armature": number(0.0),
         "damping": _polynomial(joint.damping, joint.quadratic_damping),
-        "frictionloss": number(joint.friction),
+        **friction(joint, 1.0 / joint.inertia),
         "stiffness": _polynomial(joint.stiffness, joint.quadratic_stiffness, joint.cubic_stiffness),
         "springref": number(joint.spring_reference),
     }
     add(body, "joint", **attributes)
     inertia = vector((link.inertia,) * 3)
     add(body, "inertial", pos=vector(link.centre), mass=number(link.mass), diaginertia=inertia)
+
+
+def friction(joint: Joint, weight: float, step: float = TIMESTEP) -> dict[str, str]:
+    """Attributes of a joint's dry friction; `weight` is its inverse inertia [1/kg or 1/(kg*m^2)] in MuJoCo's reference pose."""
+    words = {"frictionloss": number(joint.friction)}
+    if joint.friction_transition:
+        soft = SoftConstraint(joint.friction, joint.friction_transition, joint.friction_lead)
+        reference, impedance = soft.solver(weight, step)
+        words |= {"solreffriction": vector(reference), "solimpfriction": vector(impedance)}
+    return words
 
 
 def _polynomial(linear: float, *higher: float) -> str:

@@ -19,6 +19,8 @@ from rhythmid.simulation.kernel_source import kernel_module
 from rhythmid.simulation.machine_code import Module, load_run
 
 Array = NDArray[np.float64]
+# what the kernel of an element that acts so is given of a path besides the usual
+FURTHER = {"transmission": ("load",), "constraint": ("acceleration",)}
 MAX_STEP = 2.5e-4  # [s] for the element's own states; what it remembers takes one step a sample
 
 
@@ -26,7 +28,7 @@ MAX_STEP = 2.5e-4  # [s] for the element's own states; what it remembers takes o
 class Path:
     """A trajectory: arrays (n,) of time [s], position, velocity, actuator force, leg force, and the signal that enters
     a command, actuator or sensor element. `load` is the load that a gear carries besides the actuator force; where it is
-    not given, the model's own forces along the path make it up."""
+    not given, the model's own forces along the path make it up. Where no `acceleration` is given, the velocity tells it."""
 
     time: Array
     position: Array
@@ -35,6 +37,12 @@ class Path:
     leg: Array
     signal: Array
     load: Array | None = None
+    acceleration: Array | None = None
+
+    @property
+    def slope(self) -> Array:
+        """The acceleration (n,)."""
+        return np.gradient(self.velocity, self.time) if self.acceleration is None else self.acceleration
 
 
 def _module(element: Element) -> Module:
@@ -51,7 +59,7 @@ def _module(element: Element) -> Module:
         arguments, change = list(names), "value - leg" if element.acts == "modifier" else "value"
     else:
         arguments, change = ["z" if name == signal else name for name in names], "value - z"
-    rows = ["x", "v", "f", "leg", "z", *(["load"] if element.acts == "transmission" else [])]
+    rows = ["x", "v", "f", "leg", "z", *FURTHER.get(element.acts, ())]
 
     def call(at: str, number: int, states: list[str], elapsed: str) -> list[str]:
         sets = "; ".join(f"{name} = {name}0 + {at} * ({name}1 - {name}0)" for name in rows)
@@ -111,6 +119,7 @@ def _module(element: Element) -> Module:
             '      cache=True, nogil=True, error_model="numpy")',
             "def run(time, path, parameters, states, max_step, out):",
             *(f"    {name} = parameters[{i}]" for i, name in enumerate(p)),
+            *(["    yielding = 0.0"] if element.acts == "constraint" else []),
             *(f"    {name} = states[{i}]" for i, name in enumerate(s)),
             *(f"    {line}" for line in start),
             "    for k in range(1, time.shape[0]):",
@@ -183,6 +192,8 @@ def effect_along(
     known = [path.position, path.velocity, path.effort, path.leg, path.signal]
     if element.acts == "transmission":
         known.append(load_along(model, path))
+    elif element.acts == "constraint":
+        known.append(path.slope)
     rows = np.ascontiguousarray(np.vstack(known), dtype=float)
     out = np.empty(len(path.time))
     _run_of(element)(

@@ -164,15 +164,33 @@ def _right_hand_side(terms: tuple[Term, ...], variant: Variant) -> _Writer:
                 writer.lines.append("load = load + part")
     for term in (term for term in force if term.element.acts == "modifier"):
         writer.call(term, ["leg", *relative, "t", "f"], "leg")
-    writer.lines.append(
-        "absolute = (f + leg + body + d) / p0" if disturbed else "absolute = (f + leg + body) / p0"
-    )
+    total = "f + leg + body + d" if disturbed else "f + leg + body"
+    constraints = [term for term in force if term.element.acts == "constraint"]
+    _refuse_constraints(constraints, excited)
+    for term in constraints:
+        free = f"({total}) / p0 - u" if excited == "base_acceleration" else f"({total}) / p0"
+        writer.call(term, [free, "1.0 / p0", *relative, "t", "f"], "part")
+        writer.lines.append("body = body + part")
+    writer.lines.append(f"absolute = ({total}) / p0")
     writer.lines.append(
         {"position": "y = s0", "velocity": "y = s1", "acceleration": "y = absolute"}[variant.measured]
     )
     for term in (term for term in kernels if term.element.slot == "sensor"):
         writer.call(term, ["y", "t"], "y")
     return writer
+
+
+def _refuse_constraints(constraints: list[Term], excited: InputKind) -> None:
+    """Raise InputError for constraints whose acceleration is not known: of a base that moves, and of two that share it."""
+    if len(constraints) > 1:
+        raise InputError(
+            f"{constraints[0].label!r} and {constraints[1].label!r} both depend on the acceleration that both change; leave out one"
+        )
+    if constraints and excited == "base_displacement":
+        raise InputError(
+            f"element {constraints[0].label!r} depends on the acceleration relative to the base, which a base's displacement does "
+            "not tell; give its acceleration"
+        )
 
 
 def _indent(lines: list[str], depth: int) -> str:

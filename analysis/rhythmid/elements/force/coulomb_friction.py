@@ -39,6 +39,7 @@ ELEMENT = Element(
         "lugre_friction",
         "elastoplastic_hysteresis",
         "bouc_wen_hysteresis",
+        "soft_constraint_friction",
     ),
     confusable={
         "viscous_damper": "one amplitude only: Coulomb's apparent damping falls as 1/amplitude",
@@ -47,6 +48,7 @@ ELEMENT = Element(
         "bouc_wen_hysteresis": "differ before sliding: small slow reversals",
         "load_dependent_friction": "same at constant load: vary the actuator force",
         "transmitted_load_friction": "same at constant load: vary the load",
+        "soft_constraint_friction": "differ at reversals alone, by the lead: reverse with a large acceleration",
     },
     switches=("v", ""),
     reference="B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, Automatica 30(7), 1994, 1083-1138",

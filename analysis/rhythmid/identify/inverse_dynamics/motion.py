@@ -78,7 +78,8 @@ class Motion:
             (self.leg_position, self.leg_velocity) if of_leg else (self.position, self.velocity)
         )
         load = None if self.coupling is None else -self.coupling
-        return Path(self.time, position, velocity, effort, leg, signal, load)
+        acceleration = self.acceleration if velocity is self.velocity else None
+        return Path(self.time, position, velocity, effort, leg, signal, load, acceleration)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,55 @@
+"""Friction that is a constraint, in MuJoCo's words: `frictionloss` with the solver's parameters that make it the identified law.
+
+MuJoCo asks a joint with dry friction for the acceleration −b v and lets the force −(a + b v) / R grow no further than the friction loss.
+b = 2 / (d timeconst), R = (1 − d) w / d: w is the joint's `dof_invweight0`, and d is here the same for all violations. F = −clip(F_c (v + τ a) /
+v_t, ±F_c) follows with 1 / b = τ and R = v_t / (F_c τ).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rhythmid.body.body import Joint
+from rhythmid.errors import InputError
+from rhythmid.model import Model, Term
+
+NAME = "soft_constraint_friction"
+LEAST_IMPEDANCE, MOST_IMPEDANCE = 1e-4, 0.9999  # mjMINIMP, mjMAXIMP: MuJoCo clips d to these
+CRITICAL = 1.0  # damping ratio, which no friction uses: a friction has no position to return to
+
+
+@dataclass(frozen=True)
+class SoftConstraint:
+    """Dry friction of a joint: force F_c [N or N*m], transition v_t [m/s or rad/s] and lead τ [s]."""
+
+    force: float
+    transition: float
+    lead: float
+
+    @classmethod
+    def of(cls, term: Term) -> "SoftConstraint":
+        """The friction of a term."""
+        return cls(*(term.values[name].value for name in ("force", "transition", "lead")))
+
+    def solver(self, weight: float, step: float) -> tuple[tuple[float, float], tuple[float, float]]:
+        """MuJoCo's `solref` and the first two numbers of its `solimp`, for a joint of this `dof_invweight0` and steps [s] as long as
+        these, which no lead is shorter than."""
+        lead = max(self.lead, step)
+        stiff = self.force * lead * weight
+        impedance = stiff / (stiff + self.transition) if stiff > 0.0 else LEAST_IMPEDANCE
+        impedance = min(max(impedance, LEAST_IMPEDANCE), MOST_IMPEDANCE)
+        return (2.0 * lead / impedance, CRITICAL), (impedance, impedance)
+
+
+def put(model: Any, joints: Mapping[str, Joint], paths: Mapping[str, Model]) -> None:
+    """Give MuJoCo's model the dry friction that paths have as constraints. Raises InputError for another constraint, which it lacks."""
+    for name, path in paths.items():
+        for term in (one for one in path.terms if one.element.acts == "constraint"):
+            if term.element.name != NAME:
+                raise InputError(
+                    f"{name}: {term.label} is a constraint that MuJoCo, which steps the body, does not have"
+                )
+            place, friction = joints[name].velocity, SoftConstraint.of(term)
+            weight, step = float(model.dof_invweight0[place]), float(model.opt.timestep)
+            model.dof_frictionloss[place] = friction.force
+            model.dof_solref[place], model.dof_solimp[place, :2] = friction.solver(weight, step)
