@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.signal import correlate
 from scipy.stats import norm
 
-from rhythmid.record.quality import resolution
 from rhythmid.record.record import Record
+from rhythmid.record.rounding import resolution
 
 Array = NDArray[np.float64]
 LEAST_SAMPLES = 200  # of fewer an autocorrelation of 0.2 is within what chance makes
