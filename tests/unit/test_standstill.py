@@ -1,10 +1,14 @@
 """A machine that stands still is told from one that moves by little, and from one that noise drives."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from rhythmid.record.bag_report import quality_report
 from rhythmid.record.record import Channel, Record
 from rhythmid.record.standstill import standstill
+from rhythmid.start.start import start
 
 COUNT = 4000
 TIME = np.arange(COUNT) * 0.0025
@@ -65,3 +69,19 @@ def test_a_lone_blow_in_noise_is_a_motion() -> None:
 
 def test_too_few_samples_tell_nothing() -> None:
     assert standstill(Record("run", Channel(TIME[:50], noise()[:50], "rad"))) is None
+
+
+def test_check_and_init_say_in_one_line_that_the_machine_stands_still(tmp_path: Path) -> None:
+    table = tmp_path / "rest.csv"
+    angle = STEP * np.round(averaged(3.0 * noise(), 4))
+    columns = np.column_stack([TIME, angle, np.round(noise(2), 2)])
+    np.savetxt(table, columns, delimiter=",", header="t,angle,torque", comments="", fmt="%.12g")
+    begun = start([table])
+    (said,) = [line for line in begun.lines() if "stands still" in line]
+    assert said.startswith("CHECK output: ") and "record it while it moves" in said
+    assert "stands still" in begun.signals
+    signals = tmp_path / "signals.yaml"
+    signals.write_text(begun.signals)
+    report = quality_report(table, signals)
+    assert report.usable and [note for note in report.notes if "stands still" in note]
+    assert not any(line.endswith("flawless") for line in report.lines())

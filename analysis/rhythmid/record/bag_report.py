@@ -22,6 +22,7 @@ from rhythmid.record.quality import ChannelQuality
 from rhythmid.record.read import read_record
 from rhythmid.record.record import Record
 from rhythmid.record.signals import Signals
+from rhythmid.record.standstill import standstill
 from rhythmid.record.timing import Timing
 
 MEGABYTE = 1e6  # bytes; what is smaller is told in kB
@@ -191,6 +192,8 @@ def quality_report(
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             notes += [note for note in one.quality.notes if note not in notes]
             notes += [f"{begin}{note}" for note in copy_notes(one)]
+            if begin and (still := standstill(one)) is not None:
+                notes.append(f"{begin}output: {still}")
         duration = max(one.duration for one in parts.values())
     except InputError as error:
         if not is_bag(source) or not source.exists():
@@ -201,6 +204,8 @@ def quality_report(
             clean = cleaned(record)
             left_out, cut = clean.left_out, cut_at_gaps(clean.record)
             notes += [*clean.notes, *cut.notes]
+            if (still := standstill(clean.record)) is not None:
+                notes.append(f"output: {still}")
         except InputError as error:
             problems.append(str(error))
     if not is_bag(source):
