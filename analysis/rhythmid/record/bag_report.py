@@ -24,6 +24,7 @@ from rhythmid.record.record import Record
 from rhythmid.record.signals import Signals
 from rhythmid.record.standstill import standstill
 from rhythmid.record.timing import Timing
+from rhythmid.record.two_clocks import read_clock_notes
 
 MEGABYTE = 1e6  # bytes; what is smaller is told in kB
 
@@ -188,6 +189,7 @@ def quality_report(
             parts = {"": record}
             named = Signals.load(source) if source.suffix in (".yaml", ".yml") else signals
             notes += [] if named is None else read_length_notes(source, named)
+            notes += [] if named is None else read_clock_notes(source, named)
         for begin, one in parts.items():
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             notes += [note for note in one.quality.notes if note not in notes]
