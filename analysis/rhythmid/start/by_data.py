@@ -13,6 +13,7 @@ from rhythmid.start.meaning import (
     differ_in_number,
     letter_of,
     meaning_of,
+    of_one_array,
     poses,
     says_that_it_drives,
 )
@@ -74,7 +75,7 @@ def output_by_data(able: list[Known], known: list[Known], place: str) -> tuple[C
 
 def by_data(one: Known, output: Recorded, measured: Quantity, velocity: Choice | None) -> Known:
     """What a command without a quantity asks for: what it comes closest to."""
-    if one.quantity is not None:
+    if one.quantity is not None or of_one_array(one.one, output):
         return one
     targets: list[tuple[Quantity, Recorded]] = [(measured, output)]
     if velocity is not None:
