@@ -25,6 +25,7 @@ from rhythmid.record.signals import Signals
 from rhythmid.record.standstill import standstill
 from rhythmid.record.timing import Timing
 from rhythmid.record.two_clocks import read_clock_notes
+from rhythmid.record.unsigned import unsigned_notes
 
 MEGABYTE = 1e6  # bytes; what is smaller is told in kB
 
@@ -193,7 +194,7 @@ def quality_report(
         for begin, one in parts.items():
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             notes += [note for note in one.quality.notes if note not in notes]
-            notes += [f"{begin}{note}" for note in copy_notes(one)]
+            notes += [f"{begin}{note}" for note in (*copy_notes(one), *unsigned_notes(one))]
             if begin and (still := standstill(one)) is not None:
                 notes.append(f"{begin}output: {still}")
         duration = max(one.duration for one in parts.values())

@@ -20,6 +20,7 @@ from rhythmid.start.meaning import Quantity, is_ignored, is_lone_v, meaning_of, 
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along
 from rhythmid.start.step_before import BEFORE, step_before
 from rhythmid.start.unnamed_reference import with_reference
+from rhythmid.start.unsigned_effort import without_unsigned
 
 INTEGRAL = 0.9  # correlation from which a position and a velocity belong together
 MEASURED: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
@@ -77,6 +78,8 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
         rest = [one for one in rest if one.one is not velocity.recorded]
     rest = [_voltage(one, output.recorded, measured) for one in rest]
     rest, copies, told = _without_copies(rest, output.recorded)
+    notes += told
+    rest, told = without_unsigned(rest, output.recorded, measured)
     notes += told
     rest = [by_data(one, output.recorded, measured, velocity) for one in rest]
     more, kind, reference_of = drivers(rest, output.recorded, measured, ask)
