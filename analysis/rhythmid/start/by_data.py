@@ -17,6 +17,7 @@ from rhythmid.start.meaning import (
     poses,
     says_that_it_drives,
 )
+from rhythmid.start.no_motion import no_motion
 from rhythmid.start.relation import GOES_ALONG, HARDLY, RATIO, coherent, derivative, drives, follows, predicts
 
 SURE_INTEGRAL = (
@@ -34,9 +35,7 @@ def output_by_data(able: list[Known], known: list[Known], place: str) -> tuple[C
             known[0].taken_for("position")
         ]
     if not able:
-        raise InputError(
-            f"{place}: no position, velocity or acceleration is measured; write signals.yaml by hand"
-        )
+        raise InputError(f"{place}: {no_motion(known)}")
     for first in able:
         for second in able:
             if first is second:
