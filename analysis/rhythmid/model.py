@@ -16,7 +16,7 @@ from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.elements.element import SLOTS, Against, Element, Parameter
 from rhythmid.errors import InputError
 from rhythmid.output import write_text
-from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
+from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
 from rhythmid.validation import validated
 from rhythmid.value import Value, entry_of, value_of
 
@@ -280,7 +280,7 @@ def _units(document: dict[str, Node], mass: Node) -> Units:
     if "units" in document:
         given = validated(document["units"], _UNIT_NAMES)
         default = (
-            "kg" if (given.force, given.position) == ("N", "m") else f"{given.force}*s^2/{given.position}"
+            "kg" if (given.force, given.position) == ("N", "m") else mass_unit(given.force, given.position)
         )
         return Units(given.force, given.position, default if given.mass is None else given.mass)
     unit = str(mass.at("unit").value) if isinstance(mass.value, dict) and "unit" in mass.value else ""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from rhythmid.errors import InputError
+from rhythmid.unit_powers import reduced
 
 
 @lru_cache(maxsize=1)
@@ -21,7 +22,7 @@ def _registry():
 def _plain(unit: str) -> str:
     unit = unit.strip().replace("·", "*").replace("**", "^").replace("²", "^2").replace("³", "^3")
     unit = re.sub(r"(?<=[\w)]) +(?=[\w(])", "*", unit).replace(" ", "")  # N s/m is N*s/m
-    return "1" if unit in ("", "-", "1") else unit
+    return "1" if unit in ("", "-", "1") else reduced(unit)
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Units:
             whole = f"({given})" if (divided or power) and re.search(r"[*/^]", given) else given
             return divided + whole + power
 
-        return re.sub(r"(/?)([A-Za-z]+)(\^?)", one, unit)
+        return reduced(re.sub(r"(/?)([A-Za-z]+)(\^?)", one, unit))
 
     def check(self, given: str, expected: str, where: str) -> None:
         """Raise InputError unless `given` is the unit that this machine uses for `expected`."""
@@ -62,6 +63,11 @@ class Units:
             raise InputError(f"{problem}: they measure different things")
         if abs(factor - 1.0) > 1e-12:
             raise InputError(f"{problem}: write the value in {wanted} (multiply it by {factor:.6g})")
+
+
+def mass_unit(force: str, position: str) -> str:
+    """The unit of an inertia: of the force over that of an acceleration."""
+    return reduced(f"{force}*s^2/{position}")
 
 
 TRANSLATIONAL = Units()

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rhythmid.record.outlier import outlying_samples, repeated_samples
-from rhythmid.record.quality import clipped_samples, resolution
+from rhythmid.record.quality import clipped_samples
+from rhythmid.record.rounding import resolution
 
 seeds = st.integers(0, 10_000)
 TIME = 1e-3 * np.arange(5000)

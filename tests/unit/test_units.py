@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, strategies
 
 from rhythmid.errors import InputError
-from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
+from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
 
 
 @pytest.mark.parametrize("spelling", ["N*s/m", "N s/m", "N·s/m", " N * s / m ", "kg/s", "N*s*m^-1"])
@@ -57,3 +57,21 @@ def test_no_text_at_all_gets_more_than_one_line_of_refusal(text):
         TRANSLATIONAL.check(text, "N/m", "here")
     except InputError as refused:
         assert "\n" not in str(refused)
+
+
+@pytest.mark.parametrize(
+    ("force", "position", "unit"),
+    [
+        ("rad/s^2", "rad", "1"), ("m/s^2", "m", "1"), ("V", "px", "V*s^2/px"), ("N*m", "rad", "N*m*s^2/rad"),
+        ("rad/s", "rad", "s"), ("N*m/(rad*s)", "rad", "N*m*s/rad^2"), ("N (raw)", "m", "N (raw)*s^2/m"),
+    ],
+)  # fmt: skip
+def test_the_unit_of_an_inertia_has_each_unit_once(force, position, unit):
+    assert mass_unit(force, position) == unit
+
+
+def test_units_per_inertia_are_reduced_and_both_spellings_are_taken():
+    units = Units("rad/s^2", "rad", "1")
+    assert units.of("N/m") == "1/s^2" and units.of("N*s/m") == "1/s"
+    units.check("(rad/s^2)/rad", "N/m", "here")
+    units.check("1/s^2", "N/m", "here")

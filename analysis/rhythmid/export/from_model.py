@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from rhythmid.errors import InputError
 from rhythmid.export.joint import Control, Joint
 from rhythmid.model import Model, Term
-from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
+from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")  # what all targets take as a name
 Values = Mapping[str, float]
@@ -74,7 +74,7 @@ def _si(units: Units) -> bool:
     """Whether units are SI, whatever name the inertia's goes by."""
     known = {(one.force, one.position): one for one in (TRANSLATIONAL, ROTATIONAL)}
     one = known.get((units.force, units.position))
-    return one is not None and units.mass in (one.mass, f"{one.force}*s^2/{one.position}")
+    return one is not None and units.mass in (one.mass, mass_unit(one.force, one.position))
 
 
 def _described(term: Term) -> str:

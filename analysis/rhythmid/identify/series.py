@@ -17,8 +17,8 @@ from rhythmid.errors import InputError
 from rhythmid.identify.inputs import Inputs, Pieces
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.spread import relative_spreads
-from rhythmid.record.quality import resolution
 from rhythmid.record.record import Record
+from rhythmid.record.rounding import resolution
 from rhythmid.record.timing import nominal_period
 from rhythmid.simulation.generated_source import InputKind, OutputKind
 from rhythmid.simulation.signal import continuous, fast_length, spline

@@ -22,7 +22,10 @@ from rhythmid.record.quality import ChannelQuality
 from rhythmid.record.read import read_record
 from rhythmid.record.record import Record
 from rhythmid.record.signals import Signals
+from rhythmid.record.standstill import standstill
 from rhythmid.record.timing import Timing
+from rhythmid.record.two_clocks import read_clock_notes
+from rhythmid.record.unsigned import unsigned_notes
 
 MEGABYTE = 1e6  # bytes; what is smaller is told in kB
 
@@ -187,10 +190,13 @@ def quality_report(
             parts = {"": record}
             named = Signals.load(source) if source.suffix in (".yaml", ".yml") else signals
             notes += [] if named is None else read_length_notes(source, named)
+            notes += [] if named is None else read_clock_notes(source, named)
         for begin, one in parts.items():
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             notes += [note for note in one.quality.notes if note not in notes]
-            notes += [f"{begin}{note}" for note in copy_notes(one)]
+            notes += [f"{begin}{note}" for note in (*copy_notes(one), *unsigned_notes(one))]
+            if begin and (still := standstill(one)) is not None:
+                notes.append(f"{begin}output: {still}")
         duration = max(one.duration for one in parts.values())
     except InputError as error:
         if not is_bag(source) or not source.exists():
@@ -201,6 +207,8 @@ def quality_report(
             clean = cleaned(record)
             left_out, cut = clean.left_out, cut_at_gaps(clean.record)
             notes += [*clean.notes, *cut.notes]
+            if (still := standstill(clean.record)) is not None:
+                notes.append(f"output: {still}")
         except InputError as error:
             problems.append(str(error))
     if not is_bag(source):

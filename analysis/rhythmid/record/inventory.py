@@ -24,6 +24,7 @@ from rhythmid.record.other_lengths import length_notes, unequal_arrays
 from rhythmid.record.signals import Clock
 from rhythmid.record.table import SUFFIXES, WIDEST, Table, table_suffix
 from rhythmid.record.table_clock import COUNTER, is_even, is_time, table_clock
+from rhythmid.record.two_clocks import clock_notes, trusted_clock
 
 Array = NDArray[np.float64]
 OBJECTS = (
@@ -130,11 +131,15 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
     count = _rows_of(columns)
     unequal = [(name, value) for name, value in columns if len(value) != count]
     columns = [(name, value) for name, value in columns if len(value) == count]
+    notes = length_notes(table, count)
     if rate is not None:
         clock, reason, every = Clock("rate", rate=rate), "as given with --rate", np.arange(count) / rate
     else:
         clock, reason = table_clock(table.path, columns, unequal)
+        if is_time(str(clock.column), dict(columns)[str(clock.column)]):
+            clock, reason = trusted_clock(columns, clock, reason)
         every = dict(columns)[str(clock.column)] * clock.scale
+        notes += clock_notes(columns, str(clock.column), every)
     found, constant = [], []
     left = [f"{name}: holds words, such as {word!r}" for name, word in table.words()]
     left += map(str, unequal_arrays(table, count))
@@ -162,7 +167,6 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
             constant.append(one)
         else:
             found.append(one)
-    notes = length_notes(table, count)
     return Inventory(table.path, tuple(found), clock, reason, tuple(left), tuple(constant), notes)
 
 

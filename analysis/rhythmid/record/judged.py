@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.record.clock_skew import clock_skew
-from rhythmid.record.quality import ChannelQuality, clipped, resolution
+from rhythmid.record.quality import ChannelQuality, clipped
+from rhythmid.record.rounding import shown_resolution
 from rhythmid.record.stamp_jitter import stamp_jitter
 from rhythmid.record.timing import Timing
 
@@ -50,5 +51,5 @@ def judged(
         skew_std=None if skew is None else skew.std,
         stamp_jitter=None if jitter is None else jitter.std,
         stamp_jitter_std=None if jitter is None else jitter.uncertainty,
-        resolution=resolution(present),
+        resolution=shown_resolution(present),
     )

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from rhythmid.record.quality import clipped_samples, resolution
+from rhythmid.record.quality import clipped_samples
+from rhythmid.record.rounding import resolution, resolutions
 
 WIDEST = 3  # samples in a row that may be outliers
 FAR_OFF = 12.0  # times the usual unevenness, from which a sample is suspected
@@ -36,7 +37,7 @@ def outlying_samples(value: Array) -> Mask:
         return found
     uneven = np.abs(value[1:-1] - 0.5 * (value[:-2] + value[2:]))
     usual = USUAL * np.maximum(median_filter(uneven, NEAR), np.median(uneven))
-    limit = FAR_OFF * np.maximum(np.concatenate([usual[:1], usual, usual[-1:]]), resolution(value))
+    limit = FAR_OFF * np.maximum(np.concatenate([usual[:1], usual, usual[-1:]]), resolutions(value))
     for width in range(1, WIDEST + 1):
         first = np.arange(2, len(value) - width - 1)  # between two good samples on either side
         last = first + width

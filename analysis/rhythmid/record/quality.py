@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.record.rounding import resolution
 from rhythmid.record.timing import Timing
 
 # of the usual step (rms), from which the steps beside a plateau are those of a machine that goes on: a sine that is cut off at
 # 99 % of its size has 0.2 there, one that comes to rest has none
 MOVING = 0.05
-ROUNDED = 0.97  # share of samples on a grid, from which a channel is rounded: some drivers mix in values of another source
-LEVELS = 8  # values that occur more than once, below which they make no grid
 CLIPPED_RUN = 4  # samples in a row at the extreme value
-HAIR = 1e-7  # of a signal's range, what lies nearer together than this is one value
 CLIPPED_EXCESS = 5  # times as many samples in such runs as at the next value
 
 
@@ -38,7 +36,8 @@ class ChannelQuality:
         None where it cannot be seen. See `clock_skew`.
     stamp_jitter, stamp_jitter_std : standard deviation of the jitter of the stamps that the samples themselves show [s], and how well
         that is known [s] (a standard deviation); None where they show none. See `stamp_jitter`.
-    resolution : step of the grid that its values are rounded to, in its unit; 0 where they lie on none.
+    resolution : step of the grid that its values are rounded to, the coarsest where it depends on their size, in its unit; 0 where they
+        show none.
     """
 
     source: str
@@ -169,34 +168,6 @@ def clipped_samples(value: NDArray[np.float64]) -> NDArray[np.bool_]:
     if len(value) < CLIPPED_RUN:
         return np.zeros(len(value), dtype=bool)
     return _at_limit(value) | _at_limit(-value)
-
-
-def resolution(value: NDArray[np.float64]) -> float:
-    """Step of the grid that 97 % of the values (n,) at least were rounded to, in their unit; 0 where they lie on none."""
-    levels, count = np.unique(value, return_counts=True)
-    step, on_grid = _grid(levels, float(np.ptp(value))) if len(value) else (0.0, np.empty(0))
-    if step == 0.0 or on_grid.mean() > 0.99:
-        return step
-    common = levels[count > 1]  # a value that was not rounded hardly comes twice
-    if len(common) < LEVELS:
-        return 0.0
-    step, on_grid = _grid(common, np.ptp(value))
-    if step == 0.0:
-        return 0.0
-    away = (value - common[np.argmax(count[count > 1])]) / step
-    hit = np.abs(away - np.round(away)) < 0.05
-    return step if on_grid.mean() > 0.99 and hit.mean() > ROUNDED else 0.0
-
-
-def _grid(levels: NDArray[np.float64], span: float) -> tuple[float, NDArray[np.bool_]]:
-    """Step of the grid that distinct levels (n,) seem to lie on, 0 without any, and which steps between them are multiples of it."""
-    steps = np.diff(levels)
-    steps = steps[steps > HAIR * span]  # finer ones are the representation of numbers
-    if len(steps) == 0:
-        return 0.0, np.empty(0, dtype=bool)
-    step = float(np.median(steps[steps < 1.5 * steps.min()]))
-    multiples = steps / step
-    return step, np.abs(multiples - np.round(multiples)) < 0.05
 
 
 def _at_limit(value: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.record.quality import resolution
+from rhythmid.record.rounding import resolution
 from rhythmid.record.timing import GAP, nominal_period
 
 Array = NDArray[np.float64]

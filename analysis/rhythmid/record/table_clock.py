@@ -88,11 +88,7 @@ def table_clock(
         columns, key=lambda column: (not _is_plain_time(column[0]), _is_coarse(column[1]))
     ):
         if is_time(name, value):
-            heading = heading_of(name)
-            scale, why = heading.scale, f"its heading says {heading.written}" if heading.unit else ""
-            if not why:
-                scale, why = _guessed_scale(value)
-            return Clock("column", column=name, scale=scale), f"called a time, and goes forward; {why}"
+            return named_clock(name, value)
     for name, value in columns:
         untold = COUNTER.fullmatch(name) is None and not heading_of(name).unit
         if untold and is_even(value):
@@ -113,6 +109,15 @@ def table_clock(
     raise InputError(
         f"{path}: no column goes forward like a time ({names}){why}; give the rows' rate with --rate HZ"
     )
+
+
+def named_clock(name: str, value: Array) -> tuple[Clock, str]:
+    """The clock that a column is which is called a time and goes forward, and why."""
+    heading = heading_of(name)
+    scale, why = heading.scale, f"its heading says {heading.written}" if heading.unit else ""
+    if not why:
+        scale, why = _guessed_scale(value)
+    return Clock("column", column=name, scale=scale), f"called a time, and goes forward; {why}"
 
 
 def _guessed_scale(value: Array) -> tuple[float, str]:

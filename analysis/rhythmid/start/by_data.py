@@ -13,9 +13,11 @@ from rhythmid.start.meaning import (
     differ_in_number,
     letter_of,
     meaning_of,
+    of_one_array,
     poses,
     says_that_it_drives,
 )
+from rhythmid.start.no_motion import no_motion
 from rhythmid.start.relation import GOES_ALONG, HARDLY, RATIO, coherent, derivative, drives, follows, predicts
 
 SURE_INTEGRAL = (
@@ -33,9 +35,7 @@ def output_by_data(able: list[Known], known: list[Known], place: str) -> tuple[C
             known[0].taken_for("position")
         ]
     if not able:
-        raise InputError(
-            f"{place}: no position, velocity or acceleration is measured; write signals.yaml by hand"
-        )
+        raise InputError(f"{place}: {no_motion(known)}")
     for first in able:
         for second in able:
             if first is second:
@@ -74,7 +74,7 @@ def output_by_data(able: list[Known], known: list[Known], place: str) -> tuple[C
 
 def by_data(one: Known, output: Recorded, measured: Quantity, velocity: Choice | None) -> Known:
     """What a command without a quantity asks for: what it comes closest to."""
-    if one.quantity is not None:
+    if one.quantity is not None or of_one_array(one.one, output):
         return one
     targets: list[tuple[Quantity, Recorded]] = [(measured, output)]
     if velocity is not None:

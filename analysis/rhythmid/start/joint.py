@@ -7,7 +7,7 @@ import numpy as np
 
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Recorded
-from rhythmid.start.meaning import Meaning, Quantity, words_of
+from rhythmid.start.meaning import Meaning, Quantity, same_joint, words_of
 
 CLOSE = 0.7  # of the motion of the joint that moves most, from which another one is worth a question
 
@@ -54,6 +54,11 @@ def joint_of(
             motion = {meaning.joint: 0.0 for _, meaning in _measured(still, quantity)}
             for one, meaning in able:
                 motion[meaning.joint] = max(motion.get(meaning.joint, 0.0), float(np.nanstd(one.value)))
+    if not motion:
+        motion = _motion_of_untold(known, still)
+    if wanted is not None and wanted not in motion:
+        called = [name for name in motion if same_joint(name, wanted)]
+        wanted = called[0] if len(called) == 1 else wanted
     if wanted is not None and motion.get(wanted) == 0.0:
         raise InputError(f"{place}: joint {wanted!r} stands still")
     if wanted is not None:
@@ -68,6 +73,21 @@ def joint_of(
     close = [name for name in ranked if motion[name] >= CLOSE * motion[ranked[0]]]
     number = ask("Which joint is looked at?", close) if len(close) > 1 else 0
     return Joint(close[number], motion)
+
+
+def _motion_of_untold(
+    known: Sequence[tuple[Recorded, Meaning]], still: Sequence[tuple[Recorded, Meaning]]
+) -> dict[str, float]:
+    """How much joints moved of which no name says a quantity, such as FR_2_actual beside FR_2_target: what a controller is asked for and
+    measures of every joint is its motion."""
+    asked = {meaning.joint for _, meaning in (*known, *still) if meaning.commanded is True}
+    motion: dict[str, float] = {}
+    for one, meaning in (*known, *still):
+        told = meaning.quantity is not None or meaning.commanded is not False
+        if told or not meaning.joint or meaning.joint[0] == "#" or meaning.joint not in asked:
+            continue
+        motion[meaning.joint] = max(motion.get(meaning.joint, 0.0), float(np.nanstd(one.value)))
+    return motion if len(motion) > 1 else {}
 
 
 def _measured(

@@ -39,8 +39,11 @@ COMMANDED = frozenset(
     "request requested".split()
 )
 COMMANDED_LETTERS = frozenset("u r".split())
+COMMANDED_COLUMNS = frozenset(
+    "action actions".split()
+)  # what a policy asked for; of a topic it is a ROS action
 MEASURED = frozenset(
-    "meas measured act actual state states feedback fb est estimated present real raw filt filtered smoothed response "
+    "meas measured act actual state states observation feedback fb est estimated present real raw filt filtered smoothed response "
     "encoder encoders enc".split()
 )
 PLACES = frozenset(
@@ -57,6 +60,7 @@ DRIVING = frozenset("input in stimulus ctrl control drive".split())  # what driv
 GENERIC = frozenset(
     "dof joint joints motor data robot array value values actuator axis trajectory controller controllers in out input output".split()
 )
+JOINT = frozenset("joint joints".split())  # what drivers add to a joint's name at will
 ROTARY = frozenset(
     "angle angles theta phi alpha torque torques tau q rotation rotary omega revolute hinge encoder moment trq dof joint joints "
     "qpos qvel knee hip ankle thigh calf shoulder elbow wrist arm pan tilt roll pitch yaw pendulum".split()
@@ -98,9 +102,11 @@ def meaning_of(one: Recorded) -> Meaning:
     quantity, reason, certain = _quantity(one, near, far)
     every = {*near, *far}
     commanded: bool | None = None
-    if every & COMMANDED or (not one.topic and set(near) & COMMANDED_LETTERS and not certain):
+    of_column = set() if one.topic else set(near) & COMMANDED_COLUMNS
+    letters = set() if one.topic or certain else set(near) & COMMANDED_LETTERS
+    if asked := (every & COMMANDED) | of_column | letters:
         commanded = True
-        reason += f"; {_one(near + far, COMMANDED | COMMANDED_LETTERS)!r} says that it was asked for"
+        reason += f"; {_one(near + far, asked)!r} says that it was asked for"
     elif every & MEASURED or one.type in (
         "sensor_msgs/msg/JointState",
         "sensor_msgs/msg/Imu",
@@ -195,6 +201,20 @@ def differ_in_number(one: Recorded, other: Recorded) -> bool:
     return first == second and one.said != other.said
 
 
+def of_one_array(one: Recorded, other: Recorded) -> bool:
+    """Whether two columns are entries of one array, or are called measured and differ in a number only: one quantity of two joints."""
+    if one.topic or other.topic or one.column == other.column:
+        return False
+    first, second = (re.sub(r"\[\d+\]", "[]", each.column) for each in (one, other))
+    return (first == second and "[]" in first) or (differ_in_number(one, other) and says_who_asks(one))
+
+
+def same_joint(one: str, other: str) -> bool:
+    """Whether two names are of one joint: with or without the word joint, in whatever case and with whatever between the words."""
+    first, second = ([word for word in words_of(each) if word not in JOINT] for each in (one, other))
+    return bool(first) and first == second
+
+
 def says_who_asks(one: Recorded) -> bool:
     """Whether a word of its name says that it was asked for, or that it was measured."""
     return bool({*words_of(one.said), *words_of(one.topic)} & (COMMANDED | MEASURED))
@@ -228,7 +248,7 @@ def _motion_word(near: list[str]) -> tuple[str, Quantity] | None:
     return None
 
 
-def _one(words: list[str], known: frozenset[str]) -> str:
+def _one(words: list[str], known: Collection[str]) -> str:
     return next(word for word in words if word in known)
 
 
@@ -236,6 +256,7 @@ def joint_of_column(said: str, side: str = "", names: Collection[str] = ()) -> s
     """What tells a column from others of the same quantity: `3` of dof_pos[3], `knee` of knee_pos; `names` are words that are names here."""
     known = (
         COMMANDED
+        | COMMANDED_COLUMNS
         | MEASURED
         | GENERIC
         | FORCING

@@ -15,7 +15,7 @@ from rhythmid.model import INERTIA, MASS, Model
 from rhythmid.record.record import Channel, Record
 from rhythmid.start.balance import Law, Rows
 from rhythmid.start.roles import Roles
-from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
+from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
 from rhythmid.value import Value
 
 EARNS_PLACE = (
@@ -57,7 +57,7 @@ def units_of(roles: Roles, force: str) -> Units:
     usual = ROTATIONAL if roles.rotary else TRANSLATIONAL
     if force in ("", usual.force):
         return usual
-    return Units(force, usual.position, f"{force}*s^2/{usual.position}")
+    return Units(force, usual.position, mass_unit(force, usual.position))
 
 
 def per_inertia(units: Units) -> Units:

@@ -20,6 +20,7 @@ from rhythmid.start.meaning import Quantity, is_ignored, is_lone_v, meaning_of, 
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along
 from rhythmid.start.step_before import BEFORE, step_before
 from rhythmid.start.unnamed_reference import with_reference
+from rhythmid.start.unsigned_effort import without_unsigned
 
 INTEGRAL = 0.9  # correlation from which a position and a velocity belong together
 MEASURED: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
@@ -78,6 +79,8 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     rest = [_voltage(one, output.recorded, measured) for one in rest]
     rest, copies, told = _without_copies(rest, output.recorded)
     notes += told
+    rest, told = without_unsigned(rest, output.recorded, measured)
+    notes += told
     rest = [by_data(one, output.recorded, measured, velocity) for one in rest]
     more, kind, reference_of = drivers(rest, output.recorded, measured, ask)
     if carried is not None:
@@ -98,7 +101,8 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
         choices |= more
         others = [one for one in everything if all(one.one is not each.one for each in known)]
         notes += idle if more else [*idle, *notes_of_other_joints(output.recorded, others)]
-    rotary, why = _rotary(choices if carried is None else {"output": output}, output.recorded, ask)
+    of_robot = bool(chosen.others)
+    rotary, why = _rotary(choices if carried is None else {"output": output}, output.recorded, of_robot, ask)
     return Roles(choices, kind, _output_kind(measured), rotary, why, chosen, reference_of, tuple(notes))
 
 
@@ -232,13 +236,13 @@ def _degrees(ratio: float) -> str:
     return "correct the scale"
 
 
-def _rotary(choices: Mapping[str, Choice], output: Recorded, ask: Ask) -> tuple[bool, str]:
-    """Whether the machine turns, as units and names say; a JointState's joint that says nothing turns."""
+def _rotary(choices: Mapping[str, Choice], output: Recorded, of_robot: bool, ask: Ask) -> tuple[bool, str]:
+    """Whether the machine turns, as units and names say; a joint of several, or a JointState's, that says nothing turns."""
     for choice in choices.values():
         rotary, why = rotary_of(choice.recorded)
         if rotary is not None:
             return rotary, f"{choice.recorded}: {why}"
-    turns = output.type == "sensor_msgs/msg/JointState"
+    turns = of_robot or output.type == "sensor_msgs/msg/JointState"
     answers = ["it turns (rad, N m)", "it slides (m, N)"]
     number = ask("Does the joint turn or slide?", answers if turns else answers[::-1])
     rotary = turns == (number == 0)

@@ -1,7 +1,7 @@
 """From recordings of which nothing is said to the two files that describe them: signals.yaml and a nominal model.yaml."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -9,9 +9,11 @@ from threadpoolctl import threadpool_limits
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model
+from rhythmid.record.cleaning import cleaned
 from rhythmid.record.inventory import Inventory, inventory
 from rhythmid.record.read import load_records, read_record
 from rhythmid.record.signals import Clock, Signals
+from rhythmid.record.standstill import standstill
 from rhythmid.start.force_unit import MODELLED
 from rhythmid.start.known import Ask
 from rhythmid.start.meaning import driving_unit_of
@@ -73,11 +75,19 @@ def guess(
     clock, reason = clock_of(found, roles)
     text = signals_yaml(found, roles, units, clock, reason)
     try:
-        read_record(source, Signals.from_text(text, GUESSED))
+        record = read_record(source, Signals.from_text(text, GUESSED))
     except InputError as error:
         if clock.kind != "header":
             raise
-        text = signals_yaml(found, roles, units, Clock("receive"), f"the stamps do not serve: {error}")
+        clock, reason = Clock("receive"), f"the stamps do not serve: {error}"
+        text = signals_yaml(found, roles, units, clock, reason)
+        record = read_record(source, Signals.from_text(text, GUESSED))
+    still = standstill(cleaned(record).record)
+    if still is not None:
+        output = roles.choices["output"]
+        output = replace(output, doubts=(*output.doubts, still))
+        roles = replace(roles, choices={**roles.choices, "output": output})
+        text = signals_yaml(found, roles, units, clock, reason)
     return Guess(found, roles, text)
 
 

@@ -1,0 +1,37 @@
+"""What to tell where nothing that was recorded is called a motion: what each number was taken for, and how to name one."""
+
+import json
+from collections.abc import Sequence
+
+from rhythmid.start.known import Known
+from rhythmid.start.meaning import words_of
+
+LISTED = 12  # numbers that the message names
+AMBIGUOUS = frozenset(
+    {"current", "currents"}
+)  # of a name without a unit: amperes, or what a quantity is at present
+
+
+def no_motion(known: Sequence[Known]) -> str:
+    """The complaint, in one line."""
+    listed = "; ".join(f"{one.one} ({_taken_for(one)})" for one in known[:LISTED])
+    more = f" and {len(known) - LISTED} more" if len(known) > LISTED else ""
+    first = known[0].one
+    able = [one.one for one in known if AMBIGUOUS & set(words_of(one.one.said)) and not one.one.unit]
+    present = "; 'current' may mean amperes, or what is measured at present" if able else ""
+    one = able[0] if able else first
+    where = (
+        f"topic: {one.topic}, field: {json.dumps(one.field)}"
+        if one.topic
+        else f"column: {json.dumps(one.column)}"
+    )
+    return (
+        f"no position, velocity or acceleration is measured, as far as names say: {listed}{more}{present}. Rename the column that is one, "
+        f"such as to wheel_velocity, or write signals.yaml with it:  output: {{{where}, kind: velocity, unit: rad/s}}"
+    )
+
+
+def _taken_for(one: Known) -> str:
+    """What a number was taken for, and why."""
+    what = one.quantity or ("asked for" if one.meaning.commanded else "not understood")
+    return f"{what}: {one.meaning.reason}" if one.meaning.reason else what

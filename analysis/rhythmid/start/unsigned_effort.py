@@ -1,0 +1,26 @@
+"""Measured efforts of which only the size was recorded: they say how hard, and not which way, and are no effort of a model."""
+
+import numpy as np
+
+from rhythmid.record.inventory import Recorded
+from rhythmid.record.unsigned import WHY, is_unsigned
+from rhythmid.start.known import Known
+from rhythmid.start.relation import together
+
+
+def without_unsigned(
+    rest: list[Known], output: Recorded, measured: str | None
+) -> tuple[list[Known], list[str]]:
+    """What is left without them, and what to tell of each; only beside a measured position."""
+    if measured != "position":
+        return rest, []
+    found = [
+        one for one in rest if one.quantity == "effort" and not one.meaning.commanded and _is(one.one, output)
+    ]
+    notes = [f"{one.one} is not used: {WHY}" for one in found]
+    return [one for one in rest if one not in found], notes
+
+
+def _is(one: Recorded, output: Recorded) -> bool:
+    period, effort, position = together(one, output)
+    return is_unsigned(np.arange(len(effort), dtype=np.float64) * period, position, effort)

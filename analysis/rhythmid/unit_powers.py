@@ -1,0 +1,56 @@
+"""Units as products of powers: rad/s^2*s^2/rad is 1."""
+
+import re
+from collections.abc import Iterator
+
+TOKEN = re.compile(r"([^\W\d_]+|1)(?:\^(-?\d+))?|([*/()](?!\^))")
+
+
+def reduced(unit: str) -> str:
+    """The unit with each name once, where one stands in it several times; else as it is, and so is what is no product of powers."""
+    names = re.findall(r"[^\W\d_]+", unit)
+    powers = _powers(unit)
+    if powers is None or len(set(names)) == len(names):
+        return unit
+    over = [_power(name, power) for name, power in powers.items() if power > 0]
+    under = [_power(name, -power) for name, power in powers.items() if power < 0]
+    below = "*".join(under)
+    return ("*".join(over) or "1") + (f"/({below})" if len(under) > 1 else f"/{below}" if under else "")
+
+
+def _power(name: str, power: int) -> str:
+    return name if power == 1 else f"{name}^{power}"
+
+
+def _powers(unit: str) -> dict[str, int] | None:
+    """The power of each name, in order; None where the text is no product of names."""
+    found: dict[str, int] = {}
+    signs = [1]  # of what stands in each pair of brackets that is open
+    sign, factor = 1, True  # of the next factor, and whether one is due
+    for name, power, mark in _tokens(unit):
+        if name and factor:
+            if name != "1":
+                found[name] = found.get(name, 0) + signs[-1] * sign * int(power or 1)
+            factor = False
+        elif mark == "(" and factor:
+            signs.append(signs[-1] * sign)
+            sign = 1
+        elif mark == ")" and not factor and len(signs) > 1:
+            signs.pop()
+        elif mark in ("*", "/") and not factor:
+            sign, factor = (1 if mark == "*" else -1), True
+        else:
+            return None
+    return found if not factor and len(signs) == 1 else None
+
+
+def _tokens(unit: str) -> Iterator[tuple[str, str, str]]:
+    """Name, power and mark of each part; a mark that is none where the text is no unit."""
+    at = 0
+    while at < len(unit):
+        match = TOKEN.match(unit, at)
+        if match is None:
+            yield "", "", "?"
+            return
+        yield match.group(1) or "", match.group(2) or "", match.group(3) or ""
+        at = match.end()

@@ -1,0 +1,66 @@
+"""An effort without its sign is told from one that holds a weight, and is not taken for the effort."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rhythmid.record.bag_report import quality_report
+from rhythmid.record.unsigned import is_unsigned
+from rhythmid.start.start import guess
+
+TIME = 0.05 * np.arange(3000)
+POSITION = np.sin(0.8 * TIME) + 0.4 * np.sin(1.9 * TIME)
+SPEED = np.gradient(POSITION, TIME)
+ACCELERATION = np.gradient(SPEED, TIME)
+NOISE = np.random.default_rng(1).standard_normal(len(TIME))
+FORCE = 0.3 * ACCELERATION + 0.2 * SPEED + 0.2 * np.tanh(SPEED / 0.05) + 0.02 * NOISE
+COARSE = 0.02 * np.round(POSITION / 0.02)
+
+
+def test_the_size_of_a_force_is_unsigned() -> None:
+    assert is_unsigned(TIME, COARSE, 0.01 + np.abs(FORCE))
+    assert is_unsigned(TIME, COARSE, -np.abs(FORCE))
+
+
+@pytest.mark.parametrize(
+    "weight",
+    [2.0 + 0.0 * POSITION, 3.0 * np.cos(0.5 * POSITION), 3.0 + POSITION],
+    ids=["held", "arm", "spring"],
+)
+def test_a_force_that_holds_a_weight_has_its_sign(weight: np.ndarray) -> None:
+    force = weight + FORCE
+    assert force.min() > 0.0 and not is_unsigned(TIME, COARSE, force)
+
+
+def test_a_force_that_changes_its_sign_or_goes_with_no_motion_is_none() -> None:
+    assert not is_unsigned(TIME, COARSE, FORCE)
+    assert not is_unsigned(TIME, COARSE, np.abs(NOISE))
+
+
+def test_a_contact_that_pushes_only_has_its_sign() -> None:
+    force = np.maximum(-5.0 * POSITION - 0.5 * SPEED, 0.0) + 0.02 * np.abs(NOISE)
+    assert not is_unsigned(TIME, COARSE, force)
+
+
+def test_a_motion_that_goes_one_way_tells_nothing_of_the_sign() -> None:
+    assert not is_unsigned(TIME, TIME + 0.1 * np.sin(TIME), np.abs(FORCE))
+
+
+def test_init_says_that_a_current_has_no_sign_and_does_not_take_it(tmp_path: Path) -> None:
+    command = np.interp(TIME + 0.1, TIME, POSITION)
+    path = tmp_path / "run.csv"
+    columns = np.column_stack([TIME, command, COARSE, 500.0 * np.abs(FORCE)])
+    heading = "t,command_angle,feedback_angle,current_mA"
+    np.savetxt(path, columns, delimiter=",", header=heading, comments="", fmt="%.5g")
+    found = guess(path)
+    assert set(found.roles.choices) == {"output", "input"} and found.roles.input_kind == "reference"
+    (said,) = [line for line in found.lines() if "never changes its sign" in line]
+    assert said.startswith("CHECK current_mA is not used: ")
+    signals = tmp_path / "signals.yaml"
+    channels = (
+        "output: {column: feedback_angle, unit: rad}\neffort: {column: current_mA, unit: A}\ninput: none\n"
+    )
+    signals.write_text("time: {column: t}\n" + channels)
+    notes = quality_report(path, signals).notes
+    assert [note for note in notes if note.startswith("effort: it is no effort as it was recorded")]
