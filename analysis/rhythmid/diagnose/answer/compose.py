@@ -121,6 +121,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
             *notes,
             *held_out_zero_notes(fit, result.unseen if case.holdout and not case.budget.spent else ()),
         ),
+        chosen=result.selection.chosen.elements,
         assumptions=(ONE_CLOCK,) if any(one.command is not None for one in series) else (),
     )
 
