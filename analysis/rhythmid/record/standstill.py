@@ -1,0 +1,89 @@
+"""Standstill: an output that moves by no more than its own rounding or noise, so that nothing of the machine is in it.
+
+Noise has a short memory, is alike at all times, and goes with nothing that drives the machine. Its memory is that of the
+sensor: drivers average or hold a few samples. The autocorrelation of a motion lasts, however small the motion is beside the noise:
+at a distance it is the share of the variance that the motion has [Box, Jenkins and Reinsel, Time Series Analysis, ch. 2].
+The spread of a correlation of two such signals is Bartlett's (ibid., ch. 12).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import correlate
+from scipy.stats import norm
+
+from rhythmid.record.quality import resolution
+from rhythmid.record.record import Record
+
+Array = NDArray[np.float64]
+LEAST_SAMPLES = 200  # of fewer an autocorrelation of 0.2 is within what chance makes
+SHARE = 0.2  # of the variance, up to which what lasts is not worth the name of a motion: it is half the size of the noise
+FLICKER = 3  # values in all, up to which the sensor shows its own steps up and down and no motion
+FEW_STEPS = 16  # of the resolution from end to end, up to which a motion is of the size of the rounding
+AVERAGED = 8  # samples that a driver may average or hold, beyond which memory is the machine's, of a motion of that size
+WHITE = 2  # the same of a larger one, whose memory may be that of a machine that is damped well
+CREST = 8.0  # standard deviations, from which a lone move is an event and no noise
+CHANCE = 1e-3  # with which noise that goes with nothing is taken for driven
+USUAL = 1.4826  # standard deviations in a median absolute deviation
+
+
+def standstill(record: Record) -> str | None:
+    """Why the machine of this record is taken to stand still, in one sentence with what to do; None where it moves, or too few
+    samples tell.
+
+    Outliers look like events: give it a `cleaned` record.
+    """
+    value = record.output.value
+    if len(value) < LEAST_SAMPLES or not np.all(np.isfinite(value)):
+        return None
+    levels, span, step = len(np.unique(value)), float(np.ptp(value)), resolution(value)
+    size = f"its {record.output_kind} moves by {span:.3g} {record.output.unit} in all"
+    if levels == 1:
+        return _sentence(f"its {record.output_kind} never changes")
+    if levels <= FLICKER:
+        return _sentence(f"{size}, between {levels} values that its sensor shows side by side")
+    small = step > 0.0 and span <= FEW_STEPS * step
+    if not _noise(value, step, AVERAGED if small else WHITE) or _driven(record):
+        return None
+    if small:
+        return _sentence(f"{size}, {span / step:.0f} steps of its resolution, as noise does that is rounded")
+    return _sentence(f"{size}, no different from white noise")
+
+
+def _sentence(why: str) -> str:
+    return (
+        f"the machine stands still: {why}; record it while it moves, or choose a channel that shows a motion"
+    )
+
+
+def _noise(value: Array, step: float, memory: int) -> bool:
+    """Whether values (n,) are alike at all times, and remember no more than `memory` samples."""
+    away = np.abs(value - np.median(value))
+    if away.max() > CREST * max(USUAL * float(np.median(away)), step):
+        return False
+    return bool(np.abs(_correlation(value, value)[memory:]).max() <= SHARE)
+
+
+def _driven(record: Record) -> bool:
+    """Whether the output goes with a channel that drives the machine, more than by chance."""
+    time, value = record.output.time, record.output.value
+    own = _correlation(value, value)
+    for role, channel in record.channels.items():
+        if role in ("output", "velocity") or np.ptp(channel.value) == 0.0:
+            continue
+        drive = np.interp(time, channel.time, channel.value)
+        if np.ptp(drive) == 0.0:
+            continue
+        drives = _correlation(drive, drive)
+        spread = np.sqrt(max(1.0 + 2.0 * float(own[1:AVERAGED] @ drives[1:AVERAGED]), 1.0) / len(value))
+        found = np.abs(_correlation(drive, value))
+        if found.max() > float(norm.isf(0.5 * CHANCE / len(found))) * spread:
+            return True
+    return False
+
+
+def _correlation(first: Array, second: Array) -> Array:
+    """Correlation (n // 2,) of two signals (n,), the second so many samples later."""
+    n = len(first)
+    a, b = (one - one.mean() for one in (first, second))
+    found = correlate(b, a, mode="full", method="fft")[n - 1 : n - 1 + n // 2]
+    return found / (n * float(np.std(a)) * float(np.std(b)))

@@ -1,0 +1,67 @@
+"""A machine that stands still is told from one that moves by little, and from one that noise drives."""
+
+import numpy as np
+import pytest
+
+from rhythmid.record.record import Channel, Record
+from rhythmid.record.standstill import standstill
+
+COUNT = 4000
+TIME = np.arange(COUNT) * 0.0025
+STEP = 6e-8  # rad, of the encoder
+
+
+def made(output: np.ndarray, drive: np.ndarray | None = None, kind: str = "position") -> Record:
+    return Record(
+        "run",
+        Channel(TIME, output, "rad"),
+        None if drive is None else Channel(TIME, drive, "N*m"),
+        output_kind=kind,  # pyright: ignore[reportArgumentType]
+    )
+
+
+def noise(seed: int = 1) -> np.ndarray:
+    return np.random.default_rng(seed).normal(size=COUNT)
+
+
+def averaged(value: np.ndarray, count: int) -> np.ndarray:
+    """What a driver gives that averages so many samples."""
+    return np.convolve(value, np.ones(count) / count, mode="same")
+
+
+def test_an_encoder_that_flickers_by_a_few_steps_is_that_of_a_machine_that_stands_still() -> None:
+    output = -0.2254 + STEP * np.round(averaged(3.0 * noise(), 4))
+    holding = np.round(noise(2), 1)
+    said = standstill(made(output, holding))
+    assert said is not None and "stands still" in said and "steps of its resolution" in said
+
+
+def test_a_flicker_between_two_counts_stands_still_however_it_lasts() -> None:
+    said = standstill(made(STEP * np.round(0.5 + 0.6 * np.sin(0.3 * TIME))))
+    assert said is not None and "2 values" in said
+
+
+def test_white_noise_that_goes_with_no_command_is_no_motion() -> None:
+    said = standstill(made(1e-4 * noise(), np.sin(3.0 * TIME)))
+    assert said is not None and "white noise" in said
+
+
+@pytest.mark.parametrize("steps", [4.0, 40.0])
+def test_a_small_swing_that_lasts_is_a_motion(steps: float) -> None:
+    output = STEP * np.round(steps * np.sin(5.0 * TIME) + 0.5 * noise())
+    assert standstill(made(output)) is None
+
+
+def test_an_acceleration_that_a_white_force_makes_is_a_motion() -> None:
+    force = noise()
+    assert standstill(made(0.5 * force + 0.3 * noise(2), force, "acceleration")) is None
+
+
+def test_a_lone_blow_in_noise_is_a_motion() -> None:
+    output = noise()
+    output[2000:2003] += 50.0
+    assert standstill(made(output)) is None
+
+
+def test_too_few_samples_tell_nothing() -> None:
+    assert standstill(Record("run", Channel(TIME[:50], noise()[:50], "rad"))) is None
