@@ -21,7 +21,7 @@ from rhythmid.diagnose.selection import Contest, Selection, equivalent
 from rhythmid.diagnose.verdict_rules import Outcome, rule_for
 from rhythmid.simulation.transport import INPUT_DELAY
 
-NOT_GRANTED = "further effects that are not established ({})"
+NOT_GRANTED = "{} effects that are not established ({})"
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,11 @@ def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
     if not found:
         return Unexplained(0.0, False, None, expected)
     less, quantity, further, least = max(found)
-    words = quantity or NOT_GRANTED.format(", ".join(further).replace("_", " "))
-    return Unexplained(float(min(less / whole, 1.0)), True, words, expected, max(least, 0.0), further)
+    if further:
+        beside = any(set(one.names) == {*chosen.names, *further} for one in contest.hypotheses)
+        kind = "further" if beside else "other"  # beside the chosen ones, or in their place
+        quantity = NOT_GRANTED.format(kind, ", ".join(further).replace("_", " "))
+    return Unexplained(float(min(less / whole, 1.0)), True, quantity, expected, max(least, 0.0), further)
 
 
 def significance(prediction: Prediction, candidates: int) -> float:
