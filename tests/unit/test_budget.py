@@ -133,7 +133,7 @@ def test_once_time_is_up_only_the_best_model_of_each_number_of_effects_is_weighe
     begun = Trial((), hopper(), fit.starts, fit.chi2, fit.samples, len(hopper().free), True, WHITE)
     trials: list[tuple[Trial, Kind]] = [(begun, "nominal")]
     for place, (name, values) in enumerate(
-        {"coulomb_friction": FRICTION, "cubic_stiffness": {"stiffness": 1.0}}.items()
+        {"coulomb_friction": FRICTION, "cubic_stiffness": {"coefficient": 1.0}}.items()
     ):
         model = hopper().with_element(CATALOGUE[name], values)
         trials.append((replace(begun, added=(name,), model=model, chi2=1.0 + place), "effects"))
