@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain, repeat
 
 import pytest
@@ -9,11 +10,19 @@ from axes import CATALOGUE as EVERYTHING
 from axes import axis, axis_model
 
 from machines import CATALOGUE, SHORT, hopper, only, records
-from rhythmid.deadline import SPENT
+from rhythmid.deadline import SPENT, deadline
+from rhythmid.diagnose import free_run as search_of_motion
+from rhythmid.diagnose.answer.compose import MORE_TIME
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.case import Budget
+from rhythmid.diagnose.contenders import contend, rows_of
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.diagnose.effort import search
+from rhythmid.diagnose.hypothesis import Kind
+from rhythmid.diagnose.search.trial import Trial
+from rhythmid.identify.descent import WHITE
+from rhythmid.identify.output_error import start_only
+from rhythmid.identify.series import prepare
 
 FEW = ("coulomb_friction", "cubic_stiffness", "quadratic_drag")
 FRICTION = {"force": 0.02, "transition": 0.002}
@@ -96,3 +105,38 @@ def test_by_effort_a_budget_that_is_spent_after_an_effect_tells_that_no_further_
 @pytest.mark.parametrize("scored", [by_motion, by_effort])
 def test_with_time_enough_nothing_is_cut_off(scored):
     assert cut_off(scored()) == []
+
+
+def test_by_motion_a_time_that_is_over_after_the_search_weighs_what_a_verdict_needs_and_tells_the_rest(
+    monkeypatch,
+):
+    searched = search_of_motion.search
+
+    def all_time_gone(*given, **named):
+        found = searched(*given, **named)
+        monkeypatch.setattr(Budget, "at", lambda self, share, least=0.0: -math.inf)
+        return found
+
+    monkeypatch.setattr(search_of_motion, "search", all_time_gone)
+    found = by_motion()
+    assert [effect.element for effect in found.missing] == ["coulomb_friction"]
+    told = " ".join(cut_off(found))
+    for one in ("freed values", "mismatch of the nominal model", "small effects"):
+        assert one in told
+    assert found.next_experiment == MORE_TIME
+    assert {one.elements for one in found.hypotheses} >= {(), ("coulomb_friction",)}
+
+
+def test_once_time_is_up_only_the_best_model_of_each_number_of_effects_is_weighed():
+    series = prepare(records(hopper(), SHORT[:1]))
+    fit = start_only(hopper(), series, WHITE, 1e-3)
+    begun = Trial((), hopper(), fit.starts, fit.chi2, fit.samples, len(hopper().free), True, WHITE)
+    trials: list[tuple[Trial, Kind]] = [(begun, "nominal")]
+    for place, (name, values) in enumerate(
+        {"coulomb_friction": FRICTION, "cubic_stiffness": {"coefficient": 1.0}}.items()
+    ):
+        model = hopper().with_element(CATALOGUE[name], values)
+        trials.append((replace(begun, added=(name,), model=model, chi2=1.0 + place), "effects"))
+    with deadline(-math.inf):
+        made = contend(trials, series, rows_of(series, (), WHITE), 1e-3)
+    assert [one.trial.added for one in made] == [(), ("coulomb_friction",)]

@@ -63,6 +63,7 @@ ANSWER = Diagnosis(
     Scored("effort", 12.0, "a controller holds the machine"),
     assumptions=("The recorded effort is taken to be true in scale.",),
     excluded=(Untried("sensor_lag", "not seen"), Untried("sensor_drift", "not seen")),
+    chosen=("coulomb_friction",),
 )
 
 
@@ -96,7 +97,7 @@ def test_hypotheses_stand_in_a_table_with_differences_and_probabilities():
     rows = [line for line in printed().splitlines() if line.startswith("│")][1:]
     best, chosen, nominal = rows
     assert "coulomb_friction + position_ripple" in best and "best" in best
-    assert "2 ± 0.6" in chosen and "97 %" in chosen
+    assert "coulomb_friction (chosen)" in chosen and "2 ± 0.6" in chosen and "97 %" in chosen
     assert "nominal model" in nominal and "500 ± 150" in nominal and "< 0.1 %" in nominal
 
 
@@ -122,6 +123,31 @@ def test_only_a_few_hypotheses_are_shown():
     many = tuple(explanation((f"effect_{i}",), float(i), 0.01) for i in range(20))
     text = printed(replace(ANSWER, hypotheses=many))
     assert "the 6 best of 20 hypotheses" in text and "effect_5" in text and "effect_6" not in text
+
+
+def test_the_chosen_hypothesis_is_shown_however_many_predict_better():
+    many = tuple(explanation(("coulomb_friction", f"effect_{i}"), float(i), 0.0) for i in range(20))
+    text = printed(replace(ANSWER, hypotheses=(*many, explanation(("coulomb_friction",), 30.0, 0.9))))
+    assert "the 6 best of 21 hypotheses, and the chosen one" in text
+    assert "coulomb_friction (chosen)" in text and "30 ± 9" in text and "effect_6" not in text
+
+
+def test_what_is_not_believed_comes_in_the_order_of_the_hypotheses_and_is_no_rival_of_the_chosen_one():
+    def refused(*elements: str) -> Rejection:
+        return Rejection(elements, "share_of_rest", 0.0, 0.2, "too small a part")
+
+    rows = (
+        refused("position_ripple"),
+        refused("stribeck_friction"),
+        refused("coulomb_friction", "position_ripple"),
+    )
+    alike = (("coulomb_friction", "stribeck_friction"),)
+    text = printed(replace(ANSWER, rejections=rows, indistinguishable=alike))
+    said = [line for line in text.splitlines() if line.startswith("not believed")]
+    assert said == [
+        "not believed: coulomb friction + position ripple (too small a part)",
+        "not believed: position ripple (too small a part)",
+    ]
 
 
 def test_only_a_few_rejections_are_told_and_the_rest_is_counted():

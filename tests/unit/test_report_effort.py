@@ -1,14 +1,19 @@
 """The report of an answer by effort: recorded effort beside what the models predict, before and after."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from axes import CATALOGUE, axis, axis_model
 from json_schema import conforming
 
+from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.present import present
 from rhythmid.diagnose.answer.present_effort import effort_findings
+from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.diagnosis import Answer, diagnose
 from rhythmid.diagnose.effort.run import EffortResult
+from rhythmid.diagnose.verdict import Unexplained
 from rhythmid.report.findings import Findings
 from rhythmid.report.page import render
 from rhythmid.report.run import error_of
@@ -49,6 +54,21 @@ def test_what_goes_with_the_speed_is_gone_after(found):
     speed = next(one for one in found.functions if one.quantity == "velocity")
     assert speed.force_after is not None
     assert np.ptp(speed.force_after) < 0.2 * np.ptp(speed.force)
+
+
+def test_the_remainder_is_the_one_of_the_decision_with_the_curve_over_the_quantity_that_is_named(answer):
+    assert isinstance(answer.result, EffortResult)
+    for quantity in ("velocity", "further effects that are not established (play)"):
+        left = Unexplained(0.07, True, quantity)
+        result = replace(answer.result, decision=replace(answer.result.decision, unexplained=left))
+        told = compose_effort(Case(axis_model(), [axis()], [axis(1)], CATALOGUE), result, ()).remainder
+        assert (told.share, told.goes_with) == (0.07, quantity)
+        assert (told.curve is not None) is (quantity == "velocity")
+
+
+def test_the_chosen_hypothesis_is_among_those_that_are_listed(answer):
+    listed = [one.elements for one in answer.diagnosis.hypotheses]
+    assert answer.diagnosis.chosen == ("coulomb_friction",) and answer.diagnosis.chosen in listed
 
 
 def test_the_answer_as_json_keeps_to_the_schema(answer):

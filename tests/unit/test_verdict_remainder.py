@@ -33,7 +33,9 @@ def test_what_more_effects_would_explain_though_they_are_not_granted_is_left_ove
     more = supposed("friction play", predicted(left), shape={"within_bounds": 0.0})
     _, decision = decided(contest(NOMINAL, friction(0.6), more, maps={"velocity": predicted(0.58, 0.0)}))
     assert decision.verdict == expected and decision.named == ("friction",)
-    assert (decision.unexplained.goes_with == "further effects (play)") is (expected == "unknown_physics")
+    told = "further effects that are not established (play)"
+    assert (decision.unexplained.goes_with == told) is (expected == "unknown_physics")
+    assert (decision.unexplained.further == ("play",)) is (expected == "unknown_physics")
 
 
 def test_a_small_structured_remainder_does_not_take_the_name_away():

@@ -187,10 +187,10 @@ def _identified(task: Task) -> Answered:
 def _identified_machine(task: Task, machine: Machine) -> Answered:
     records, _ = _joint_records(task)
     found = identify_machine(records, machine)
-    headline = f"{len(found.parameters)} parameters identified"
+    headline = f"{len(found.parameters)} parameters identified" if found.usable else found.headline
     return Answered(
         headline=headline,
-        verdict="identified",
+        verdict="identified" if found.usable else "not identified",
         time=_began(one for record in records for one in record.joints.values()),
         values=_values(found.parameters),
         result=found.to_dict(),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rhythmid.body.robot_file import mujoco
+from rhythmid.body.robot_file import mujoco, quiet_data
 
 Array = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ def end_links(model: Any, links: dict[str, int]) -> dict[str, Array]:
     """
     mj = mujoco()
 
-    data = mj.MjData(model)
+    data = quiet_data(model)
     mj.mj_kinematics(model, data)
     group = model.body_weldid
     carrying = {int(group[model.body_parentid[root]]) for root in set(group.tolist()) - {0}}

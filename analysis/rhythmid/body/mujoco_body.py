@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 from rhythmid.body.body import Array, Body, Joint, Passive
 from rhythmid.body.inertial_parameter import ARMATURE, MASS, PAYLOAD, split
 from rhythmid.body.link_inertia import Principal, end_links, point_mass
-from rhythmid.body.robot_file import FIXED, FREE, LEAST_MASS, mujoco, read_robot, refused, warnings_told
+from rhythmid.body.robot_file import (
+    FIXED,
+    FREE,
+    LEAST_MASS,
+    mujoco,
+    quiet_data,
+    read_robot,
+    refused,
+    warnings_told,
+)
 from rhythmid.errors import InputError
 
 HEAVIEST = 1e6  # [kg] a link with a larger mass is a mistake
@@ -105,7 +114,7 @@ class MujocoBody(Body):
     def worker(self) -> tuple[Any, Any]:
         """A model and the data of a run, for one thread."""
         model = copy.copy(self.model)
-        return model, mujoco().MjData(model)
+        return model, quiet_data(model)
 
     def joint(self, name: str) -> Joint:
         """A joint by name. Raises InputError for an unknown one."""
@@ -166,7 +175,7 @@ class MujocoBody(Body):
             if payload:
                 own = Principal.from_ten(own.ten + payload * point_mass(self.ends[link]))
             own.put_into(model, self.links[link])
-        mj.mj_setConst(model, mj.MjData(model))
+        mj.mj_setConst(model, quiet_data(model))
         return replace(self, model=model, given=given)
 
     def with_ends(self, places: Mapping[str, Array]) -> "MujocoBody":

@@ -100,6 +100,18 @@ def warnings_told() -> Iterator[list[str]]:
     told.extend(str(one.message) for one in others)
 
 
+def quiet_data(model: Any) -> Any:
+    """An `MjData` in which MuJoCo says nothing of what goes wrong in a run; those who run it look for numbers that are not finite.
+
+    MuJoCo prints a warning, and writes it to a file in the current folder, only where the count of its kind in the data is 0 (its
+    documentation, mjWarningStat; engine_core_util.c, mj_warning).
+    """
+    data = mujoco().MjData(model)
+    for kind in data.warning:
+        kind.number = 1
+    return data
+
+
 def refused(path: Path, error: Exception) -> InputError:
     """What MuJoCo says of a file, in one line."""
     return InputError(f"{path}: MuJoCo refuses it: {' '.join(str(error).split())}")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import drive_of, driven
+from rhythmid.identify.moving import moving
 from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
 from rhythmid.record.cleaning import cleaned
@@ -41,16 +42,21 @@ class Admitted:
 def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model) -> Admitted:
     """The records and the held-out ones made tidy, driven by what drives the model, and cut where that is missing.
 
-    Raises InputError for records that cannot be judged.
+    Those in which the machine stands still are left out. Raises InputError for records that cannot be judged, and where it stands still in
+    all that are to be fitted, or in all held-out ones.
     """
     whole = (*records, *holdout)
     remark = check_driven(whole, model)
-    clean = [cleaned(record) for record in whole]
+    fitted, still = moving([cleaned(record) for record in records])
+    judged, still_too = moving([cleaned(record) for record in holdout])
+    clean = [*fitted, *judged]
     given = tuple(driven(one.record, model) for one in clean)
     check_comparable(prepare(given))
     cut = [cut_at_gaps(record) for record in given]
     said = (
         remark,
+        *still,
+        *still_too,
         *(f"{one.name}: {note}" for one in whole for note in (*punctuality_notes(one.run), *copy_notes(one))),
         *(note for one in clean for note in one.notes),
         *(drive_of(one.record, b) for one, b in zip(clean, given)),
@@ -59,7 +65,7 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
         tuple(dict.fromkeys(note for note in (*said, *more) if note is not None))
         for more in ((n for one in cut for n in one.notes), (n for one in cut for n in one.filled))
     )
-    learnt, unseen = cut[: len(records)], cut[len(records) :]
+    learnt, unseen = cut[: len(fitted)], cut[len(fitted) :]
     return Admitted(
         tuple(stretch for one in learnt for stretch in one.stretches),
         tuple(stretch for one in unseen for stretch in one.stretches),

@@ -11,9 +11,10 @@ from rhythmid.model import Model
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
 
-# shares of a budget up to which the catalogue is searched, and other kinds of explanation are weighed and tried: what follows needs
-# the rest
-SEARCHED, WEIGHED = 0.7, 0.85
+# shares of a budget up to which the catalogue is searched, hypotheses and other kinds of explanation are weighed, and what is not needed for
+# a verdict is computed. What is under way then ends with what it has, and what has to be done takes the rest (measured where processors
+# are shared with three times as much other work: from the end of the search to the answer a third of the whole)
+SEARCHED, WEIGHED, EXPLAINED = 0.6, 0.8, 0.9
 LEAST_CALIBRATION = 10.0  # s in which the nominal model may be refitted, however small a budget is: without that nothing can be said
 
 
@@ -28,10 +29,14 @@ class Budget:
         """When so large a share of it will have passed, but `least` [s] at least; infinite without any seconds."""
         return math.inf if self.seconds is None else self.began + max(share * self.seconds, least)
 
+    def passed(self, share: float) -> bool:
+        """Whether so large a share of it has passed."""
+        return time.monotonic() > self.at(share)
+
     @property
     def spent(self) -> bool:
         """Whether the search is to begin nothing more."""
-        return time.monotonic() > self.at(SEARCHED)
+        return self.passed(SEARCHED)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.deadline import SPENT, time_is_up
 from rhythmid.diagnose.evidence import (
     Blocks,
     CrossValidated,
@@ -203,17 +204,20 @@ def contend(
     reach: float = math.inf,
     tell: Tell = silent,
 ) -> list[Contender]:
-    """Contenders of these trials, in their order; those that diverge are left out.
+    """Contenders of these trials, in their order; those that diverge are left out, and once time is up all that are not needed.
 
     Chi2 of those that matter comes to `reach`; what does not is weighed as far as it has come. The nominal model is a measure for
-    all and always fitted whole, and so is the best model of each number of effects: what richer ones explain beside it decides.
+    all and always fitted whole, and so is the best model of each number of effects: what richer ones explain beside it decides. These are
+    needed, whatever the time.
     """
     whole = {min(group, key=lambda one: one.chi2).added for group in _by_size(trials).values()}
 
     def one(case: tuple[Trial, Kind]) -> tuple[CrossValidated, Array, dict[str, float]]:
         trial, kind = case
-        needed = math.inf if kind == "nominal" or trial.added in whole else reach
-        fit = whole_fit(trial, series, rows.noise, step, reach=needed)
+        needed = kind == "nominal" or trial.added in whole
+        if time_is_up() and not needed:
+            raise InputError(SPENT)
+        fit = whole_fit(trial, series, rows.noise, step, reach=math.inf if needed else reach)
         found = cross_validate(linearised(fit, rows), rows.blocks)
         state_steps = fit.linearisation.state_steps
         free = start_freedom(

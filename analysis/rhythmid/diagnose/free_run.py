@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rhythmid.deadline import SPENT, deadline, time_is_up
 from rhythmid.diagnose.alternatives import alternatives
 from rhythmid.diagnose.baseline import Calibration
-from rhythmid.diagnose.case import WEIGHED, Case
+from rhythmid.diagnose.case import EXPLAINED, WEIGHED, Case
 from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
 from rhythmid.diagnose.contenders import (
     Contender,
@@ -61,6 +61,10 @@ from rhythmid.identify.student import autocorrelation_time
 # what competes beside the effects that were searched for, where there is time
 OTHER_KINDS = ("freed values, longer delays, other places, free functions and related laws",)
 INTERVALS = ("intervals followed along the likelihood, and integration in finer steps",)
+BEFORE = ("what the mismatch of the nominal model depends on",)
+AGAIN = ("what the model that was chosen in the end leaves, which is told of the one before it",)
+SMALL_EFFECTS = ("what small effects that no hypothesis names add to the standard deviations",)
+RERUN = ("free runs over the held-out records for the report",)
 
 
 @dataclass(frozen=True)
@@ -107,6 +111,7 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     reach = reach_of(found.fit.chi2, found.fit.samples)
     with deadline(case.budget.at(WEIGHED)):
         contenders = contend(kinds, seen, rows, step, reach, case.tell)
+        found = _weighed(found, found.trials, contenders)
     run = trajectories(found.fit)
     sizes = scales(seen, found.fit.model)
     structured = scoring.kind == "free_run" and calibration.fit.noise.is_structure
@@ -115,7 +120,7 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     if trial.added != found.best.added:
         run = trajectories(whole_fit(trial, seen, found.noise, step, pool=case.pool))
     if case.budget.spent:
-        found = replace(found, excluded=(*found.excluded, (OTHER_KINDS, SPENT)))
+        found = _untried(found, OTHER_KINDS)
     elif chosen.kind != "freed_value":
         nominal = next(one.trial for one in contenders if one.kind == "nominal")
         weighed = [one.trial for one in contenders]
@@ -125,12 +130,16 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
                 nominal, trial, seen, known, found.noise, step, run, found.rounds, weighed, reach, case.tell
             )
             found = _told(found, OTHER_KINDS)
-        contenders += contend(others, seen, rows, step, reach, case.tell)
+            more = contend(others, seen, rows, step, reach, case.tell)
+            found = _weighed(found, [one for one, _ in others], more)
+        contenders += more
     case.tell("locating what is left")
     after = dependences(run, rows, case.pool)
     refitted = None
     before = after
-    if trial.added:
+    if trial.added and case.budget.passed(WEIGHED):
+        before, found = [], _untried(found, BEFORE)
+    elif trial.added:
         nominal_run = trajectories(found.nominal)
         before = dependences(nominal_run, rows, case.pool)
         if not case.budget.spent:
@@ -142,17 +151,27 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     if selection.chosen.key != trial.added:
         trial = _trial_of(selection.chosen, contenders)
         run = trajectories(whole_fit(trial, seen, found.noise, step, pool=case.pool))
-        after = dependences(run, rows, case.pool)
-        contest = replace(contest, maps=_maps(after, refitted, contenders, rows))
-        selection = select(contest)
-        trial = _trial_of(selection.chosen, contenders)
+        if case.budget.passed(EXPLAINED):
+            found = _untried(found, AGAIN)
+        else:
+            after = dependences(run, rows, case.pool)
+            contest = replace(contest, maps=_maps(after, refitted, contenders, rows))
+            selection = select(contest)
+            trial = _trial_of(selection.chosen, contenders)
     found = _with_best(found, trial, case)
     least = _detectable(contenders, selection.chosen, rows)
     if trial.added and selection.chosen.kind == "effects":
         found = _told(_followed(found, case), INTERVALS)
     found = replace(found, excluded=(*found.excluded, *_unconverged(calibration.fit, found)))
     between = covariance_between(found.fit.names, selection.chosen, contest.hypotheses)
-    unnamed = _unnamed(found, known, case)
+    unnamed = np.zeros((len(found.fit.names),) * 2)
+    if case.budget.passed(EXPLAINED):
+        found = _untried(found, SMALL_EFFECTS)
+    else:
+        unnamed = _unnamed(found, known, case)
+    shown = unseen
+    if unseen and case.budget.passed(EXPLAINED):
+        shown, found = (), _untried(found, RERUN)
     fit = with_robust_covariance(found.fit)
     errors = size_errors(fit.model, selection.chosen.elements, fit.std)
     found = replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed))
@@ -164,8 +183,8 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         found,
         tuple(before),
         tuple(after),
-        _rerun(found.nominal, unseen, found),
-        _rerun(found.fit, unseen, found),
+        _rerun(found.nominal, shown, found),
+        _rerun(found.fit, shown, found),
         contest,
         selection,
         decide(contest, selection, least, errors),
@@ -187,7 +206,23 @@ def _followed(found: Search, case: Case) -> Search:
 
 def _told(found: Search, untried: tuple[str, ...]) -> Search:
     """The search that tells what was not tried, or not brought to its end, where time was up meanwhile."""
-    return replace(found, excluded=(*found.excluded, (untried, SPENT))) if time_is_up() else found
+    return _untried(found, untried) if time_is_up() else found
+
+
+def _untried(found: Search, what: tuple[str, ...]) -> Search:
+    """The search that tells what there was no time for."""
+    return replace(found, excluded=(*found.excluded, (what, SPENT)))
+
+
+def _weighed(found: Search, trials: Sequence[Trial], contenders: Sequence[Contender]) -> Search:
+    """The search that tells, where time is up, which models that were fitted were not weighed on unseen data."""
+    if not time_is_up():
+        return found
+    known = {one.trial.added for one in contenders}
+    for trial in trials:
+        if trial.added not in known:
+            found = _untried(found, (f"the evidence for {' + '.join(trial.added)}",))
+    return found
 
 
 def _unconverged(nominal: Fit, found: Search) -> list[tuple[tuple[str, ...], str]]:

@@ -148,7 +148,7 @@ def _shape_rule(name: str, says: str, reason: str) -> Rule:
 
 
 CHANCE = "a gain of this size is expected by chance among so many candidates"
-HARM = "it harms some blocks of the records, which outweighs its gain in the others"
+HARM = "it harms some blocks of the records, so that too little of its gain in the others is left"
 FEW = "its gain rests on too few blocks of the records"
 INSTEAD = "other effects, one fewer, predict as well"
 

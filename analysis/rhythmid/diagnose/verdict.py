@@ -21,6 +21,8 @@ from rhythmid.diagnose.selection import Contest, Selection, equivalent
 from rhythmid.diagnose.verdict_rules import Outcome, rule_for
 from rhythmid.simulation.transport import INPUT_DELAY
 
+NOT_GRANTED = "{} effects that are not established ({})"
+
 
 @dataclass(frozen=True)
 class Unexplained:
@@ -28,7 +30,8 @@ class Unexplained:
 
     `share` is that of the explainable mismatch; `goes_with` the quantity of the free map that predicts it best; `significant`
     whether that is more than chance. `expected` is the largest share of all, significant or not, each times the chance that
-    it is real. `least` is the mean square that it removes at least, `EQUIVALENT` standard errors below the estimate.
+    it is real. `least` is the mean square that it removes at least, `EQUIVALENT` standard errors below the estimate. `further` names the
+    effects that predict it beside the chosen ones where they, and no free map, predict it best: they are granted no place.
     """
 
     share: float
@@ -36,6 +39,7 @@ class Unexplained:
     goes_with: str | None
     expected: float = 0.0
     least: float = 0.0
+    further: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -74,28 +78,32 @@ class Decision:
 def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
     """What is left beside a hypothesis: what free maps predict, or hypotheses with more effects that were not granted."""
     whole = contest.nominal.prediction.mean_square - contest.floor
-    rivals = [(quantity, one, len(contest.maps)) for quantity, one in contest.maps.items()]
+    rivals = [(quantity, (), one, len(contest.maps)) for quantity, one in contest.maps.items()]
     rivals += [
-        (_further(one, chosen), one.prediction, contest.candidates)
+        ("", _further(one, chosen), one.prediction, contest.candidates)
         for one in contest.hypotheses
         if len(one.elements) > len(chosen.elements) and one.kind == "effects"
     ]
-    found: list[tuple[float, str, float]] = []
+    found: list[tuple[float, str, tuple[str, ...], float]] = []
     expected = 0.0
-    for words, one, count in rivals:
+    for quantity, further, one, count in rivals:
         gain, error = difference(one, chosen.prediction)
         less, uncertain = removed(one, chosen.prediction)
         expected = max(expected, less * chance_better(one, chosen.prediction, decisive(count)))
         ahead = gain_ahead(one, chosen.prediction) >= -EQUIVALENT
         if less > 0.0 and ahead and 0.0 < significance(one, count) * error < gain:
-            found.append((less, words, less - EQUIVALENT * uncertain))
+            found.append((less, quantity, further, less - EQUIVALENT * uncertain))
     if whole <= 0.0:
         return Unexplained(0.0, False, None)
     expected = float(min(expected / whole, 1.0))
     if not found:
         return Unexplained(0.0, False, None, expected)
-    less, words, least = max(found)
-    return Unexplained(float(min(less / whole, 1.0)), True, words, expected, max(least, 0.0))
+    less, quantity, further, least = max(found)
+    if further:
+        beside = any(set(one.names) == {*chosen.names, *further} for one in contest.hypotheses)
+        kind = "further" if beside else "other"  # beside the chosen ones, or in their place
+        quantity = NOT_GRANTED.format(kind, ", ".join(further).replace("_", " "))
+    return Unexplained(float(min(less / whole, 1.0)), True, quantity, expected, max(least, 0.0), further)
 
 
 def significance(prediction: Prediction, candidates: int) -> float:
@@ -105,10 +113,9 @@ def significance(prediction: Prediction, candidates: int) -> float:
     return float(student.isf(FALSE_ALARM / max(candidates, 1), max(blocks - 1, 1)))
 
 
-def _further(other: Hypothesis, chosen: Hypothesis) -> str:
-    """In words, the effects of another hypothesis that the chosen one does not have."""
-    more = [name for name in other.names if name not in chosen.names]
-    return f"further effects ({', '.join(more).replace('_', ' ')})"
+def _further(other: Hypothesis, chosen: Hypothesis) -> tuple[str, ...]:
+    """Names of the effects of another hypothesis that the chosen one does not have."""
+    return tuple(name for name in other.names if name not in chosen.names)
 
 
 def shares_of(contest: Contest, chosen: Hypothesis) -> dict[str, float]:

@@ -5,6 +5,8 @@ from typing import Any, Literal
 
 Name = Literal["not_identified", "other_unit", "large_shift", "value_at_zero", "long_delay", "negative_delay"]
 
+GIVEN_VALUES = "Are the values that the model is given near the machine's? If so, `rhythmid diagnose` names the physics that it lacks."
+
 
 @dataclass(frozen=True)
 class Caution:
@@ -30,7 +32,7 @@ def not_identified(motion: float, response: float | None) -> Caution:
     return Caution(
         "not_identified",
         f"not identified: the fit leaves {left} unexplained, so none of its values can be used",
-        "Are the values that the model is given near the machine's? If so, `rhythmid diagnose` names the physics that it lacks.",
+        GIVEN_VALUES,
     )
 
 

@@ -173,7 +173,7 @@ def descend(
             )
         gradient = jacobian.T @ residual
         blocked = ((values <= low) & (gradient > 0)) | ((values >= high) & (gradient < 0))
-        improved = False
+        improved = cut = False
         for _ in range(12):
             floor = np.array([a + STAY * (v - a) if v > b else a for v, a, b in zip(values, low, brink)])
             least, most = floor - values, high - values
@@ -204,9 +204,9 @@ def descend(
                 converged = gain < enough
                 break
             damping = max(damping * 10.0, LEAST_DAMPING)
-            if damping > 1e8:
+            if damping > 1e8 or (cut := time_is_up()):
                 break
-        converged = converged or not improved  # no direction lowers the cost any more
+        converged = converged or not (improved or cut)  # no direction lowers the cost any more
         if converged and not searched:
             searched, moved = True, sought(problem, model, current, states, state_steps)
             trial_residuals = problem.residuals(model, moved)

@@ -21,6 +21,7 @@ from rhythmid.identify.identification import Delays, Estimate, Identification, S
 from rhythmid.identify.inner_delays import dead_times
 from rhythmid.identify.joint import POOR_MOTION, JointFit, best_fit, explained
 from rhythmid.identify.large_shifts import large_shifts
+from rhythmid.identify.moving import moving
 from rhythmid.identify.natural_size import sizes_of
 from rhythmid.identify.own_zeros import with_own_zeros
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
@@ -185,13 +186,12 @@ def identify(
         raise InputError(
             "these records are of several joints: give a model with a body:, as Model.load reads it"
         )
-    given = cast(tuple[Record, ...], given)
-    clean = [cleaned(record) for record in given]
+    clean, still = moving([cleaned(one) for one in cast(tuple[Record, ...], given)])
     cut = [note for one in clean for note in cut_at_gaps(one.record).notes]
     found = _identified(
         tuple(one.record for one in clean), model, harmonics, method, forcing, offset, htf, tell
     )
-    return replace(found, notes=(*(note for one in clean for note in one.notes), *cut, *found.notes))
+    return replace(found, notes=(*still, *(note for one in clean for note in one.notes), *cut, *found.notes))
 
 
 def _identified(
@@ -269,7 +269,7 @@ class _Seen:
     ) -> tuple[Caution, ...]:
         """What should keep a user from believing the estimates. Raises InputError where a channel is in another unit."""
         stuck = joint is not None and not joint.search.arrived
-        cautions = large_shifts(self.nominal, parameters, delays, self.records[0].output.period)
+        cautions = large_shifts(self.nominal, parameters, delays, self.records)
         if not stuck and nrmse <= POOR_MOTION and shift(self.nominal, fitted) <= SHIFTED:
             return cautions
         mend = check_plausible(self.nominal, self.records)

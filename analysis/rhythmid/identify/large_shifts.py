@@ -1,12 +1,15 @@
 """Values that have left the nominal ones by far, or what is possible: there a fit may be absorbing physics that the model lacks."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
 
 from rhythmid.identify.caution import Caution
 from rhythmid.identify.identification import Delays, Estimate
 from rhythmid.identify.plausibility import gains
 from rhythmid.model import Model
+from rhythmid.record.record import Record
 from rhythmid.report.quantity import number, rounded
 
 TIMES = 4.0  # ratio of a value to the nominal one from which the shift is told
@@ -22,13 +25,18 @@ ABSORBING = "the fit may be absorbing missing physics"
 
 
 def large_shifts(
-    nominal: Model, parameters: Mapping[str, Estimate], delays: Delays, period: float
+    nominal: Model, parameters: Mapping[str, Estimate], delays: Delays, records: Sequence[Record]
 ) -> tuple[Caution, ...]:
-    """Values that have left the nominal ones by far, and negative delays; `period` [s] is the time between samples."""
+    """Values that have left the nominal ones by far, and delays that no machine has or that are longer than any of the `records`.
+
+    A delay of which the records give no standard deviation is told by its value alone: it is printed as well.
+    """
+    period = records[0].output.period
+    length = max(float(np.ptp(record.output.time)) for record in records)
     return (
         *_values(nominal, parameters),
         *_negative_delays(nominal, delays, period),
-        *_long_delays(nominal, delays, period),
+        *_long_delays(nominal, delays, period, length),
     )
 
 
@@ -63,38 +71,48 @@ def _values(nominal: Model, parameters: Mapping[str, Estimate]) -> Iterator[Caut
 def _negative_delays(nominal: Model, delays: Delays, period: float) -> Iterator[Caution]:
     """Delays by which the machine would answer before it is asked."""
     for side, found, expected in _estimated(nominal, delays):
-        if found.value is None or found.std is None:
-            continue
-        if found.value >= -max(EARLY * found.std, EARLY_LEAST * period):
+        if found.value is None or found.value >= -max(EARLY * (found.std or 0.0), EARLY_LEAST * period):
             continue
         yield Caution(
             "negative_delay",
-            f"{_named(side)} at {rounded(1e3 * found.value, 1e3 * found.std)} ± {number(1e3 * found.std, 2)} ms, but no machine answers before "
-            f"it is asked: {ABSORBING}",
+            f"{_named(side)} at {_size(found)}, but no machine answers before it is asked: {ABSORBING}",
             "Do the clocks of command and measurement agree, and is the input held from its stamps on (hold: in signals.yaml)? If so, "
             "`rhythmid diagnose` names the limit or other physics that the model lacks.",
             f"delay: {side}", found.value, expected, "s",
         )  # fmt: skip
 
 
-def _long_delays(nominal: Model, delays: Delays, period: float) -> Iterator[Caution]:
-    """Delays that are long; not where the limit cycle, which sees them another way than the response does, agrees."""
-    if delays.separable and delays.closure is not None and abs(delays.closure) <= AGREES:
-        return
+def _long_delays(nominal: Model, delays: Delays, period: float, length: float) -> Iterator[Caution]:
+    """Delays that are long; not where the limit cycle, which sees them another way than the response does, agrees, unless they are longer
+    than the record, within which no answer to any command would be."""
+    agree = delays.separable and delays.closure is not None and abs(delays.closure) <= AGREES
     for side, found, expected in _estimated(nominal, delays):
-        if found.value is None or found.std is None:
+        if found.value is None:
             continue
-        if found.value - expected - PASSED_BY * found.std <= SAMPLES * period:
+        beyond = found.value > length
+        long = found.value - expected - PASSED_BY * (found.std or 0.0) > SAMPLES * period
+        if not beyond and (agree or not long):
             continue
-        samples = math.floor((found.value - expected) / period)
+        than = f"{math.floor((found.value - expected) / period)} samples more than the nominal {1e3 * expected:g} ms"
+        if beyond:
+            than = (
+                f"longer than the record of {number(length, 3)} s, which holds no answer to any command then"
+            )
         yield Caution(
             "long_delay",
-            f"{_named(side)} at {rounded(1e3 * found.value, 1e3 * found.std)} ms, {samples} samples more than the nominal "
-            f"{1e3 * expected:g} ms: {ABSORBING}",
+            f"{_named(side)} at {_size(found)}, {than}: {ABSORBING}",
             "Is so long a delay known from the bus, the network or the drive? If not, `rhythmid diagnose` weighs it against lags, "
             "play and friction.",
             f"delay: {side}", found.value, expected, "s",
         )  # fmt: skip
+
+
+def _size(found: Estimate) -> str:
+    """A delay in ms with its standard deviation, or that the records give none."""
+    value = 1e3 * (found.value or 0.0)
+    if found.std is None:
+        return f"{number(value, 3)} ms, which the records do not determine"
+    return f"{rounded(value, 1e3 * found.std)} ± {number(1e3 * found.std, 2)} ms"
 
 
 def _named(side: str) -> str:

@@ -26,7 +26,12 @@ def hypotheses_section(found: Findings) -> Section:
     """The hypotheses, the best first, and the score tests from which they came."""
     rows: Sequence[Mapping[str, Any]] = found.result["hypotheses"]
     chosen = sorted(found.chosen)
-    against = {tuple(sorted(row["hypothesis"])) for row in found.result["rejections"]}
+    alike = found.result["indistinguishable"]
+    against = {
+        tuple(sorted(row["hypothesis"]))
+        for row in found.result["rejections"]
+        if not interchangeable(row["hypothesis"], chosen, alike)
+    }
     blocks: list[Block] = [
         Paragraph(
             "Each hypothesis is a model that was fitted to the records. It is scored by how well it predicts stretches of them that its "
@@ -108,6 +113,16 @@ def most_weighed(hypotheses: Sequence[tuple[Sequence[str], float]]) -> int:
     return max((len(effects) for effects, chance in hypotheses if chance > 0.0), default=0) or -1
 
 
+def interchangeable(elements: Sequence[str], chosen: Sequence[str], groups: Sequence[Sequence[str]]) -> bool:
+    """Whether these elements are the chosen ones but for one, with a name of the same indistinguishable group in its place."""
+    mine, other = set(elements) - set(chosen), set(chosen) - set(elements)
+    return (
+        len(elements) == len(chosen)
+        and len(mine) == len(other) == 1
+        and any(mine | other <= {*g} for g in groups)
+    )
+
+
 def grouped(excluded: Sequence[tuple[str, str]]) -> list[str]:
     """What was not tried, as (name, reason), in one line for each reason, with all its names."""
     names: dict[str, list[str]] = {}
@@ -137,6 +152,8 @@ def _row(
     said = "not believed, see below" if tuple(sorted(elements)) in against else NONE
     if sorted(elements) == chosen:
         said = "chosen"
+    elif interchangeable(elements, chosen, found.result["indistinguishable"]):
+        said = "as good as the chosen one"
     chance = _weight(row, weighed, found.result["verdict"] in ("missing_physics", "consistent"))
     kind = KINDS.get(row["kind"], pretty_name(row["kind"]))
     return name, kind, behind, chance, percent(row["heldout_nrmse"]), said

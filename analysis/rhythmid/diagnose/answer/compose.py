@@ -18,7 +18,7 @@ from rhythmid.diagnose.answer.result import (
     Untried,
 )
 from rhythmid.diagnose.answer.wording import freed_value, location_of, recalibrated, summary_of
-from rhythmid.diagnose.case import Case
+from rhythmid.diagnose.case import EXPLAINED, Case
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.evidence import difference
 from rhythmid.diagnose.free_run import FreeRunResult
@@ -36,6 +36,7 @@ from rhythmid.model import Model
 
 SHOWN = 8  # alternatives listed
 ONE_CLOCK = "The clocks of command and measurement agree: an offset between them counts as delay."
+MORE_TIME = "none computed in the time given; a larger --budget tells which experiment separates best"
 RIVALS = 10.0  # difference of the information criterion within which a rival is worth an experiment
 
 
@@ -108,7 +109,11 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         fit={"refitted_nominal": plain, "augmented": augmented},
         parameters={name: estimated(fit, name) for name in fit.model.parameters},
         delays=delays_of(fit),
-        next_experiment=next_experiment(found, rivals, series, decision.verdict),
+        next_experiment=(
+            MORE_TIME
+            if case.budget.passed(EXPLAINED)
+            else next_experiment(found, rivals, series, decision.verdict)
+        ),
         scoring=Scored(result.scoring.kind, None, result.scoring.reason),
         calibration=(
             *result.calibration.notes,
@@ -121,6 +126,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
             *notes,
             *held_out_zero_notes(fit, result.unseen if case.holdout and not case.budget.spent else ()),
         ),
+        chosen=result.selection.chosen.elements,
         assumptions=(ONE_CLOCK,) if any(one.command is not None for one in series) else (),
     )
 

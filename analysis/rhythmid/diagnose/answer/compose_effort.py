@@ -49,7 +49,10 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     )
     remainder = _remainder(result)
     if not slots and decision.verdict == "unknown_physics":
-        slots, where = ["force"], f"{SENTENCES['force']}; it depends on {remainder.goes_with}"
+        where = SENTENCES["force"]
+        slots = ["force"]
+        if remainder.goes_with is not None:
+            where += f"; it depends on {remainder.goes_with}"
     held = f"held out: {', '.join(dict.fromkeys(record.whole or record.name for record in case.holdout))}"
     return Diagnosis(
         verdict=decision.verdict,
@@ -67,6 +70,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         parameters=effort_parameters(chosen),
         delays=effort_delays(chosen),
         next_experiment=_next_experiment(result),
+        chosen=result.selection.chosen.elements,
         scoring=Scored("effort", result.applicability.bandwidth, result.applicability.reason),
         assumptions=(FIXED_SCALE, NO_SENSOR),
         calibration=recalibrated(case.nominal, chosen.fit.model, chosen.std()),
@@ -106,11 +110,11 @@ def _missing(fitted: Fitted, label: str, result: EffortResult) -> MissingEffect:
 
 
 def _remainder(result: EffortResult) -> Remainder:
-    left, found = result.decision.unexplained, result.remainder
-    curve = None
-    if left.significant:  # over the quantity that is named
-        curve = Curve(tuple(map(float, found.curves[0].value)), tuple(map(float, found.curves[0].mean)))
-    return Remainder(left.share, left.significant, found.goes_with if left.significant else None, curve)
+    """What is left, as the decision has it, with the curve over the quantity that it names; effects that are granted no place have none."""
+    left = result.decision.unexplained
+    drawn = next((one for one in result.remainder.curves if one.quantity == left.goes_with), None)
+    curve = None if drawn is None else Curve(tuple(map(float, drawn.value)), tuple(map(float, drawn.mean)))
+    return Remainder(left.share, left.significant, left.goes_with, curve)
 
 
 def effort_delays(fitted: Fitted) -> dict:
@@ -135,8 +139,9 @@ def _next_experiment(result: EffortResult) -> str:
     if decision.equivalent:
         rivals = "; and ".join(listed(group) for group in decision.equivalent)
         return f"several speeds in both directions, slow reversals and another load: what separates {rivals}"
-    if result.decision.unexplained.significant:
-        return (
-            f"the same motion with {result.decision.unexplained.goes_with} varied alone over its whole range"
-        )
+    left = decision.unexplained
+    if left.further:
+        return f"a longer record of more varied motion: what would establish {listed(left.further)}, or rule it out"
+    if left.significant:
+        return f"the same motion with {left.goes_with} varied alone over its whole range"
     return "motion with more varied speed, load and position"

@@ -6,9 +6,9 @@ from dataclasses import asdict
 from rich.console import Console
 from rich.markup import escape
 
-from rhythmid.diagnose.answer.result import Diagnosis, Remainder, Scored
+from rhythmid.diagnose.answer.result import Diagnosis, Explanation, Remainder, Scored
 from rhythmid.diagnose.rejections import Rejection
-from rhythmid.report.hypotheses import grouped, most_weighed
+from rhythmid.report.hypotheses import grouped, interchangeable, most_weighed
 from rhythmid.report.quantity import number
 from rhythmid.report.terminal_table import print_estimates, print_table
 
@@ -54,7 +54,7 @@ def show(found: Diagnosis, console: Console) -> None:
     ):
         for line in group:
             lines.said(label, line)
-    for line in rejection_words(found.rejections):
+    for line in rejection_words(told_rejections(found)):
         lines.said("not believed", line)
     lines.said("next experiment", found.next_experiment)
 
@@ -73,7 +73,12 @@ class _Lines:
 
 
 def _print_hypotheses(found: Diagnosis, console: Console) -> None:
-    shown = found.hypotheses[:HYPOTHESES_SHOWN]
+    shown = [
+        one
+        for place, one in enumerate(found.hypotheses)
+        if place < HYPOTHESES_SHOWN or _is_chosen(found, one)
+    ]
+    best = min(len(found.hypotheses), HYPOTHESES_SHOWN)
     weighed = most_weighed([(one.elements, one.probability) for one in found.hypotheses])
     stands = found.verdict in ("missing_physics", "consistent")
     figures = ("worse by", "probability" if stands else "weight of evidence", "held-out error")
@@ -82,15 +87,21 @@ def _print_hypotheses(found: Diagnosis, console: Console) -> None:
         behind = "best" if one.score_difference == 0.0 else _worse(one.score_difference, one.standard_error)
         held = NONE if one.heldout_nrmse is None else f"{number(100.0 * one.heldout_nrmse, 3)} %"
         weight = _weight(one.probability, stands) if len(one.elements) <= weighed else NONE
-        name = " + ".join(one.elements) or NOMINAL
+        name = (" + ".join(one.elements) or NOMINAL) + (" (chosen)" if _is_chosen(found, one) else "")
         rows.append((name, one.kind.replace("_", " "), behind, weight, held))
     print_table(
         console,
-        f"the {len(shown)} best of {len(found.hypotheses)} hypotheses, by their predictions of unseen data",
+        f"the {best} best of {len(found.hypotheses)} hypotheses{', and the chosen one' if len(shown) > best else ''}, "
+        "by their predictions of unseen data",
         ("hypothesis", "kind", *figures),
         rows,
         right=figures,
     )
+
+
+def _is_chosen(found: Diagnosis, one: Explanation) -> bool:
+    """Whether a hypothesis is the one that the answer was made from."""
+    return sorted(one.elements) == sorted(found.chosen)
 
 
 def remainder_words(left: Remainder) -> str:
@@ -107,6 +118,18 @@ def scoring_words(scored: Scored) -> str:
     ]
     below = "" if scored.bandwidth is None else f" below {scored.bandwidth:.3g} Hz"
     return f"{how}{below}: {scored.reason}"
+
+
+def told_rejections(found: Diagnosis) -> list[Rejection]:
+    """The rejections in the order of the hypotheses, without those of hypotheses that are told as indistinguishable from the chosen one:
+    what speaks against them is only that it is simpler."""
+    rank = {tuple(sorted(one.elements)): place for place, one in enumerate(found.hypotheses)}
+    against = [
+        row
+        for row in found.rejections
+        if not interchangeable(row.hypothesis, found.chosen, found.indistinguishable)
+    ]
+    return sorted(against, key=lambda row: rank.get(tuple(sorted(row.hypothesis)), len(rank)))
 
 
 def rejection_words(rejections: Sequence[Rejection]) -> list[str]:

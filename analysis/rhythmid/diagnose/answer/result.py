@@ -129,7 +129,8 @@ def settled(verdict: Verdict, indistinguishable: tuple[tuple[str, ...], ...]) ->
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The answer to: which physics does the model lack?"""
+    """The answer to: which physics does the model lack? `chosen` are the elements of the hypothesis that `augmented`, `parameters` and
+    `remainder` are of, nothing where that is the nominal model."""
 
     verdict: Verdict
     summary: str
@@ -152,6 +153,7 @@ class Diagnosis:
     excluded: tuple[Untried, ...] = ()
     heldout: str = ""
     notes: tuple[str, ...] = field(default=())
+    chosen: tuple[str, ...] = ()
 
     @property
     def refitted_nominal(self) -> FitQuality:

@@ -97,7 +97,9 @@ def summary_of(
         )
         if of_main and decision.rule == "rivals":
             groups = "; and ".join(listed(group, "or") for group in decision.equivalent)
-            return f"{said} They are {groups}."
+            open_ = {name for group in decision.equivalent for name in group}
+            others = listed([one.element for one in missing if one.element not in open_])
+            return f"{said} They are {groups}{f', each beside {others}' if others else ''}."
         main = (
             f", of which {in_words(missing[0].element)} explains {missing[0].share:.0%} of the mismatch"
             if len(missing) > 1

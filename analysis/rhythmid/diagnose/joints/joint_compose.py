@@ -57,8 +57,8 @@ def compose_machine(
         verdict = "undecided"
     return MachineDiagnosis(
         verdict=verdict,
-        summary=_summary(missing, unknown, undecided, answers),
-        location=_location(missing, unknown),
+        summary=summary_of_joints(missing, unknown, undecided, answers),
+        location=_location(missing, unknown, undecided),
         missing=tuple(missing),
         unknown=unknown,
         undecided=undecided,
@@ -145,12 +145,13 @@ def _link(machine: Machine, wrong: WrongLink) -> JointEffect:
     )  # fmt: skip
 
 
-def _summary(
+def summary_of_joints(
     missing: Sequence[JointEffect],
     unknown: Sequence[str],
     undecided: Sequence[str],
     answers: Mapping[str, Diagnosis],
 ) -> str:
+    """The joints at which something is wrong, and of those at which the records do not decide what each could lack."""
     said = []
     for one in missing:
         what = f"the {one.of_link}" if one.link else in_words(one.element)
@@ -159,17 +160,30 @@ def _summary(
     if unknown:
         words += f" At {', '.join(unknown)} something is missing that the catalogue does not know."
     if undecided:
-        words += f" At {', '.join(undecided)} the records do not decide: {answers[undecided[0]].summary}"
+        for why, joints in _alike(undecided, answers).items():
+            words += f" At {', '.join(joints)} the records do not decide: {why}"
     return words.strip() or "Nothing of practical size is missing at any joint."
 
 
-def _location(missing: Sequence[JointEffect], unknown: Sequence[str]) -> JointLocation:
+def _alike(joints: Sequence[str], answers: Mapping[str, Diagnosis]) -> dict[str, list[str]]:
+    """What is said at these joints, each of which has rivals of its own, and the joints at which the same is said."""
+    found: dict[str, list[str]] = {}
+    for joint in joints:
+        found.setdefault(answers[joint].summary, []).append(joint)
+    return found
+
+
+def _location(
+    missing: Sequence[JointEffect], unknown: Sequence[str], undecided: Sequence[str]
+) -> JointLocation:
     if missing:
         first = missing[0]
         where = SENTENCES.get(first.slot, "in the inertia of the body")
         return JointLocation(first.joint, first.slot, f"at joint {first.joint}, {where}")
     if unknown:
         return JointLocation(unknown[0], "force", f"at joint {unknown[0]}, {SENTENCES['force']}")
+    if undecided:
+        return JointLocation(None, None, f"not decided; the model is in doubt at {', '.join(undecided)}")
     return JointLocation(None, None, "nowhere: the refitted model explains the effort of every joint")
 
 

@@ -270,6 +270,8 @@ def _finely_fitted(task: _Task, trial: Trial, noise: NoiseModel, step: float) ->
     """The whole fit of a trial, with the step [s] that it needs: what was an error of integration beside a mismatch may be all that is
     left once that is explained."""
     fit = whole_fit(trial, task.series, noise, step, pool=task.pool)
+    if time_is_up():
+        return fit, step
     left = noise_of(fit.residuals, task.series, task.floor)
     finer = accurate(fit.run, fit.model, fit.starts, POOR_FIT * left.variance**0.5, 2)
     if finer.max_step >= 0.45 * fine_enough(trial.model, step):
@@ -328,7 +330,7 @@ def _most_likely(
 
     The first noise model is coloured by the effect that is missing and can put a surrogate ahead by a little.
     """
-    if len(near) == 1:
+    if len(near) == 1 or time_is_up():
         return near[0]
 
     def left(trial: Trial) -> float:

@@ -7,6 +7,7 @@ stands behind them at first, for its score needs no place.
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from rhythmid.deadline import time_is_up
 from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.trial import Proposal, Trial
 from rhythmid.elements.element import Element
@@ -21,7 +22,7 @@ CHAINS = ("command", "actuator", "sensor")
 def in_best_order(trial: Trial, series: Sequence[Series], noise: NoiseModel, step: float) -> Trial:
     """The trial, or the same effects with the newest one at another place of its chain, where that fits better."""
     others = [Proposal(trial.added, model, ({},)) for model in other_orders(trial.model, trial.added[-1])]
-    if not others:
+    if not others or time_is_up():
         return trial
     states = compile_model(trial.model).layout.states
     moved, _ = run_trials(others, series, trial.starts, states, noise, step)

@@ -18,6 +18,7 @@ from rhythmid.body.machine import Machine
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit, fit_effort, size_of
+from rhythmid.identify.joint import POOR_MOTION
 from rhythmid.identify.joints.base_parameters import InertialEstimate, estimate_inertia
 from rhythmid.identify.joints.correlation import Correlations
 from rhythmid.identify.joints.held_reference import balances_of, not_told
@@ -71,7 +72,8 @@ class MachineIdentification(Result):
 
     `parameters` by "joint.element.parameter" and "body.joint.armature"; `effort_nrmse` of each joint's predicted effort, `free_run`
     of its motion as given and as identified, on records or ends of records that no fit has seen where `unseen`; `worse` the joints whose
-    motion the identified values predict worse than those given; `not_separable` in words.
+    motion the identified values predict worse than those given, `not_identified` those of which they predict neither motion nor effort;
+    `not_separable` in words.
     """
 
     machine: Machine
@@ -83,11 +85,19 @@ class MachineIdentification(Result):
     free_run: dict[str, dict[str, float]]
     unseen: bool
     worse: tuple[str, ...] = ()
+    not_identified: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
+
+    @property
+    def usable(self) -> bool:
+        """Whether the fit explains enough of every joint to be called an identification."""
+        return not self.not_identified
 
     @property
     def headline(self) -> str:
         """How well the efforts are predicted."""
+        if not self.usable:
+            return f"Not identified: {', '.join(self.not_identified)}: neither motion nor effort is predicted"
         worst = max(self.effort_nrmse, key=lambda joint: self.effort_nrmse[joint])
         return f"{len(self.parameters)} parameters; efforts missed by {100.0 * self.effort_nrmse[worst]:.3g} % at most, at {worst}"
 
@@ -113,6 +123,7 @@ class MachineIdentification(Result):
         from dataclasses import asdict
 
         return {
+            "usable": self.usable,
             "parameters": {name: one.to_dict() for name, one in self.parameters.items()},
             "correlations": self.correlations.to_dict(),
             "not_separable": list(self.not_separable),
@@ -122,6 +133,7 @@ class MachineIdentification(Result):
                 "free_run": self.free_run,
                 "unseen": self.unseen,
                 "worse": list(self.worse),
+                "not_identified": list(self.not_identified),
             },
             "notes": list(self.notes),
         }
@@ -175,14 +187,18 @@ def identify_machine(
     runs, notes = {}, [*machine.body.notes, *said, *of_holdout]
     others = JointBalances.of(machine, unseen, balances)
     try:
-        runs["given"] = free_runs(machine, others, unseen).nrmse
+        made = free_runs(machine, others, unseen)
+        runs["given"] = made.nrmse
+        notes.extend(made.told("given"))
         if free and balances.computed:
             known = _known(identified, found)
             identified, spread, refined = refine(identified, balances, seen, known, EXPECTED)
             correlations.append(refined)
             for name, std in spread.items():
                 found[name] = replace(found[name], value=identified.value(name), std=std)
-        runs["identified"] = free_runs(identified, others, unseen).nrmse
+        made = free_runs(identified, others, unseen)
+        runs["identified"] = made.nrmse
+        notes.extend(made.told("identified"))
     except InputError as error:
         notes.append(f"no free run: {error}")
     told = Correlations.joined(correlations)
@@ -190,7 +206,7 @@ def identify_machine(
     notes.extend(_warning(joint, runs) for joint in worse)
     return MachineIdentification(
         identified, found, told, (*_not_separable(told, balances.computed), *not_told(balances, seen)), inertia, errors,
-        runs, True, worse, tuple(notes),
+        runs, True, worse, poor_joints(errors, runs.get("identified")), tuple(notes),
     )  # fmt: skip
 
 
@@ -200,6 +216,19 @@ def worse_joints(runs: Mapping[str, Mapping[str, float]]) -> tuple[str, ...]:
         return ()
     before, after = runs["given"], runs["identified"]
     return tuple(joint for joint in before if after[joint] > max(WORSE * before[joint], before[joint] + MUCH))
+
+
+def poor_joints(efforts: Mapping[str, float], motions: Mapping[str, float] | None) -> tuple[str, ...]:
+    """The joints of which more than `POOR_MOTION` is missed: of the effort, and of the motion in free run where there is one.
+
+    Either is enough to have been identified: without a controller the right machine drifts from the recorded motion as well, for small
+    errors of its effort add up, and where a reference makes the joint run its effort may be known by a guessed scale only.
+    """
+    return tuple(
+        joint
+        for joint, effort in efforts.items()
+        if effort > POOR_MOTION and (motions is None or motions[joint] > POOR_MOTION)
+    )
 
 
 def _warning(joint: str, runs: Mapping[str, Mapping[str, float]]) -> str:

@@ -34,9 +34,22 @@ TRIALS = 8  # runs of the whole with other parameters, at most
 
 @dataclass(frozen=True)
 class FreeRuns:
-    """Free runs: by joint the error (rms) as a share of the motion's standard deviation."""
+    """Free runs: by joint the error (rms) as a share of the motion's standard deviation; in how many of so many `stretches` the run `diverged`,
+    and in words the first."""
 
     nrmse: dict[str, float]
+    stretches: int
+    diverged: int
+    first: str = ""
+
+    def told(self, name: str) -> tuple[str, ...]:
+        """In one line, that runs with the values of this name diverge; nothing where none does."""
+        if not self.diverged:
+            return ()
+        runs = f"{self.diverged} of {self.stretches} free runs" if self.stretches > 1 else "the free run"
+        return (
+            f"{runs} with the {name} values: {self.first}; counted there as {100.0 * DIVERGED:.0f} % of the motion",
+        )
 
 
 @dataclass(frozen=True)
@@ -76,24 +89,46 @@ def _signal(channel: Channel, hold: Hold) -> PPoly:
 
 def errors_of(machine: Machine, balances: JointBalances, records: Sequence[JointRecord]) -> Array:
     """Errors (n, joints) of free runs over all stretches, each as a share of its joint's motion."""
+    return np.concatenate([errors for errors, _ in _runs(machine, balances, records)])
+
+
+def _runs(
+    machine: Machine, balances: JointBalances, records: Sequence[JointRecord]
+) -> list[tuple[Array, str]]:
+    """Of each stretch the errors (n, joints) of a free run as shares of the joints' motion, and in words why it has no end."""
     sizes = _sizes(balances, machine)
     drives = [commands(machine, record) for record in records]
     worker = machine.body.worker()
-    found = []
+    found: list[tuple[Array, str]] = []
     for body in balances.bodies:
         measured = _measured(machine, body)
         try:
             made = _run(machine, body, *drives[body.stretch.record], worker)
-            found.append((made - measured) / sizes)
-        except InputError:
-            found.append(np.full(measured.shape, DIVERGED))
-    return np.clip(np.concatenate(found), -DIVERGED, DIVERGED)
+            errors = (made - measured) / sizes
+            found.append((np.clip(errors, -DIVERGED, DIVERGED), _astray(machine, body, errors)))
+        except InputError as error:
+            found.append((np.full(measured.shape, DIVERGED), str(error)))
+    return found
+
+
+def _astray(machine: Machine, body: BodyMotion, errors: Array) -> str:
+    """In words, where a run of errors (n, joints) first is as far off as one that diverges counts for; nothing where it is nowhere."""
+    far = np.abs(errors) >= DIVERGED
+    if not far.any():
+        return ""
+    first = int(np.argmax(far.any(axis=1)))
+    joint = machine.joints[int(np.argmax(far[first]))]
+    return f"the simulation is off by more than {DIVERGED:g} times the motion of {joint} from t = {body.stretch.time[first]:.4g} s on"
 
 
 def free_runs(machine: Machine, balances: JointBalances, records: Sequence[JointRecord]) -> FreeRuns:
     """How well the machine predicts these records' motion."""
-    errors = np.sqrt(np.mean(errors_of(machine, balances, records) ** 2, axis=0))
-    return FreeRuns(dict(zip(machine.joints, errors.tolist(), strict=True)))
+    made = _runs(machine, balances, records)
+    errors = np.sqrt(np.mean(np.concatenate([one for one, _ in made]) ** 2, axis=0))
+    reasons = [reason for _, reason in made if reason]
+    return FreeRuns(
+        dict(zip(machine.joints, errors.tolist(), strict=True)), len(made), len(reasons), *reasons[:1]
+    )
 
 
 def refine(

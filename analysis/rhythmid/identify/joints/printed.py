@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from rhythmid.identify.caution import GIVEN_VALUES
 from rhythmid.report.quantity import number, rounded
 
 if TYPE_CHECKING:
@@ -14,7 +15,13 @@ if TYPE_CHECKING:
 
 def show_identification(found: "MachineIdentification", console: Console) -> None:
     """Print an identification: parameters, inertias, errors, and what the records do not tell apart."""
-    table = Table(title="parameters")
+    if not found.usable:
+        missed = ", ".join(map(escape, found.not_identified))
+        console.print(
+            f"[bold]not identified: the identified values predict neither the motion nor the effort of {missed}, so none of theirs can be used[/]"
+        )
+        console.print(f"  {GIVEN_VALUES}")
+    table = Table(title="parameters" + ("" if found.usable else " of a fit that is not usable"))
     for column in ("name", "value", "95 % interval", "unit"):
         table.add_column(column)
     for name, one in found.parameters.items():
