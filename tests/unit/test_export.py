@@ -64,7 +64,7 @@ force: [{linear_spring: {stiffness: 200.0}}, {viscous_damper: {damping: 1.0}}, {
 """
 SOFT = DRY.replace(
     "coulomb_friction: {force: 1.0, transition: 0.005}",
-    "soft_constraint_friction: {force: 1.0, transition: 0.02, lead: 0.015}",
+    "soft_constraint_friction: {force: 1.0, softness: 1.0, lead: 0.015}",
 )
 HANGING = """\
 inertia: {mass: {value: 0.5, unit: kg}}
@@ -146,7 +146,7 @@ def test_dry_friction_that_is_a_constraint_moves_in_mujoco_as_in_rhythmid_and_is
     assert error(found, expected) < 0.003
     urdf = exported([joint(SOFT)], "urdf")
     assert 'friction="1.0"' in urdf
-    assert "not expressed: friction_transition 0.02 m/s" in urdf
+    assert "not expressed: friction_regularisation 1.25 1/kg" in urdf
     both = SOFT.replace("force: [", "force: [{coulomb_friction: {force: 0.5}}, ")
     assert "two dry frictions" in exported([joint(both)], "mujoco")
 

@@ -50,7 +50,7 @@ def hinge() -> tuple[dict[str, float], dict[str, np.ndarray]]:
     impedance, weight = float(model.dof_solimp[0, 0]), float(model.dof_invweight0[0])
     values = {
         "force": FRICTION,
-        "transition": FRICTION * LEAD * weight * (1.0 - impedance) / impedance,
+        "softness": INERTIA * weight * (1.0 - impedance) / impedance,
         "lead": LEAD,
     }
     return values, {"time": time, **dict(zip(("x", "v", "a", "force"), rows.T))}
@@ -65,7 +65,9 @@ def test_the_law_is_the_frictionloss_of_mujoco_at_every_step(catalogue):
     values, run = hinge()
     kernel = catalogue["soft_constraint_friction"].kernel
     free = torque(run["time"]) / INERTIA
-    given = [kernel(a, 1.0 / INERTIA, 0.0, v, 0.0, 0.0, **values) for a, v in zip(free, run["v"])]
+    given = [
+        kernel(a, 1.0 / INERTIA, 0.0, v, 0.0, 0.0, **values, mass=INERTIA) for a, v in zip(free, run["v"])
+    ]
     np.testing.assert_allclose(given, run["force"], atol=1e-12)
     assert 0.02 < np.mean(np.abs(run["force"]) < 0.99 * FRICTION) < 0.5  # it slides, turns and creeps
 
@@ -82,7 +84,7 @@ def test_the_simulator_moves_as_mujoco_does():
     values, run = hinge()
     found = simulate(soft(values), run["time"], zero_order_hold(run["time"], torque(run["time"])))
     np.testing.assert_allclose(found.position, run["x"], atol=2e-3 * np.ptp(run["x"]))
-    sticking = soft(values | {"lead": 0.0, "transition": 1e-5})
+    sticking = soft(values | {"lead": 1e-6, "softness": 0.01})
     other = simulate(sticking, run["time"], zero_order_hold(run["time"], torque(run["time"])))
     assert np.abs(other.position - run["x"]).max() > 0.02 * np.ptp(run["x"])  # the lead is seen
 
@@ -91,7 +93,7 @@ def test_coulomb_friction_is_the_law_without_lead_and_creep(catalogue):
     law, coulomb = (catalogue[name].kernel for name in ("soft_constraint_friction", "coulomb_friction"))
     for v in (-0.3, -0.01, 0.02):
         for acceleration in (-5.0, 3.0):
-            here = law(acceleration, 2.0, 0.0, v, 0.0, 0.0, 0.4, 1e-6, 0.0)
+            here = law(acceleration, 2.0, 0.0, v, 0.0, 0.0, 0.4, 0.1, 1e-7, 1.0)
             assert here == pytest.approx(coulomb(0.0, v, 0.0, 0.0, 0.4, 1e-6, 1.0, 1e-9))
 
 
@@ -103,7 +105,7 @@ def machine_of(folder: Path, xml: str, joints: str) -> Machine:
 
 def test_a_body_that_mujoco_steps_has_the_law_and_writes_it_back(tmp_path: Path):
     values, run = hinge()
-    values |= {"transition": 3.0 * values["transition"], "lead": 0.02}  # not what MuJoCo does by default
+    values |= {"softness": 1.5 * values["softness"], "lead": 0.02}  # not what MuJoCo does by default
     command = zero_order_hold(run["time"], torque(run["time"]))
     machine = machine_of(tmp_path, HINGE.format(friction=""), "{hinge: {}}")
     machine = machine.with_element("hinge", load_catalogue()["soft_constraint_friction"], values)

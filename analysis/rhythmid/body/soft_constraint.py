@@ -1,8 +1,8 @@
 """Friction that is a constraint, in MuJoCo's words: `frictionloss` with the solver's parameters that make it the identified law.
 
 MuJoCo asks a joint with dry friction for the acceleration −b v and lets the force −(a + b v) / R grow no further than the friction loss.
-b = 2 / (d timeconst), R = (1 − d) w / d: w is the joint's `dof_invweight0`, and d is here the same for all violations. F = −clip(F_c (v + τ a) /
-v_t, ±F_c) follows with 1 / b = τ and R = v_t / (F_c τ).
+b = 2 / (d timeconst), R = (1 − d) w / d: w is the joint's `dof_invweight0`, and d is here the same for all violations. F = −clip(m (a + v / τ) / s,
+±F_c) follows with 1 / b = τ and R = s / m.
 """
 
 from collections.abc import Mapping
@@ -20,24 +20,23 @@ CRITICAL = 1.0  # damping ratio, which no friction uses: a friction has no posit
 
 @dataclass(frozen=True)
 class SoftConstraint:
-    """Dry friction of a joint: force F_c [N or N*m], transition v_t [m/s or rad/s] and lead τ [s]."""
+    """Dry friction of a joint: force F_c [N or N*m], regularisation R [1/kg or 1/(kg*m^2)] and lead τ [s]."""
 
     force: float
-    transition: float
+    regularisation: float
     lead: float
 
     @classmethod
-    def of(cls, term: Term) -> "SoftConstraint":
-        """The friction of a term."""
-        return cls(*(term.values[name].value for name in ("force", "transition", "lead")))
+    def of(cls, term: Term, mass: float) -> "SoftConstraint":
+        """The friction of a term, of a path with this inertia."""
+        values = {name: value.value for name, value in term.values.items()}
+        return cls(values["force"], values["softness"] / mass, values["lead"])
 
     def solver(self, weight: float, step: float) -> tuple[tuple[float, float], tuple[float, float]]:
         """MuJoCo's `solref` and the first two numbers of its `solimp`, for a joint of this `dof_invweight0` and steps [s] as long as
         these, which no lead is shorter than."""
         lead = max(self.lead, step)
-        stiff = self.force * lead * weight
-        impedance = stiff / (stiff + self.transition) if stiff > 0.0 else LEAST_IMPEDANCE
-        impedance = min(max(impedance, LEAST_IMPEDANCE), MOST_IMPEDANCE)
+        impedance = min(max(weight / (weight + self.regularisation), LEAST_IMPEDANCE), MOST_IMPEDANCE)
         return (2.0 * lead / impedance, CRITICAL), (impedance, impedance)
 
 
@@ -49,7 +48,7 @@ def put(model: Any, joints: Mapping[str, Joint], paths: Mapping[str, Model]) -> 
                 raise InputError(
                     f"{name}: {term.label} is a constraint that MuJoCo, which steps the body, does not have"
                 )
-            place, friction = joints[name].velocity, SoftConstraint.of(term)
+            place, friction = joints[name].velocity, SoftConstraint.of(term, path.mass.value)
             weight, step = float(model.dof_invweight0[place]), float(model.opt.timestep)
             model.dof_frictionloss[place] = friction.force
             model.dof_solref[place], model.dof_solimp[place, :2] = friction.solver(weight, step)

@@ -37,7 +37,7 @@ WRITTEN = {"ipos": "pos", "iquat": "quat", "inertia": "diaginertia"}  # of an in
 IN_PLACE = frozenset(
     (
         "inertia", "damping", "friction", "position_gain", "velocity_gain", "command_delay", "command_lag", "gain", "actuator_lag",
-        "actuator_delay", "effort_limit", "constant_force", "friction_transition", "friction_lead",
+        "actuator_delay", "effort_limit", "constant_force", "friction_regularisation", "friction_lead",
     )
 )  # fmt: skip
 

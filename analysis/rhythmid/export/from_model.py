@@ -158,7 +158,8 @@ def _falling_friction(reading: _Reading, term: Term, values: Values) -> None:
 def _soft_friction(reading: _Reading, term: Term, values: Values) -> None:
     reading.add("friction", values["force"])
     reading.soft_friction = values["force"]
-    reading.numbers |= {"friction_transition": values["transition"], "friction_lead": values["lead"]}
+    softness = values["softness"] / reading.mass
+    reading.numbers |= {"friction_regularisation": softness, "friction_lead": values["lead"]}
 
 
 def _sum_into(name: str, parameter: str) -> Callable[[_Reading, Term, Values], None]:

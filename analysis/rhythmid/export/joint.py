@@ -53,8 +53,8 @@ class Joint:
     damping: float = _quantity("N*s/m", "viscous damping")
     quadratic_damping: float = _quantity("N*s^2/m^2", "damping with the square of the speed")
     friction: float = _quantity("N", "dry friction while sliding")
-    friction_transition: float = _quantity(
-        "m/s", "fastest creep under the dry friction, where that is a constraint"
+    friction_regularisation: float = _quantity(
+        "1/kg", "regularisation of the dry friction, where that is a constraint"
     )
     friction_lead: float = _quantity("s", "by how much such a friction turns before the velocity")
     static_friction: float = _quantity("N", "dry friction at rest, where it is larger than while sliding")

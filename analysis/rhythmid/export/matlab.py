@@ -12,7 +12,7 @@ NONLINEAR = frozenset(
     (
         "quadratic_damping",
         "friction",
-        "friction_transition",
+        "friction_regularisation",
         "friction_lead",
         "static_friction",
         "quadratic_stiffness",

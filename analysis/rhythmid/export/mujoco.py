@@ -19,7 +19,7 @@ EXPRESSED = frozenset(
         "inertia", "gravity", "weight_moment", "hanging_position", "damping", "quadratic_damping", "friction", "stiffness",
         "spring_reference", "quadratic_stiffness", "cubic_stiffness", "constant_force", "position_gain", "velocity_gain",
         "command_delay", "command_lag", "gain", "actuator_lag", "actuator_delay", "effort_limit", "measurement_delay",
-        "friction_transition", "friction_lead",
+        "friction_regularisation", "friction_lead",
     )
 )  # fmt: skip
 
@@ -53,7 +53,7 @@ def _body(world: tree.Element, joint: Joint) -> None:
         f"inertia {joint.inertia:.6g} {joint.unit('inertia')} is link and rotor together: in a robot whose link has an inertia of "
         "its own, write the difference as armature of the joint",
     )
-    if joint.friction and not joint.friction_transition:
+    if joint.friction and not joint.friction_regularisation:
         comment(
             body,
             "frictionloss is a soft constraint: at rest it creeps, where the identified friction holds or turns smoothly",
@@ -78,8 +78,8 @@ def _body(world: tree.Element, joint: Joint) -> None:
 def friction(joint: Joint, weight: float, step: float = TIMESTEP) -> dict[str, str]:
     """Attributes of a joint's dry friction; `weight` is its inverse inertia [1/kg or 1/(kg*m^2)] in MuJoCo's reference pose."""
     words = {"frictionloss": number(joint.friction)}
-    if joint.friction_transition:
-        soft = SoftConstraint(joint.friction, joint.friction_transition, joint.friction_lead)
+    if joint.friction_regularisation:
+        soft = SoftConstraint(joint.friction, joint.friction_regularisation, joint.friction_lead)
         reference, impedance = soft.solver(weight, step)
         words |= {"solreffriction": vector(reference), "solimpfriction": vector(impedance)}
     return words

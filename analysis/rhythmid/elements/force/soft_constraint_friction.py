@@ -1,13 +1,16 @@
-"""Dry friction as a physics engine's soft constraint: F = −clip(F_c (v + τ a) / v_t, ±F_c), with the mass's own acceleration a.
+"""Dry friction as a physics engine's soft constraint: F = −clip(m (a + v / τ) / s, ±F_c), with the mass's own acceleration a.
 
 MuJoCo's `frictionloss` is this law, not F_c sgn v. Its constraint asks for the acceleration −b v, b = 2 / (d_max timeconst), with
 the force −(a + b v) / R and never more than the friction loss; R = (1 − d) / d times the joint's `dof_invweight0`, with d the first
-number of `solimp`. So τ = 1 / b (9.5 ms with its defaults) and v_t = F_c R / b: the sign turns τ earlier than the velocity does,
-and a light joint creeps at up to v_t.
+number of `solimp`. So τ = 1 / b (9.5 ms with its defaults) and s = m R (1/9 where nothing else moves with the joint): the sign turns
+τ earlier than the velocity does, and a light joint creeps at up to v_t = F_c τ s / m.
 
 The force needs the acceleration that it takes part in. With a = a₀ + F y, where a₀ is what the acceleration would be without it and
 the yielding y the inverse of the mass, F = −clip(F_c (v + τ a₀) / (v_t + F_c τ y), ±F_c). Along a measured motion the acceleration
 contains the force already, and y = 0.
+
+Lead and softness are the engine's numbers and hardly anybody changes them, so the search keeps near them. A friction with any lead
+would follow what stamps are out by, and one with any softness a viscous damper.
 """
 
 import math
@@ -15,10 +18,13 @@ import math
 from rhythmid.elements.element import Element, Parameter
 
 LEAD = 0.0095  # [s] with MuJoCo's defaults, 0.95 * 0.02 s / 2: d_max and timeconst of its solimp and solref
+SOFTNESS = 1.0 / 9.0  # with MuJoCo's defaults, (1 - d) / d with d = 0.9
+NEAR_LEAD = (0.8, 1.25)  # times LEAD, between which a search has it
+NEAR_SOFTNESS = (0.25, 4.0)  # times SOFTNESS, the same: the joints beside one make it seem lighter or heavier
 
 
-def kernel(acceleration, yielding, x, v, t, f, force, transition, lead):
-    ramp = max(transition + force * lead * yielding, 1e-300)
+def kernel(acceleration, yielding, x, v, t, f, force, softness, lead, mass):
+    ramp = max(force * lead * (softness / mass + yielding), 1e-300)
     return -force * max(-1.0, min(1.0, (v + lead * acceleration) / ramp))
 
 
@@ -27,15 +33,15 @@ ELEMENT = Element(
     slot="force",
     acts="constraint",
     title="Dry friction as a soft constraint",
-    equation="F = −clip(F_c (v + τ a) / v_t, ±F_c)",
+    equation="F = −clip(m (a + v / τ) / s, ±F_c)",
     parameters=(
         Parameter("force", "N", "friction force F_c while sliding", bounds=(0.0, math.inf)),
         Parameter(
-            "transition",
-            "m/s",
-            "speed v_t of the fastest creep under it",
+            "softness",
+            "1",
+            "softness s: the mass times the constraint's regularisation R",
             bounds=(0.0, math.inf),
-            default=1e-3,
+            default=SOFTNESS,
         ),
         Parameter(
             "lead",
@@ -45,12 +51,16 @@ ELEMENT = Element(
             default=LEAD,
         ),
     ),
+    borrows={"mass": ("inertia.mass", None)},
     kernel=kernel,
     size="force",
     starts=lambda s: [
-        {"force": 0.02 * s.force, "transition": w * s.velocity, "lead": LEAD} for w in (0.02, 0.1, 0.5)
+        {"force": share * s.force, "softness": SOFTNESS, "lead": LEAD} for share in (0.02, 0.1, 0.5)
     ],
-    ranges=lambda s: {"transition": s.turning},
+    ranges=lambda s: {
+        "softness": (NEAR_SOFTNESS[0] * SOFTNESS, NEAR_SOFTNESS[1] * SOFTNESS),
+        "lead": (NEAR_LEAD[0] * LEAD, NEAR_LEAD[1] * LEAD),
+    },
     candidate=False,
     also_known_as=("frictionloss", "regularised constraint"),
     family="friction",
