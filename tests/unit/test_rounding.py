@@ -6,6 +6,7 @@ import pytest
 from rhythmid.record.judged import judged
 from rhythmid.record.outlier import outlying_samples, repeated_samples
 from rhythmid.record.rounding import resolution, resolutions, shown_resolution
+from rhythmid.record.stamp_jitter import stamp_jitter
 
 TIME = 2e-4 * np.arange(45_000)
 SCALE = 3.125e-3  # rad, of a count
@@ -64,3 +65,7 @@ def test_a_square_wave_is_not_said_to_be_rounded_to_its_height() -> None:
 @pytest.mark.parametrize("motion", [np.cos(10.0 * TIME), np.sin(8.0 * TIME**1.5), TIME**2])
 def test_a_smooth_motion_without_noise_that_is_read_evenly_lies_on_no_grid(motion: np.ndarray) -> None:
     assert resolution(motion) == 0.0
+
+
+def test_rounding_that_grows_with_the_size_is_no_jitter_of_the_stamps() -> None:
+    assert stamp_jitter([(TIME, SCALE * written(angle() ** 2 / 600.0, 4))]) is None

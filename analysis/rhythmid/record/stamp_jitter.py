@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.record.rounding import resolution
+from rhythmid.record.rounding import resolutions
 from rhythmid.record.timing import GAP, nominal_period
 
 Array = NDArray[np.float64]
@@ -62,10 +62,13 @@ def stamp_jitter(stretches: Sequence[Samples]) -> StampJitter | None:
     if sum(len(t) for t, _ in given) < BINS * SAMPLES_OF_A_BIN:
         return None
     period = float(np.median([nominal_period(np.diff(time)) for time, _ in given]))
-    step = resolution(np.concatenate([value for _, value in given]))
+    steps = resolutions(np.concatenate([value for _, value in given]))
+    step = float(steps.max())
     coarse, fine = (_found(given, sides, period, step) for sides in SIDES)
     if coarse is None or fine is None or coarse.std > math.sqrt(AGREE) * fine.std:
         return None
+    if np.ptp(steps) > 0.0 and fine.noise <= step:
+        return None  # noise that is the rounding of numbers grows with their size, and so do speeds where these swing
     return fine
 
 
