@@ -9,6 +9,7 @@ import pytest
 from rhythmid.body.machine import Machine
 from rhythmid.body.simulate import simulate as simulate_machine
 from rhythmid.body.write_back import save_machine
+from rhythmid.diagnose.effort.candidate import Start, extended
 from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
@@ -170,3 +171,14 @@ def test_a_concealed_frictionloss_in_a_light_joint_is_named_and_nothing_where_th
     if friction:
         assert found.missing[0].parameters["force"].value == pytest.approx(friction, rel=0.1)
         assert found.missing[0].parameters["lead"].value == pytest.approx(LEAD, abs=0.004)
+
+
+def test_as_a_candidate_it_takes_the_place_of_the_coulomb_friction_that_it_contains(catalogue):
+    model = soft({"force": 0.1}).without("soft_constraint_friction")
+    model = model.with_element(catalogue["coulomb_friction"], {"force": 0.3})
+    start = Start(
+        "effects", "soft_constraint_friction", catalogue["soft_constraint_friction"], {"force": 0.2}
+    )
+    found, label = extended(model, start)
+    assert label == "soft_constraint_friction" and found.value("soft_constraint_friction.force") == 0.2
+    assert found.value("coulomb_friction.force") == 0.0 and "coulomb_friction.force" not in found.free

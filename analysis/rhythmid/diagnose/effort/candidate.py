@@ -115,7 +115,19 @@ def extended(model: Model, start: Start, factor: float = 1.0) -> tuple[Model, st
         margin = LEAST_START * abs(values[name] - element.absent)
         values[name] = float(np.clip(value, low + margin if low > -math.inf else low, high))
     grown = model.with_element(element, values)
-    return grown, grown.terms[-1].label
+    label = grown.terms[-1].label
+    return (_alone(grown, element) if element.acts == "constraint" else grown), label
+
+
+def _alone(model: Model, constraint: Element) -> Model:
+    """The model without the laws that a constraint contains, which then say nothing: an engine's joint has one dry friction."""
+    absent = {}
+    for term in model.terms:
+        element = term.element
+        if constraint.name in element.special_case_of and element.size:
+            name = f"{term.label}.{element.size}"
+            absent[name] = replace(model.parameters[name], value=element.absent, fixed=True)
+    return model.with_parameters(absent)
 
 
 def screen(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> list[Screened]:
