@@ -243,7 +243,7 @@ def asked(monkeypatch: pytest.MonkeyPatch, means: bool, share: float, error: flo
         order.append(scoring.kind)
         return SimpleNamespace(search=SimpleNamespace(fit=SimpleNamespace(model=hopper())))
 
-    effort = SimpleNamespace(applies=True, free_run_means_something=means, effort_share=share, balance=None)
+    effort = SimpleNamespace(applies=True, free_run_means_something=means, effort_share=share, notes=())
     monkeypatch.setattr(module, "applicable", lambda *_: effort)
     monkeypatch.setattr(module, "_by_effort", by_effort)
     monkeypatch.setattr(

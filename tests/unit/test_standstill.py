@@ -48,6 +48,7 @@ def test_a_flicker_between_two_counts_stands_still_however_it_lasts() -> None:
 def test_white_noise_that_goes_with_no_command_is_no_motion() -> None:
     said = standstill(made(1e-4 * noise(), np.sin(3.0 * TIME)))
     assert said is not None and "white noise" in said
+    assert standstill(made(1e-4 * noise(), np.sin(3.0 * TIME)), buried=False) is None
 
 
 @pytest.mark.parametrize("steps", [4.0, 40.0])

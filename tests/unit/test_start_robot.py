@@ -77,7 +77,7 @@ def test_a_robots_log_leads_to_the_joint_and_the_physics_that_its_file_lacks(tmp
         assert done.returncode == 0
     answer = json.loads((tmp_path / "answer.json").read_text())
     assert [(one["joint"], one["element"]) for one in answer["missing"]][:1] == [
-        ("elbow_joint", "coulomb_friction")
+        ("elbow_joint", "soft_constraint_friction")
     ]
     force = answer["missing"][0]["parameters"]["force"]
     assert force["value"] == pytest.approx(FRICTION, rel=0.1)

@@ -10,9 +10,10 @@ from rhythmid.record.standstill import standstill
 def moving(clean: Sequence[Cleaned]) -> tuple[list[Cleaned], tuple[str, ...]]:
     """The records in which the machine moves, and a note on each other one, which is left out.
 
-    Raises InputError where it stands still in all of them.
+    Noise in which a motion may be buried is judged by what a fit makes of it. Raises InputError where the machine stands still in
+    all of them.
     """
-    found = [(one, standstill(one.record)) for one in clean]
+    found = [(one, standstill(one.record, buried=False)) for one in clean]
     kept = [one for one, still in found if still is None]
     still = [f"{one.record.name}: {why}" for one, why in found if why is not None]
     if still and not kept:

@@ -26,10 +26,11 @@ CHANCE = 1e-3  # with which noise that goes with nothing is taken for driven
 USUAL = 1.4826  # standard deviations in a median absolute deviation
 
 
-def standstill(record: Record) -> str | None:
+def standstill(record: Record, buried: bool = True) -> str | None:
     """Why the machine of this record is taken to stand still, in one sentence with what to do; None where it moves, or too few
     samples tell.
 
+    Not `buried`, an output whose noise spans more than the rounding counts as a motion: a small one may lie in it.
     Outliers look like events: give it a `cleaned` record.
     """
     value = record.output.value
@@ -42,7 +43,7 @@ def standstill(record: Record) -> str | None:
     if levels <= FLICKER:
         return _sentence(f"{size}, between {levels} values that its sensor shows side by side")
     small = step > 0.0 and span <= FEW_STEPS * step
-    if not _noise(value, step, AVERAGED if small else WHITE) or _driven(record):
+    if not (small or buried) or not _noise(value, step, AVERAGED if small else WHITE) or _driven(record):
         return None
     if small:
         return _sentence(f"{size}, {span / step:.0f} steps of its resolution, as noise does that is rounded")
