@@ -51,9 +51,8 @@ def joint_catalogue(catalogue: Catalogue) -> Catalogue:
                 for rest in (s.low, s.centre, s.high)
             ],
         )
-    if (
-        friction := found.get("soft_constraint_friction")
-    ) is not None:  # what a simulated robot's joints have
+    # what the joints of a simulated robot have
+    if (friction := found.get("soft_constraint_friction")) is not None:
         found[friction.name] = replace(friction, candidate=True)
     if (constant := found.get("constant_force")) is not None:  # a spring that is at rest far from the motion
         found[constant.name] = replace(constant, special_case_of=(*constant.special_case_of, "linear_spring"))

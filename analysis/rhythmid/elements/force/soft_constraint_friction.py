@@ -19,7 +19,7 @@ from rhythmid.elements.element import Element, Parameter
 
 LEAD = 0.0095  # [s] with MuJoCo's defaults, 0.95 * 0.02 s / 2: d_max and timeconst of its solimp and solref
 SOFTNESS = 1.0 / 9.0  # with MuJoCo's defaults, (1 - d) / d with d = 0.9
-NEAR_LEAD = (0.9, 1.1)  # times LEAD, between which a search has it
+NEAR_LEAD = (0.9, 1.1)  # times LEAD, between which a search has it: recorded motions give it within 5 %
 NEAR_SOFTNESS = (0.25, 4.0)  # times SOFTNESS, the same: the joints beside one make it seem lighter or heavier
 
 
