@@ -151,22 +151,22 @@ def summary_of_joints(
     undecided: Sequence[str],
     answers: Mapping[str, Diagnosis],
 ) -> str:
-    """The joints at which something is wrong, and of those at which the records do not decide what each could lack."""
+    """The joints at which something is wrong; of those with unknown physics what that depends on, and of those at which the records do not
+    decide what each could lack."""
     said = []
     for one in missing:
         what = f"the {one.of_link}" if one.link else in_words(one.element)
         said.append(f"{one.joint}: {what}")
     words = f"The model is wrong at {'; '.join(said)}." if said else ""
-    if unknown:
-        words += f" At {', '.join(unknown)} something is missing that the catalogue does not know."
-    if undecided:
-        for why, joints in _alike(undecided, answers).items():
-            words += f" At {', '.join(joints)} the records do not decide: {why}"
+    for why, joints in _alike(unknown, answers).items():
+        words += f" At {', '.join(joints)} {why[0].lower()}{why[1:]}"
+    for why, joints in _alike(undecided, answers).items():
+        words += f" At {', '.join(joints)} the records do not decide: {why}"
     return words.strip() or "Nothing of practical size is missing at any joint."
 
 
 def _alike(joints: Sequence[str], answers: Mapping[str, Diagnosis]) -> dict[str, list[str]]:
-    """What is said at these joints, each of which has rivals of its own, and the joints at which the same is said."""
+    """What is said at these joints, each of which has an answer of its own, and the joints at which the same is said."""
     found: dict[str, list[str]] = {}
     for joint in joints:
         found.setdefault(answers[joint].summary, []).append(joint)
