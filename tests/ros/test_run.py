@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,10 @@ from rclpy.utilities import try_shutdown
 from rosbags.rosbag2 import Reader
 from sensor_msgs.msg import JointState
 
+from rhythmid.errors import InputError
 from rhythmid.experiment import Experiment
 from rhythmid.offline_run import perform
+from rhythmid.record.bag import Bag
 from rhythmid_nodes.joint_state import JointStateReader
 
 MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"
@@ -59,6 +62,17 @@ def content(bag: Path, namespace="/hopper"):
     return rows, run
 
 
+def recorded(bag: Path) -> Counter[str]:
+    """Topic -> number of messages that are on the disk of a bag that may still be written."""
+    counts = Counter()
+    try:
+        for block in Bag(bag).blocks():
+            counts[block.topic.name] += len(block)
+    except InputError:  # not yet a bag
+        pass
+    return counts
+
+
 class Running:
     """`rhythmid run` in the background."""
 
@@ -82,9 +96,9 @@ class Running:
         return found
 
     def wait_for_samples(self, bag: Path):
-        """Until the first second is on the disk, or the run has failed to come so far."""
+        """Until samples of the excitation, which starts last, are on the disk, or the run has failed to come so far."""
         patience = time.monotonic() + 60
-        while not (bag.is_dir() and sum(file.stat().st_size for file in bag.iterdir()) > 50_000):
+        while recorded(bag).get("/hopper/excitation", 0) < 100:
             assert self.process.poll() is None and time.monotonic() < patience, self.process.stderr.read()
             time.sleep(0.05)
 
