@@ -52,12 +52,15 @@ def supposed(
     free: int | None = None,
     shape: Mapping[str, float] | None = None,
     richer: Mapping[str, tuple[str, ...]] | None = None,
+    family: Mapping[str, str] | None = None,
 ) -> Hypothesis:
-    """A hypothesis of effects, whose labels (split at spaces) are their names."""
+    """A hypothesis of effects, whose labels (split at spaces) are their names; `family` are their families."""
     labels = tuple(elements.split())
     chosen = kind or ("effects" if labels else "nominal")
     count = 5 + len(labels) if free is None else free
-    return Hypothesis(labels, labels, chosen, count, prediction, 0.1, shape or {}, richer or {})
+    return Hypothesis(
+        labels, labels, chosen, count, prediction, 0.1, shape or {}, richer or {}, family=family or {}
+    )
 
 
 def contest(

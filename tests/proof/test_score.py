@@ -253,3 +253,19 @@ def test_the_card_counts_by_size_and_tells_what_was_confused():
     assert "rhythmid proof --seed 1" in text
     assert "| coulomb_friction | coulomb_friction 1, backlash 1 |" in text
     assert rate(scores, lambda s: s.outcome == "exact").share == pytest.approx(1 / 3)
+
+
+def test_a_family_is_right_where_something_of_it_was_concealed_or_is_clutter():
+    families = [
+        {"family": "friction", "laws": [], "share": 0.9, "probability": 0.93},
+        {"family": "lag", "laws": [], "share": 0.1, "probability": 0.85},
+        {"family": "stiffness", "laws": [], "share": 0.0, "probability": 0.2},
+    ]
+    one = judged(
+        truth("coulomb_friction", clutter=("sensor_lag",)), answer("undecided") | {"families": families}
+    )
+    assert [(kind.right, kind.related) for kind in one.kinds] == [(True, True), (True, False), (False, False)]
+    assert len(one.kinds_stated) == 2 and one.kind_right
+    other = judged(truth("second_mode"), answer("undecided") | {"families": families})
+    assert not other.kind_right and "| 0/1 = 0.0 %" in markdown([other], "proof")
+    assert not judged(truth("coulomb_friction"), answer("undecided")).kinds

@@ -7,6 +7,7 @@ from contests import NOMINAL, contest, decided, friction, predicted, supposed
 
 from rhythmid.diagnose.answer.result import FitQuality, MissingEffect
 from rhythmid.diagnose.answer.wording import freed_value, listed, summary_of
+from rhythmid.diagnose.family import MissingFamily
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.identify import paper_hopper
 
@@ -68,3 +69,12 @@ def test_a_freed_value_is_told_wherever_it_stands_among_the_effects(elements, sa
     fitted = paper_hopper().with_element(load_catalogue()["coulomb_friction"], {"force": 0.1})
     fitted = fitted.with_values({"inertia.mass": 0.3})
     assert said in freed_value(paper_hopper(), fitted, elements)
+
+
+def test_a_second_effect_whose_family_alone_is_certain_is_told_beside_the_first():
+    _, decision = decided(contest(NOMINAL, friction(0.02)))
+    family = MissingFamily("stiffness", ("cubic_stiffness", "bilinear_stiffness"), 0.2, 0.9)
+    decision = replace(decision, families=(family,))
+    named = [MissingEffect("friction", "force", "", 1.0, 1.0, {})]
+    said = summary_of(decision, named, FitQuality(0.1, 0.1), FitQuality(0.01, 0.01), "motion")
+    assert said.endswith(" The model lacks some form of stiffness (90 %), too; the law is undecided.")

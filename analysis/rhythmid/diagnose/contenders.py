@@ -20,7 +20,7 @@ from rhythmid.diagnose.evidence import (
     cross_validate,
     prediction,
 )
-from rhythmid.diagnose.hypothesis import Hypothesis, Kind, names_of, richer_of
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind, family_of, names_of, richer_of
 from rhythmid.diagnose.search.refit import fine_enough, whole_fit
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.errors import InputError
@@ -256,6 +256,7 @@ def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> 
             shape(one.trial) if one.kind == "effects" else {},
             richer_of(one.trial.model, one.trial.added),
             one.values,
+            family_of(one.trial.model, one.trial.added),
         )
         for one in contenders
     ]

@@ -56,6 +56,7 @@ class Hypothesis:
     shape : statistics of the fitted effects themselves, by the name of the rule that looks at them.
     richer : of each name, the laws that contain it.
     values : the free parameters as fitted.
+    family : of each name of the catalogue, its family; "" where it has none.
     """
 
     elements: tuple[str, ...]
@@ -67,6 +68,7 @@ class Hypothesis:
     shape: Mapping[str, float] = field(default_factory=dict)
     richer: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
+    family: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -89,6 +91,12 @@ def richer_of(model: Model, elements: Sequence[str]) -> dict[str, tuple[str, ...
     """By name, the laws that contain the effects with these labels as special cases."""
     terms = [model.term(label) for label in elements]
     return {term.element.name: term.element.special_case_of for term in terms if term is not None}
+
+
+def family_of(model: Model, elements: Sequence[str]) -> dict[str, str]:
+    """By name, the families of the effects with these labels."""
+    terms = [model.term(label) for label in elements]
+    return {term.element.name: term.element.family for term in terms if term is not None}
 
 
 def special_case(first: Hypothesis, second: Hypothesis) -> bool:

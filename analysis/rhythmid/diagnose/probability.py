@@ -55,3 +55,21 @@ def joint_probability(
         if all(sum(name in group for name in one.names) >= count for group, count in accepted)
     ]
     return float(np.clip(sum(held), 0.0, 1.0))
+
+
+def chance_of_law(share: float, left: float, size_error: float = 0.0) -> float:
+    """Chance that an effect with this share of the mismatch is the law that its name says, where this much is left: of the part of the mismatch
+    that it is to explain, what is left may be a part."""
+    own = share / (share + left) if share + left > 0.0 else 0.0
+    return adequacy(own) * resolved(size_error)
+
+
+def removed_by(some: Sequence[str], chosen: Hypothesis, contest: Contest) -> float:
+    """Share of the mismatch that these effects of a hypothesis remove beside its others. Laws that are hardly true remove what a law that
+    is not known does. None where the model without them was not fitted."""
+    whole = contest.nominal.prediction.mean_square - contest.floor
+    others = set(chosen.elements) - set(some)
+    without = [one.prediction.mean_square for one in contest.hypotheses if set(one.elements) == others]
+    if whole <= 0.0 or not without:
+        return 0.0
+    return float(np.clip((min(without) - chosen.prediction.mean_square) / whole, 0.0, 1.0))

@@ -5,6 +5,7 @@ A change of the rules, or of the constants, is tried on answers that were kept.
 
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ def ledger(contest: Contest, detectable: float, size_errors: Mapping[str, float]
                 "heldout_nrmse": one.heldout_nrmse,
                 "shape": {name: value for name, value in one.shape.items() if math.isfinite(value)},
                 "richer": {name: list(others) for name, others in one.richer.items()},
+                "family": dict(one.family),
                 **_written(one.prediction),
             }
             for one in (*contest.hypotheses, *contest.ruled_out)
@@ -73,6 +75,7 @@ def contest_of(data: dict[str, Any]) -> Contest:
             one["heldout_nrmse"],
             one["shape"],
             {name: tuple(others) for name, others in one["richer"].items()},
+            family=one.get("family", {}),
         )
         for one in data["hypotheses"]
     )
@@ -123,4 +126,5 @@ def redecide(answer: dict[str, Any]) -> dict[str, Any]:
         "missing": missing,
         "joint_probability": decision.joint,
         "indistinguishable": [list(group) for group in decision.equivalent],
+        "families": [asdict(family) for family in decision.families],
     }

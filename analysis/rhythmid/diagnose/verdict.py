@@ -4,16 +4,16 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from scipy.stats import t as student
 
 from rhythmid.diagnose.constants import EQUIVALENT, FALSE_ALARM, STATED
 from rhythmid.diagnose.evidence import chance_better, difference, gain_ahead, removed
+from rhythmid.diagnose.family import MissingFamily, families_of
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, Verdict
 from rhythmid.diagnose.probability import (
-    adequacy,
+    chance_of_law,
     joint_probability,
-    resolved,
+    removed_by,
     weights_of,
 )
 from rhythmid.diagnose.rejections import decisive, keeps_shape
@@ -59,6 +59,7 @@ class Decision:
     unexplained : what is left.
     explained : share of what anything explains that the names explain.
     beside : names of effects that the chosen model has, too, too uncertain for the answer to stand by them.
+    families : of the effects of the chosen hypothesis, where the verdict tells them.
     """
 
     verdict: Verdict
@@ -73,6 +74,7 @@ class Decision:
     unexplained: Unexplained
     explained: float
     beside: tuple[str, ...] = ()
+    families: tuple[MissingFamily, ...] = ()
 
 
 def unexplained(contest: Contest, chosen: Hypothesis) -> Unexplained:
@@ -180,12 +182,14 @@ def decide(
         labels = tuple(label for label in labels if label != chosen.elements[-1])
     if chosen.kind == "delay" and chosen.effects:  # a delay beside effects is told with the delays
         labels = tuple(label for label in labels if label != INPUT_DELAY)
-    alone = {label: _sure(shares[label], left.expected, size_errors.get(label, 0.0)) for label in labels}
+    alone = {
+        label: chance_of_law(shares[label], left.expected, size_errors.get(label, 0.0)) for label in labels
+    }
     open_ = [label for label in labels if alone[label] < STATED]
     sure = {
-        label: _sure(
+        label: chance_of_law(
             shares[label],
-            left.expected + _removed_by([one for one in open_ if one != label], chosen, contest),
+            left.expected + removed_by([one for one in open_ if one != label], chosen, contest),
             size_errors.get(label, 0.0),
         )
         for label in labels
@@ -237,25 +241,8 @@ def decide(
         left,
         1.0 - left.share,
         tuple(names[label] for label in labels if label not in named and label in chosen.effects),
+        families_of(contest, chosen, shares, weights, left.expected, open_) if rule.tells_family else (),
     )
-
-
-def _sure(share: float, left: float, size_error: float) -> float:
-    """Chance that an effect with this share of the mismatch is the law that its name says, where this much is left: of the part of the mismatch
-    that it is to explain, what is left may be a part."""
-    own = share / (share + left) if share + left > 0.0 else 0.0
-    return adequacy(own) * resolved(size_error)
-
-
-def _removed_by(some: Sequence[str], chosen: Hypothesis, contest: Contest) -> float:
-    """Share of the mismatch that these effects of a hypothesis remove beside its others. Laws that are hardly true remove what a law that
-    is not known does. None where the model without them was not fitted."""
-    whole = contest.nominal.prediction.mean_square - contest.floor
-    others = set(chosen.elements) - set(some)
-    without = [one.prediction.mean_square for one in contest.hypotheses if set(one.elements) == others]
-    if whole <= 0.0 or not without:
-        return 0.0
-    return float(np.clip((min(without) - chosen.prediction.mean_square) / whole, 0.0, 1.0))
 
 
 def _stated(labels: Sequence[str], probability: Callable[[Sequence[str]], float]) -> tuple[str, ...]:

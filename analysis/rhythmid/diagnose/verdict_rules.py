@@ -53,7 +53,10 @@ class Outcome:
 
 @dataclass(frozen=True)
 class VerdictRule:
-    """One row: it applies to an outcome whose `statistic` is above the `threshold`; fields of the outcome stand in its `reason`."""
+    """One row: it applies to an outcome whose `statistic` is above the `threshold`; fields of the outcome stand in its `reason`.
+
+    `tells_family`: whether the answer tells the families of the effects with their probabilities, although it may state no name.
+    """
 
     name: str
     says: str
@@ -61,6 +64,7 @@ class VerdictRule:
     verdict: Verdict
     reason: str
     statistic: Callable[[Outcome], float]
+    tells_family: bool = False
 
     def reason_of(self, found: Outcome) -> str:
         """The reason in words and figures."""
@@ -193,6 +197,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "missing_physics",
         "",
         lambda found: float(found.stated),
+        tells_family=True,
     ),
     VerdictRule(
         "partly_left",
@@ -209,6 +214,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "undecided",
         "the evidence does not separate several explanations",
         lambda found: 1.0 if found.alike else 1.0 - found.evidence,
+        tells_family=True,
     ),
     VerdictRule(
         "size_open",
@@ -217,6 +223,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "undecided",
         "the records do not determine the size of the effect that explains most, so it may stand for a law that the catalogue lacks",
         lambda found: found.vague,
+        tells_family=True,
     ),
     VerdictRule(
         "too_uncertain",
@@ -225,6 +232,7 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
         "undecided",
         "what may be left of the mismatch is too large for the names to be stated, so the true law may be one that the catalogue lacks",
         lambda _: 1.0,
+        tells_family=True,
     ),
 )
 
@@ -236,9 +244,13 @@ def rule_for(found: Outcome) -> VerdictRule:
 
 def table() -> str:
     """The rules as a Markdown table."""
-    rows = ["| name | statistic | above | verdict | because |", "| --- | --- | --- | --- | --- |"]
+    rows = [
+        "| name | statistic | above | verdict | families told | because |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
     rows += [
-        f"| `{rule.name}` | {rule.says} | {rule.threshold:.3g} | `{rule.verdict}` | {_words(rule.reason)} |"
+        f"| `{rule.name}` | {rule.says} | {rule.threshold:.3g} | `{rule.verdict}` | {'yes' if rule.tells_family else ''} | "
+        f"{_words(rule.reason)} |"
         for rule in VERDICT_RULES
     ]
     return "\n".join(rows)

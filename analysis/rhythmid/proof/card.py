@@ -60,18 +60,32 @@ def _rates(kind: str, scores: Sequence[Score]) -> dict[str, Rate]:
             }
             | sure
             | {"the same of another family": rate(scores, lambda s: bool(s.stated_unrelated))}
+            | _kind_rates(scores)
         )
     found = {
         "exact name" if kind == "single" else "exact names": rate(scores, lambda s: s.outcome == "exact"),
         "exact, or in a declared family of two": rate(scores, lambda s: s.right_within_family),
         "dominant effect first": rate(scores, lambda s: s.dominant_first),
         "slot": rate(scores, lambda s: s.slot_right),
-    } | sure
+        **sure,
+        **_kind_rates(scores),
+    }
     held = [s for s in scores if s.right_within_family and s.heldout is not None]
     found["held-out error within 1.1 of the noise floor"] = rate(
         held, lambda s: (s.heldout or math.inf) <= 1.1
     )
     return found
+
+
+def _kind_rates(scores: Sequence[Score]) -> dict[str, Rate]:
+    """Whether the kind of what is missing is stated, and how many of the families that are stated are not there."""
+    stated = [one for score in scores for one in score.kinds_stated]
+    return {
+        f"family of the dominant effect stated with p ≥ {SURE}": rate(scores, lambda s: s.kind_right),
+        f"families stated with p ≥ {SURE}: not there": Rate(
+            sum(not one.right for one in stated), len(stated)
+        ),
+    }
 
 
 def _machines(kind: str, scores: Sequence[Score]) -> dict[str, dict[str, Rate]]:

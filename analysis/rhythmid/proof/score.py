@@ -54,7 +54,8 @@ class Score:
 
     `outcome` exact: named what was concealed, and nothing but perhaps clutter that is really there; family: named, or declared
     indistinguishable from what was named, in a family of two or as the richer law; wrong: something else named. `dominant_first`: what explains most
-    was concealed. `heldout` is the held-out error over the noise floor; None where the effort was scored or an effort was recorded.
+    was concealed. `heldout` is the held-out error over the noise floor; None where the effort was scored or an effort was recorded. `kinds`
+    are the families that are said to be missing, that with the largest share first.
     """
 
     case: str
@@ -81,6 +82,17 @@ class Score:
     processor_seconds: float
     absent: tuple[str, ...]
     failure: str
+    kinds: tuple[Stated, ...] = ()
+
+    @property
+    def kinds_stated(self) -> tuple[Stated, ...]:
+        """Families that the answer stands by."""
+        return tuple(one for one in self.kinds if one.probability >= SURE)
+
+    @property
+    def kind_right(self) -> bool:
+        """Whether the family with the largest share is stated, and something of it was concealed."""
+        return bool(self.kinds) and self.kinds[0].probability >= SURE and self.kinds[0].related
 
     @property
     def stated_wrong(self) -> tuple[str, ...]:
@@ -168,7 +180,24 @@ def score(truth: dict[str, Any], answer: dict[str, Any], catalogue: Catalogue) -
         processor_seconds=answer["processor_seconds"],
         absent=tuple(truth["absent"]),
         failure=answer.get("failure", ""),
+        kinds=_kinds(answer, true, clutter, catalogue),
     )
+
+
+def _kinds(
+    answer: dict[str, Any], true: Sequence[str], clutter: Sequence[str], catalogue: Catalogue
+) -> tuple[Stated, ...]:
+    """Families that are said to be missing; right where something of them was concealed or is clutter, related where it was concealed."""
+    hidden, there = _families_of(true, catalogue), _families_of((*true, *clutter), catalogue)
+    return tuple(
+        Stated(one["family"], float(one["probability"]), one["family"] in there, one["family"] in hidden)
+        for one in answer.get("families", ())
+    )
+
+
+def _families_of(names: Sequence[str], catalogue: Catalogue) -> set[str]:
+    """Families of effects, of which some are not in the catalogue."""
+    return {FOREIGN[name] if name in FOREIGN else catalogue[name].family for name in names}
 
 
 def _ranked(answer: dict[str, Any]) -> list[dict[str, Any]]:
@@ -228,7 +257,7 @@ def _outcome(
 
 def _kin_of(clutter: Sequence[str], catalogue: Catalogue) -> set[str]:
     """Names of the catalogue that are of the family of any of these effects, of which some are not in the catalogue."""
-    families = {FOREIGN[name] if name in FOREIGN else catalogue[name].family for name in clutter}
+    families = _families_of(clutter, catalogue)
     return {*clutter, *(name for name, one in catalogue.items() if one.family and one.family in families)}
 
 

@@ -127,6 +127,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
             *held_out_zero_notes(fit, result.unseen if case.holdout and not case.budget.spent else ()),
         ),
         chosen=result.selection.chosen.elements,
+        families=decision.families,
         assumptions=(ONE_CLOCK,) if any(one.command is not None for one in series) else (),
     )
 

@@ -71,6 +71,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         delays=effort_delays(chosen),
         next_experiment=_next_experiment(result),
         chosen=result.selection.chosen.elements,
+        families=decision.families,
         scoring=Scored("effort", result.applicability.bandwidth, result.applicability.reason),
         assumptions=(FIXED_SCALE, NO_SENSOR),
         calibration=recalibrated(case.nominal, chosen.fit.model, chosen.std()),

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
+from rhythmid.diagnose.family import MissingFamily
 from rhythmid.diagnose.hypothesis import Kind, ScoringKind, Verdict
 from rhythmid.diagnose.rejections import Rejection
 
@@ -130,7 +131,8 @@ def settled(verdict: Verdict, indistinguishable: tuple[tuple[str, ...], ...]) ->
 @dataclass(frozen=True)
 class Diagnosis:
     """The answer to: which physics does the model lack? `chosen` are the elements of the hypothesis that `augmented`, `parameters` and
-    `remainder` are of, nothing where that is the nominal model."""
+    `remainder` are of, nothing where that is the nominal model. `families` are those of its effects: the kind of what is missing may be
+    certain where the law is not."""
 
     verdict: Verdict
     summary: str
@@ -154,6 +156,7 @@ class Diagnosis:
     heldout: str = ""
     notes: tuple[str, ...] = field(default=())
     chosen: tuple[str, ...] = ()
+    families: tuple[MissingFamily, ...] = ()
 
     @property
     def refitted_nominal(self) -> FitQuality:

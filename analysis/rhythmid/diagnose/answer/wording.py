@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from rhythmid.diagnose.answer.result import FitQuality, Location, MissingEffect
-from rhythmid.diagnose.constants import CONTRADICTS, CONTRADICTS_LEAST
+from rhythmid.diagnose.constants import CONTRADICTS, CONTRADICTS_LEAST, STATED
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.forward import Search
@@ -43,6 +43,21 @@ def location_of(
     return Location(best, where, tuple(evidence))
 
 
+def _begun(words: str) -> str:
+    """A sentence with its first letter raised."""
+    return words[:1].upper() + words[1:]
+
+
+def _some_form_of(decision: Decision, stated: Sequence[str] = ()) -> str:
+    """The families that are probable enough to be told, of which no law is `stated`; nothing where there are none."""
+    told = [
+        f"some form of {one.family} ({100.0 * one.probability:.0f} %)"
+        for one in decision.families
+        if one.probability >= STATED and not set(one.laws) & set(stated)
+    ]
+    return f"The model lacks {' and '.join(told)}" if told else ""
+
+
 def _alike(decision: Decision) -> str:
     groups = "; nor ".join(listed(group) for group in decision.equivalent)
     return f"These records do not separate {groups}."
@@ -61,7 +76,7 @@ def summary_of(
     `whole` is what errors are a share of; `freed` tells of the fixed value that the chosen hypothesis frees, if it does.
     """
     names = listed([effect.element for effect in missing])
-    value = "" if freed is None else freed[:1].upper() + freed[1:]
+    value = "" if freed is None else _begun(freed)
     if value and decision.verdict != "missing_physics":
         return value
     if decision.verdict == "consistent":
@@ -89,9 +104,15 @@ def summary_of(
             said += (
                 f" {number(100.0 * left.share, 2)} % of the mismatch is left and depends on {left.goes_with}."
             )
-        return f"{said} {value}".strip()
+        families = _some_form_of(decision, [effect.element for effect in missing])
+        return f"{said} {value}".strip() + (f" {families}, too; the law is undecided." if families else "")
     if decision.verdict == "undecided":
-        said = f"{decision.reason[:1].upper()}{decision.reason[1:]}."
+        families = _some_form_of(decision)
+        said = (
+            f"{families}, but the law is undecided: {decision.reason}."
+            if families
+            else f"{_begun(decision.reason)}."
+        )
         of_main = bool(decision.equivalent) and (
             not missing or decision.equivalent[0][0] == missing[0].element
         )

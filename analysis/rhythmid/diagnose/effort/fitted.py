@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rhythmid.diagnose.evidence import Linearised
-from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction, names_of, richer_of
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction, family_of, names_of, richer_of
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit
 from rhythmid.model import Model
@@ -68,6 +68,7 @@ class Fitted:
             self.shape,
             richer=richer_of(model, self.elements),
             values={name: model.value(name) for name in self.fit.names},
+            family=family_of(model, self.elements),
         )
 
     def std(self) -> dict[str, float]:
