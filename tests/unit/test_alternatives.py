@@ -47,7 +47,7 @@ def others(
     rounds: Sequence[Round] = (),
 ) -> list[tuple[Trial, Kind]]:
     """The alternatives to a search that chose the effects with these labels."""
-    base, trial = search_of(nominal).best, search_of(chosen, *labels).best
+    base, trial = search_of(nominal).best, replace(search_of(chosen, *labels).best, differences=None)
     series, known = list(chosen.run.series), trajectories(chosen)
     return alternatives(base, trial, series, catalogue, NOISE, 1e-3, known, rounds, [base, trial])
 

@@ -8,7 +8,7 @@ import pytest
 from machines import CATALOGUE, SHORT, hopper, records
 from rhythmid.deadline import SPENT, deadline, time_is_up, without_deadline
 from rhythmid.diagnose.search.refit import run_trials
-from rhythmid.diagnose.search.trial import propose
+from rhythmid.diagnose.search.trial import Origin, propose
 from rhythmid.identify import descent
 from rhythmid.identify.descent import WHITE, descend, first_guess
 from rhythmid.identify.free_run import prepare_run
@@ -70,9 +70,9 @@ def test_a_descent_ends_after_the_iteration_in_which_time_is_up_with_what_it_has
 def test_proposals_that_no_time_is_left_for_are_told():
     model, run, starts = far_off()
     proposal = propose(model, CATALOGUE["coulomb_friction"], [{"force": 0.1, "transition": 0.01}], ())
-    states = run.compiled.layout.states
+    origin = Origin(tuple(starts), run.compiled.layout.states)
     with deadline(PAST):
-        trials, excluded = run_trials([proposal], run.series, starts, states, WHITE, run.max_step)
+        trials, excluded = run_trials([proposal], run.series, origin, WHITE, run.max_step)
     assert trials == [] and excluded == [(("coulomb_friction",), SPENT)]
 
 

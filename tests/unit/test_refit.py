@@ -9,7 +9,7 @@ import pytest
 from machines import CATALOGUE, hopper
 from rhythmid.diagnose.search import refit
 from rhythmid.diagnose.search.refit import run_trials
-from rhythmid.diagnose.search.trial import Proposal, Trial, propose
+from rhythmid.diagnose.search.trial import Origin, Proposal, Trial, propose
 from rhythmid.identify.descent import Descent, out_of_reach
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series
@@ -60,7 +60,9 @@ def fitted_force(
         refit, "fork_map", lambda work, cases: [(i, work(case)) for i, case in enumerate(cases)]
     )
     start = np.array([0.15, 0.0])
-    trials, excluded = run_trials([proposal], [STILL], [start], ("position", "velocity"), QUIET, 1e-3)
+    trials, excluded = run_trials(
+        [proposal], [STILL], Origin((start,), ("position", "velocity")), QUIET, 1e-3
+    )
     assert not excluded
     return trials[0].model.value("coulomb_friction.force"), tried
 
@@ -135,7 +137,7 @@ def test_a_parameter_with_many_minima_is_followed_to_the_deepest_from_one_to_the
     stepwise = replace(element, hops=lambda s: {"time": 1.0})
     proposal = propose(hopper(), stepwise, [{"change": 0.01, "time": 3.0}], (), 1000.0)
     trials, _ = run_trials(
-        [proposal], [STILL], [np.array([0.15, 0.0])], ("position", "velocity"), QUIET, 1e-3
+        [proposal], [STILL], Origin((np.array([0.15, 0.0]),), ("position", "velocity")), QUIET, 1e-3
     )
     assert trials[0].model.value("stiffness_jump.time") == 7.0
 
@@ -157,7 +159,7 @@ def test_what_a_guess_fixes_is_kept_with_what_was_fitted_from_it(monkeypatch):
     guesses = [shape | {"position": 0.1, "side": -1.0}, shape | {"position": 0.2, "side": 1.0}]
     proposal = propose(hopper(), element, guesses, (), 1000.0)
     trials, _ = run_trials(
-        [proposal], [STILL], [np.array([0.15, 0.0])], ("position", "velocity"), QUIET, 1e-3
+        [proposal], [STILL], Origin((np.array([0.15, 0.0]),), ("position", "velocity")), QUIET, 1e-3
     )
     found = trials[0].model
     assert (found.value("end_stop_contact.position"), found.value("end_stop_contact.side")) == (0.2, 1.0)

@@ -19,7 +19,7 @@ from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.round import Round
 from rhythmid.diagnose.search.score_tests import Score, Trajectories
-from rhythmid.diagnose.search.trial import Proposal, Trial, propose
+from rhythmid.diagnose.search.trial import Origin, Proposal, Trial, propose
 from rhythmid.diagnose.static_law import laws_of
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales, Slot
@@ -28,7 +28,6 @@ from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.progress import Tell, silent
-from rhythmid.simulation.compiled import compile_model
 from rhythmid.simulation.generated_source import DRIVES
 from rhythmid.simulation.transport import INPUT_DELAY
 
@@ -83,9 +82,8 @@ def alternatives(
     }
     if not kinds:
         return []
-    states = compile_model(chosen.model).layout.states
     given = list(proposals.values())
-    trials, _ = run_trials(given, series, chosen.starts, states, noise, step, reach=reach, tell=tell)
+    trials, _ = run_trials(given, series, Origin.of(chosen), noise, step, reach=reach, tell=tell)
     return [(trial, kinds[tuple(sorted(trial.added))]) for trial in trials]
 
 

@@ -16,9 +16,8 @@ from rhythmid.diagnose.free_map import FREE_MAPS, first_guess
 from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.refit import run_trials
 from rhythmid.diagnose.search.score_tests import Trajectories
-from rhythmid.diagnose.search.trial import Trial, propose
+from rhythmid.diagnose.search.trial import Origin, Trial, propose
 from rhythmid.identify.series import Series
-from rhythmid.simulation.compiled import compile_model
 
 
 def refitted_map(
@@ -43,7 +42,6 @@ def refitted_map(
     proposal = propose(
         nominal.model, FREE_MAPS[name], [first_guess(np.concatenate(values_of(known, name)))], nominal.added
     )
-    states = compile_model(nominal.model).layout.states
-    trials, _ = run_trials([proposal], series, nominal.starts, states, rows.noise, step)
+    trials, _ = run_trials([proposal], series, Origin.of(nominal), rows.noise, step)
     made = contend([(trial, "free_map") for trial in trials], series, rows, step)
     return (best.quantity, made[0]) if made else None

@@ -6,9 +6,10 @@ equations stay as small as the number of parameters however many series there ar
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from rhythmid.identify.start_memory import sought
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
+NOTHING: Mapping[str, float] = MappingProxyType({})
 WHITE = NoiseModel(np.empty(0), 1.0)
 LEAST_DAMPING = 1e-6  # damping up to which a step counts as a full one
 STATES = 0.01  # damping beyond which a step holds every state back
@@ -59,6 +61,25 @@ def _first_steps(model: Model, names: Sequence[str], run: FreeRun) -> Array:
                 size = 0.1 * (high - low)
         steps.append(1e-4 * size)
     return np.array(steps)
+
+
+def _settled_steps(
+    problem: Problem,
+    model: Model,
+    starts: Sequence[Array],
+    residuals: Sequence[Array],
+    similar: Mapping[str, float],
+) -> tuple[Array, Array]:
+    """Difference steps of parameters (p,) and initial states (q,): those of a similar structure where it has them."""
+    run, names = problem.run, problem.names
+    every = [*names, *run.compiled.layout.states]
+    velocity = 2 * np.pi * max(dominant_frequency(one) for one in run.series) * problem.spread
+    state_steps = 1e-4 * np.array([problem.spread, velocity, *([problem.spread] * (run.states - 2))])
+    guessed = np.append(_first_steps(model, names, run), state_steps)
+    steps = np.array([similar.get(name, guess) for name, guess in zip(every, guessed, strict=True)])
+    known = [name in similar for name in every]
+    p = len(names)
+    return problem.settle_steps(model, starts, residuals, steps[:p], steps[p:], known)
 
 
 def _step(
@@ -117,13 +138,14 @@ def descend(
     tolerance: float = 1e-3,
     differences: tuple[Array, Array] | None = None,
     reach: float = math.inf,
+    similar: Mapping[str, float] = NOTHING,
 ) -> Descent:
     """Levenberg-Marquardt from the model's own values.
 
     Stops when a further step lowers chi2, or promises to lower it, by less than `tolerance` (less where the noise model turns
     out to be too wide) or 1e-7 of itself; and when chi2, falling on as it did in the last `PACE` iterations, would not come to
     `reach` in those that are left; and where a deadline passes. `differences` are steps known from another descent of the same structure; without
-    them they are sought. Raises InputError when the model diverges at its initial values.
+    them those of a `similar` one are taken, by name of parameter or state, and the others sought. Raises InputError when the model diverges at its initial values.
     """
     problem = Problem(run, names, noise, pool)
     current = [np.array(s) for s in (starts if starts is not None else first_guess(model, run))]
@@ -135,11 +157,7 @@ def descend(
             "the model diverges when simulated over the records with its initial values; check its parameters and units"
         )
     if differences is None:
-        velocity = 2 * np.pi * max(dominant_frequency(one) for one in run.series) * problem.spread
-        state_steps = 1e-4 * np.array([problem.spread, velocity, *([problem.spread] * (run.states - 2))])
-        steps, state_steps = problem.settle_steps(
-            model, current, residuals, _first_steps(model, names, run), state_steps
-        )
+        steps, state_steps = _settled_steps(problem, model, current, residuals, similar)
     else:
         steps, state_steps = differences
     held = np.array([float(place in run.compiled.layout.memories) for place in range(run.states)])

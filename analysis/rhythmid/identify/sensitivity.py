@@ -125,16 +125,20 @@ class Problem:
         residuals: Sequence[Array],
         steps: Array,
         state_steps: Array,
+        known: Sequence[bool],
     ) -> tuple[Array, Array]:
         """Difference steps under which every parameter and state moves the outputs by about the same small amount.
 
-        Their natural sizes span many powers of ten (a stiffness, a delay, a hidden state of an actuator).
+        Their natural sizes span many powers of ten (a stiffness, a delay, a hidden state of an actuator). Those that are `known`
+        (p + q) stay as they are.
         """
         base = [residual + one.averaged for residual, one in zip(residuals, self.run.series)]
         joint = np.concatenate([steps, state_steps])
         p = len(self.names)
-        todo = list(range(len(joint)))
+        todo = [column for column, settled in enumerate(known) if not settled]
         for _ in range(4):
+            if not todo:
+                break
             signed = self._signed(model, joint[:p])
             outputs = self._perturbed(model, starts, signed, joint[p:], todo)
             again = []
@@ -149,8 +153,6 @@ class Problem:
                 if not 0.1 < ratio < 10.0:
                     again.append(c)
             todo = again
-            if not todo:
-                break
         return joint[:p], joint[p:]
 
     def _signed(self, model: Model, steps: Array) -> Array:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from rhythmid.diagnose.search.refit import reach_of, run_trials, under_noise
 from rhythmid.diagnose.search.round import Round, distinct
-from rhythmid.diagnose.search.trial import Proposal, Trial, propose
+from rhythmid.diagnose.search.trial import Origin, Proposal, Trial, propose
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
 from rhythmid.identify.noise import NoiseModel
@@ -12,7 +12,6 @@ from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.progress import Tell
-from rhythmid.simulation.compiled import compile_model
 
 # elements that scored best at first, and of those that fit best alone, so many are tried again in the place of each of several effects
 RIVALS_TRIED = 2
@@ -43,9 +42,7 @@ def eliminate(
             return []
         tell(f"testing {', '.join(' + '.join(p.added) for p in fresh)}")
         reach = reach_of(known.chi2, known.samples) + margin
-        found, _ = run_trials(
-            fresh, series, known.starts, _states(known), noise, step, reach=reach, tell=tell
-        )
+        found, _ = run_trials(fresh, series, Origin.of(known), noise, step, reach=reach, tell=tell)
         tried.update({tuple(sorted(t.added)): t for t in found})
         return found
 
@@ -148,10 +145,6 @@ def _stands_for(trial: Trial, best: Trial) -> bool:
     extra = [trial.element(label) for label in trial.added if label not in best.added]
     gone = [best.element(label) for label in best.added if label not in trial.added]
     return len(extra) == len(gone) == 1 and gone[0].name in extra[0].special_case_of
-
-
-def _states(trial: Trial) -> tuple[str, ...]:
-    return compile_model(trial.model).layout.states
 
 
 def _starts_for(

@@ -31,7 +31,7 @@ from rhythmid.diagnose.search.round import Round, distinct, not_tried, one_round
 from rhythmid.diagnose.search.score_tests import (
     under,
 )
-from rhythmid.diagnose.search.trial import Trial
+from rhythmid.diagnose.search.trial import Origin, Trial
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.identify.free_run import accurate
 from rhythmid.identify.noise import NoiseModel
@@ -219,7 +219,7 @@ def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
     """Refits of the models that the last round proposes, those that do better than the best so far, best first."""
     here, now = state.here, replace(state.rounds[-1], added=state.here.added)
     count = REFITTED if not state.best.added else REFITTED - 1
-    begun = task.series, here.starts, state.current.run.compiled.layout.states, here.noise, state.step
+    begun = task.series, Origin.of(here), here.noise, state.step
     found, failed = [], []
     # where nothing is found yet and none of the best does better, they were kin that the scores, which are linear, promise too much of
     for first in range(0, count * (1 if state.best.added else GROUPS), count):

@@ -9,12 +9,11 @@ from dataclasses import replace
 
 from rhythmid.deadline import time_is_up
 from rhythmid.diagnose.search.refit import run_trials
-from rhythmid.diagnose.search.trial import Proposal, Trial
+from rhythmid.diagnose.search.trial import Origin, Proposal, Trial
 from rhythmid.elements.element import Element
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.series import Series
 from rhythmid.model import Model, Term
-from rhythmid.simulation.compiled import compile_model
 
 CHAINS = ("command", "actuator", "sensor")
 
@@ -24,8 +23,7 @@ def in_best_order(trial: Trial, series: Sequence[Series], noise: NoiseModel, ste
     others = [Proposal(trial.added, model, ({},)) for model in other_orders(trial.model, trial.added[-1])]
     if not others or time_is_up():
         return trial
-    states = compile_model(trial.model).layout.states
-    moved, _ = run_trials(others, series, trial.starts, states, noise, step)
+    moved, _ = run_trials(others, series, Origin.of(trial), noise, step)
     return min([trial, *moved], key=lambda one: one.chi2)
 
 

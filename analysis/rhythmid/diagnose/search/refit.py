@@ -5,14 +5,23 @@ that is missing from the others must not be taken for coloured noise.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.deadline import SPENT, time_is_up
-from rhythmid.diagnose.search.trial import FAINTER, Outcome, Proposal, Trial, outcome_of, trial_of
+from rhythmid.diagnose.search.trial import (
+    FAINTER,
+    Origin,
+    Outcome,
+    Proposal,
+    Trial,
+    outcome_of,
+    steps_by_name,
+    trial_of,
+)
 from rhythmid.elements.element import ELAPSED, STEP
 from rhythmid.errors import InputError
 from rhythmid.identify.descent import Descent, descend, out_of_reach
@@ -57,15 +66,13 @@ def reach_of(chi2: float, samples: int) -> float:
 def _fit_proposal(
     proposal: Proposal,
     series: Sequence[Series],
-    starts: Sequence[Array],
-    known: Sequence[str],
+    origin: Origin,
     noise: NoiseModel,
     max_step: float,
     enough: float,
     reach: float,
 ) -> Outcome:
-    """A few iterations from each guess, more from the best as long as it may come to `reach`, starting in `starts` (whose states
-    are `known` by name); no further guess is tried once chi2 falls below `enough`.
+    """A few iterations from each guess, more from the best as long as it may come to `reach`; no further guess is tried once chi2 falls below `enough`.
 
     Raises InputError when the model diverges from every guess, or a deadline had passed before the first.
     """
@@ -76,19 +83,21 @@ def _fit_proposal(
     best: Descent | None = None
     failure: InputError | None = None
     ticks: list[dict[str, float]] = []
+    steps = dict(origin.steps)
     if proposal.added and has_clock(proposal.model, proposal.added[-1]):
-        begin = [_extended(proposal.model, run, i, start, known) for i, start in enumerate(starts)]
+        begin = _extended(proposal.model, run, origin)
         ticks = scanned(proposal.model, series, begin, noise)
     for guess in (*ticks, *proposal.guesses, *proposal.faint):
         if guess in proposal.faint and best is not None and best.chi2 < proposal.ceiling:
             break
         model = proposal.model.with_values(guess)
         try:
-            begin = [_extended(model, run, i, start, known) for i, start in enumerate(starts)]
-            end = descend(model, run, names, noise, begin, SKETCH, tolerance=TOLERANCE)
+            begin = _extended(model, run, origin)
+            end = descend(model, run, names, noise, begin, SKETCH, tolerance=TOLERANCE, similar=steps)
         except InputError as error:
             failure = error
             continue
+        steps = _steps(end, run, [name for name in guess if name not in origin.steps])
         if best is None or end.chi2 < best.chi2:
             best = end
         if best.chi2 < enough or time_is_up():
@@ -102,7 +111,9 @@ def _fit_proposal(
     flat = _flat(best.model, best.differences[0], guessed)
     if flat and not time_is_up():
         back = best.model.with_values({name: proposal.guesses[0][name] for name in flat})
-        again = descend(back, run, names, noise, best.starts, BRIEF, None, TOLERANCE)
+        again = descend(
+            back, run, names, noise, best.starts, BRIEF, None, TOLERANCE, similar=_steps(best, run, flat)
+        )
         best = min(best, again, key=lambda end: end.chi2)
     return outcome_of(best, run, noise)
 
@@ -154,7 +165,17 @@ def _hopped(
             if not low < value < high:
                 continue
             moved = before.model.with_values({name: value})
-            again = descend(moved, run, names, noise, before.starts, BRIEF, None, TOLERANCE)
+            again = descend(
+                moved,
+                run,
+                names,
+                noise,
+                before.starts,
+                BRIEF,
+                None,
+                TOLERANCE,
+                similar=_steps(before, run, [name]),
+            )
             best = min(best, again, key=lambda end: end.chi2)
         if best.chi2 > before.chi2 - 1.0:
             break
@@ -184,12 +205,17 @@ def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
         known = {tuple(guess[name.rpartition(".")[2]] for name in flat) for guess in guesses}
         run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
         free = tuple(trial.model.free)
+        steps = steps_by_name(trial.model, run.compiled.layout.states, trial.differences, flat)
         found: list[Descent] = []
         for share in (1.0, *FAINTER):
             for values in sorted(known):
                 moved = trial.model.with_values(dict(zip(flat, (share * value for value in values))))
                 try:
-                    found.append(descend(moved, run, free, trial.noise, trial.starts, 1, tolerance=TOLERANCE))
+                    found.append(
+                        descend(
+                            moved, run, free, trial.noise, trial.starts, 1, tolerance=TOLERANCE, similar=steps
+                        )
+                    )
                 except InputError:
                     continue
         if not found:
@@ -203,27 +229,34 @@ def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
     return best
 
 
-def _extended(model: Model, run: FreeRun, index: int, start: Array, known: Sequence[str]) -> Array:
-    """A start of series `index` for a structure with other states: those it shares are kept, new ones begin at rest."""
-    fresh = start_of(model, run, index, float(start[0]), float(start[1]))
-    for place, name in enumerate(run.compiled.layout.states):
-        if name in known:
-            fresh[place] = start[list(known).index(name)]
-    return fresh
+def _steps(end: Descent, run: FreeRun, without: Collection[str]) -> dict[str, float]:
+    """Steps of a descent by name, without those of parameters that have moved."""
+    return steps_by_name(end.model, run.compiled.layout.states, end.differences, without)
+
+
+def _extended(model: Model, run: FreeRun, origin: Origin) -> list[Array]:
+    """Starts of each series for a structure with other states: those that it shares are kept, new ones begin at rest."""
+    found = []
+    for index, start in enumerate(origin.starts):
+        fresh = start_of(model, run, index, float(start[0]), float(start[1]))
+        for place, name in enumerate(run.compiled.layout.states):
+            if name in origin.states:
+                fresh[place] = start[origin.states.index(name)]
+        found.append(fresh)
+    return found
 
 
 def run_trials(
     proposals: Sequence[Proposal],
     series: Sequence[Series],
-    starts: Sequence[Array],
-    known: Sequence[str],
+    origin: Origin,
     noise: NoiseModel,
     max_step: float,
     enough: Sequence[float] | None = None,
     reach: float = math.inf,
     tell: Tell = silent,
 ) -> tuple[list[Trial], list[tuple[tuple[str, ...], str]]]:
-    """Fit all proposals in parallel. Returns the trials, best first, and those excluded with the reason.
+    """Fit all proposals in parallel, beginning from the `origin`. Returns the trials, best first, and those excluded with the reason.
 
     A few iterations from each guess first, until chi2 is `enough`; then the promising ones are carried to convergence, as long as
     they may come to `reach`: a chi2 that one has to come to in order to matter.
@@ -231,7 +264,7 @@ def run_trials(
     goals = list(enough) if enough is not None else [-math.inf] * len(proposals)
 
     def one(case: tuple[Proposal, float]) -> Outcome:
-        return _fit_proposal(case[0], series, starts, known, noise, max_step, case[1], reach)
+        return _fit_proposal(case[0], series, origin, noise, max_step, case[1], reach)
 
     trials: list[Trial] = []
     excluded: list[tuple[tuple[str, ...], str]] = []

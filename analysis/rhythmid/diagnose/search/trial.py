@@ -1,8 +1,8 @@
 """Trials: candidate models, what is proposed to be fitted and what a fit has reached."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from rhythmid.identify.free_run import FreeRun
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.start_cost import felt_starts, start_cost
 from rhythmid.model import Model
+from rhythmid.simulation.compiled import compile_model
 
 Array = NDArray[np.float64]
 FAINTER = (0.1, 0.01)  # shares of a guess that led nowhere, tried in its place
@@ -43,6 +44,36 @@ class Trial:
         if term is None:
             raise KeyError(label)
         return term.element
+
+
+@dataclass(frozen=True)
+class Origin:
+    """A fitted model that fits of other structures begin from.
+
+    Parameters
+    ----------
+    starts : initial state of each series, the states in the order of their names `states`.
+    steps : by which its sensitivities were taken, by name of parameter or state: a structure that has these, too, needs about the same.
+    """
+
+    starts: tuple[Array, ...]
+    states: tuple[str, ...]
+    steps: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, trial: Trial) -> "Origin":
+        """The origin that a trial is."""
+        states = compile_model(trial.model).layout.states
+        steps = {} if trial.differences is None else steps_by_name(trial.model, states, trial.differences)
+        return cls(trial.starts, states, steps)
+
+
+def steps_by_name(
+    model: Model, states: Sequence[str], differences: tuple[Array, Array], without: Collection[str] = ()
+) -> dict[str, float]:
+    """Difference steps of a model's free parameters and states by name, `without` those of what has moved elsewhere."""
+    every = zip((*model.free, *states), np.concatenate(differences).tolist(), strict=True)
+    return {name: step for name, step in every if name not in without}
 
 
 @dataclass(frozen=True)
