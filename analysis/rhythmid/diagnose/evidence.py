@@ -152,7 +152,8 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
             weight = np.where(seen, weights_of(residual + change, spread) / spread**2, 0.0)
             normal, right = _normal_equations(jacobian, weight, residual)
             normal = normal / np.outer(norms, norms) + precision
-            change = -jacobian @ (np.linalg.lstsq(normal, right / norms + pull, rcond=1e-12)[0] / norms)
+            step = np.linalg.lstsq(normal, right / norms + pull, rcond=1e-12)[0] / norms
+            change = jacobian @ -step  # the jacobian of long records is too large for a negative copy
             spread = max(scale_of((residual + change)[seen]), blocks.least)
         error[out] += change[out]
         scale[out] = spread
