@@ -18,6 +18,7 @@ from rhythmid.diagnose.evidence import CrossValidated, Linearised, cross_validat
 from rhythmid.diagnose.free_functions import FreeMap, free_maps
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
 from rhythmid.errors import InputError
+from rhythmid.freed_memory import give_back
 from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.series import Series
@@ -155,6 +156,7 @@ def dependences(known: Trajectories, rows: Rows, pool: ThreadPoolExecutor | None
     n = len(alone.error)
 
     def dependence(one: FreeMap) -> Dependence:
+        give_back()
         wide = beside(fit, base, one, rows, reach)
         predicted = cross_validate(wide, rows.blocks)
         coefficients = _coefficients(wide, rows.fitted)[-len(one.columns) :]
