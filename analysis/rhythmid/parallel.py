@@ -14,13 +14,16 @@ import threading
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
 from rhythmid.errors import InputError
+from rhythmid.freed_memory import give_back
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+AHEAD = 2  # results for each processor that wait to be taken: one more than keeps it busy, for they take unequal times
 
 
 def cores() -> int:
@@ -57,11 +60,28 @@ def _work(function: Callable[[Any], Any], items: Sequence[Any], own: Iterable[in
             answer = (index, None, error)
         except BaseException:
             answer = (index, None, RuntimeError(traceback.format_exc()))
+        give_back()  # while it waits, and before what the next item needs
         try:
             pipe.send(answer)
         except (pickle.PicklingError, TypeError, AttributeError) as error:
             pipe.send((index, None, RuntimeError(f"a worker's result cannot be sent back: {error}")))
     pipe.close()
+
+
+def each(
+    function: Callable[[Item], Result], items: Iterable[Item], pool: ThreadPoolExecutor | None = None
+) -> Iterator[Result]:
+    """Results in the order of the items, made in the pool's threads a few ahead of who takes them: neither items nor results gather."""
+    if pool is None:
+        yield from map(function, items)
+        return
+    waiting: deque[Future[Result]] = deque()
+    for item in items:
+        waiting.append(pool.submit(function, item))
+        if len(waiting) > AHEAD * cores():
+            yield waiting.popleft().result()
+    while waiting:
+        yield waiting.popleft().result()
 
 
 def fork_map(
@@ -93,6 +113,7 @@ def fork_map(
             running[receive] = (process, own)
         send.close()
 
+    give_back()
     try:
         for worker in range(count):
             start(list(range(worker, len(items), count)))

@@ -4,12 +4,14 @@ import os
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from rhythmid.errors import InputError
-from rhythmid.parallel import fork_map
+from rhythmid.freed_memory import give_back
+from rhythmid.parallel import AHEAD, cores, each, fork_map
 
 
 def test_forked_workers_return_every_result_once_and_pass_on_refusals():
@@ -72,3 +74,25 @@ except KeyboardInterrupt:
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60.0, check=True
     )
     assert (done.stdout, done.stderr) == ("interrupted\n", "")
+
+
+def test_results_of_threads_keep_their_order_and_neither_they_nor_their_items_gather():
+    taken, begun = 0, []
+
+    def items():
+        for n in range(200):
+            begun.append(n - taken)
+            yield n
+
+    with ThreadPoolExecutor(2) as pool:
+        for n, square in enumerate(each(lambda n: n * n, items(), pool)):
+            assert square == n * n
+            taken += 1
+    assert taken == 200
+    assert max(begun) <= AHEAD * cores() + 1
+
+
+def test_free_memory_is_given_back_and_what_is_in_use_stays_as_it_is():
+    kept = [bytes([n % 251]) * 1000 for n in range(1000)]
+    give_back()
+    assert kept == [bytes([n % 251]) * 1000 for n in range(1000)]

@@ -4,7 +4,14 @@ import pytest
 
 import rhythmid as rh
 from rhythmid.diagnose.search.round import one_round
-from rhythmid.diagnose.search.score_tests import changes_of, guesses, score, sizes_along, trajectories
+from rhythmid.diagnose.search.score_tests import (
+    best_changes,
+    changes_of,
+    guesses,
+    score,
+    sizes_along,
+    trajectories,
+)
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.identify.output_error import estimate
 from rhythmid.identify.series import prepare
@@ -49,6 +56,8 @@ def test_scores_are_those_of_changes_at_the_fit_that_the_noise_of_the_round_has_
     assert [one.statistic for one in found.scores] == pytest.approx(
         [one.statistic for one in again], rel=1e-6
     )
+    best = best_changes(moved, changes_of(known, guesses(catalogue, moved.model, sizes_along(known))), 2)
+    assert [one.key for one in best] == [one.key for one in again[:2]]
 
 
 def test_a_resonance_that_no_candidate_knows_is_not_the_noise_s_colour():

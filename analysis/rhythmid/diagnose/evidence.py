@@ -127,7 +127,7 @@ class Blocks:
 
 @dataclass(frozen=True)
 class CrossValidated:
-    """Errors (n,) of prediction of every row by the fit that did not see it, and the scale (n,) that the fit expected.
+    """Errors (n,) of prediction of every row by the fit that did not see it, and the scale (b,) that the fit expected in each block.
 
     `penalty` is taken off the log density of every row that a fit sees: what freedom costs that cross-validation does not see.
     """
@@ -140,7 +140,7 @@ class CrossValidated:
 def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
     """Predict every block from the others."""
     residual, jacobian = fit.residual, fit.jacobian
-    error, scale = residual.copy(), np.ones(len(residual))
+    error, scale = residual.copy(), np.ones(blocks.count)
     norms = np.linalg.norm(jacobian, axis=0)
     norms[norms == 0.0] = 1.0
     precision, pull = np.diag(fit.precision / norms**2), fit.precision * fit.departure / norms
@@ -152,10 +152,11 @@ def cross_validate(fit: Linearised, blocks: Blocks) -> CrossValidated:
             weight = np.where(seen, weights_of(residual + change, spread) / spread**2, 0.0)
             normal, right = _normal_equations(jacobian, weight, residual)
             normal = normal / np.outer(norms, norms) + precision
-            change = -jacobian @ (np.linalg.lstsq(normal, right / norms + pull, rcond=1e-12)[0] / norms)
+            step = np.linalg.lstsq(normal, right / norms + pull, rcond=1e-12)[0] / norms
+            change = jacobian @ -step  # the jacobian of long records is too large for a negative copy
             spread = max(scale_of((residual + change)[seen]), blocks.least)
         error[out] += change[out]
-        scale[out] = spread
+        scale[blocks.fold == fold] = spread
     return CrossValidated(error, scale)
 
 
@@ -182,7 +183,7 @@ def prediction(
     counts = blocks.sums(np.ones(len(found.error)))
     density = block_densities(
         blocks.split(found.error),
-        blocks.sums(found.scale) / np.maximum(counts, 1.0),
+        found.scale,
         time,
         seen,
         blocks.least,

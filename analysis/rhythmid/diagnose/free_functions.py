@@ -6,7 +6,7 @@ sensor's error is a function of its output. Each is a sum of functions whose eff
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import accumulate
@@ -18,6 +18,7 @@ from scipy.signal import lfilter
 
 from rhythmid.diagnose.search.response import response
 from rhythmid.diagnose.search.score_tests import Trajectories, residual_line
+from rhythmid.parallel import each
 
 Array = NDArray[np.float64]
 SPLINES, SPLINES_OF_TWO = 8, 5  # basis functions of one quantity, and of each of two
@@ -108,7 +109,7 @@ def stretched(values: Array, most: float) -> Array:
 
 
 def _simulated(
-    known: Trajectories, functions: list[list[Array]], pool: ThreadPoolExecutor | None
+    known: Trajectories, functions: Iterable[list[Array]], pool: ThreadPoolExecutor | None
 ) -> tuple[tuple[Array, ...], ...]:
     """Outputs' changes when each function acts as a force."""
 
@@ -119,7 +120,7 @@ def _simulated(
             changes.append(np.zeros(series.blocks) if change is None else series.of_block(change))
         return tuple(changes)
 
-    return tuple(pool.map(one, functions)) if pool else tuple(one(function) for function in functions)
+    return tuple(each(one, functions, pool))
 
 
 def values_of(known: Trajectories, name: str) -> list[Array]:
@@ -151,7 +152,7 @@ def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> It
             yield FreeMap(name, _simulated(known, functions, pool), grid, basis)
     both = [_splines(quantities[name], SPLINES_OF_TWO)[0] for name in ("position", "velocity")]
     if all(both):
-        products = [[a * b for a, b in zip(x, v)] for x in both[0] for v in both[1]]
+        products = ([a * b for a, b in zip(x, v)] for x in both[0] for v in both[1])
         yield FreeMap("position and velocity", _simulated(known, products, pool), none, nowhere)
     yield FreeMap("past position", _simulated(known, _slipped(quantities["position"]), pool), none, nowhere)
     yield from filtered(known, pool)

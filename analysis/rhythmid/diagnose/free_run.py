@@ -250,13 +250,18 @@ def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.floa
     names = {element.name for element, _ in lacking}
     scored = distinct(found.rounds[-1].scores, len(catalogue)) if found.rounds else []
     tried = [(one.element, dict(one.values)) for one, _ in scored if one.element.name in names]
-    changes = changes_of(trajectories(fit), tried, case.pool)
     std = np.array([fit.std[name] for name in fit.names])
     known = np.isfinite(std) & (std > 0.0)
-    if not changes or not known.any():
+    if not tried or not known.any():
         return made
-    line = fit.linearisation
-    columns = np.column_stack([projected(fit, whitened(fit, one.outputs, fit.noise)) for one in changes])
+    line, count = fit.linearisation, 0
+    # filled one by one: of long records all of them twice would be large
+    columns = np.empty((len(line.residual), len(tried)), order="F")
+    for count, one in enumerate(changes_of(trajectories(fit), tried, case.pool), start=1):
+        columns[:, count - 1] = projected(fit, whitened(fit, one.outputs, fit.noise))
+    if not count:
+        return made
+    columns = columns[:, :count]
     priors = [fit.model.parameters[name].prior for name, one in zip(fit.names, known) if one]
     inverse = covariance_of(line.jacobian[:, known], priors)
     made[np.ix_(known, known)] = mean_product(line.jacobian[:, known], line.residual, columns, inverse)

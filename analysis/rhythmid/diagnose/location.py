@@ -18,6 +18,7 @@ from rhythmid.diagnose.evidence import CrossValidated, Linearised, cross_validat
 from rhythmid.diagnose.free_functions import FreeMap, free_maps
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
 from rhythmid.errors import InputError
+from rhythmid.freed_memory import give_back
 from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.series import Series
@@ -154,19 +155,22 @@ def dependences(known: Trajectories, rows: Rows, pool: ThreadPoolExecutor | None
     before = float(np.sum(alone.error**2))
     n = len(alone.error)
 
-    def dependence(one: FreeMap) -> Dependence:
-        wide = beside(fit, base, one, rows, reach)
+    found: list[Dependence] = []
+    for one in free_maps(known, pool):
+        give_back()
+        wide, count = beside(fit, base, one, rows, reach), len(one.columns)
+        quantity, grid, basis = one.quantity, one.grid, one.basis
+        del one  # its columns, which are large over long records, stand in `wide` now
         predicted = cross_validate(wide, rows.blocks)
-        coefficients = _coefficients(wide, rows.fitted)[-len(one.columns) :]
+        coefficients = _coefficients(wide, rows.fitted)[-count:]
+        del wide
         left = float(np.sum(predicted.error**2))
         floor = min(float(n), left)
         whole = max(before - floor, 1e-9 * before, 5.0 * math.sqrt(2.0 * n))
-        drawn = coefficients @ one.basis if one.basis.size else np.empty(0)
+        drawn = coefficients @ basis if basis.size else np.empty(0)
         explained = float(np.clip((before - left) / whole, -1.0, 1.0))
-        return Dependence(one.quantity, explained, one.grid, drawn, predicted)
-
-    # by `map`, which lets go of each map before the next one is made
-    return sorted(map(dependence, free_maps(known, pool)), key=lambda found: -found.explained)
+        found.append(Dependence(quantity, explained, grid, drawn, predicted))
+    return sorted(found, key=lambda one: -one.explained)
 
 
 def _coefficients(fit: Linearised, fitted: int) -> Array:

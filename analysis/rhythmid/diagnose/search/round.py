@@ -1,7 +1,7 @@
 """One round of the search: scores of the whole catalogue at a fit, along whole records and in short windows of them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -12,6 +12,7 @@ from rhythmid.diagnose.free_functions import filtered
 from rhythmid.diagnose.search.score_tests import (
     Change,
     Score,
+    best_changes,
     changes_of,
     guesses,
     p_value,
@@ -23,6 +24,7 @@ from rhythmid.diagnose.search.score_tests import (
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
+from rhythmid.freed_memory import give_back
 from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.least_squares import reduced
 from rhythmid.identify.multiple_shooting import periods_long, windows
@@ -81,7 +83,7 @@ def distinct(scores: Sequence[Score], count: int) -> list[tuple[Score, list[Scor
 
 
 def noise_without(
-    fit: Fit, changes: Sequence[Change], filters: Sequence[tuple[Array, ...]] = (), most: int = 60
+    fit: Fit, changes: Iterable[Change], filters: Iterable[tuple[Array, ...]] = (), most: int = 60
 ) -> NoiseModel:
     """Noise model of the residual less what the catalogue's best guesses and linear filters together explain of it.
 
@@ -91,11 +93,10 @@ def noise_without(
     part that the catalogue may lack.
     """
     samples = sum(int(one.used.sum()) for one in fit.run.series)
-    ranked = score(fit, changes)[: min(most, samples // 50)]
+    best = best_changes(fit, changes, min(most, samples // 50))
     residuals = [r.copy() for r in fit.residuals]
     share = 1.0
-    by_key = {change.key: change for change in changes}
-    picked = [*(by_key[one.key].outputs for one in ranked), *filters]
+    picked = [*(one.outputs for one in best), *filters]
     if picked:
         used = [one.used for one in fit.run.series]
         design, target = reduced(
@@ -126,20 +127,22 @@ def one_round(
     noise = noise_without(fit, _changes(fit, catalogue, pool), _filters(fit, pool))
     if fit.nrmse() > MISFIT and noise.is_structure:
         noise = NoiseModel(np.empty(0), noise.variance**0.5)
+    give_back()
     fit = under(fit, noise, pool)
     scores = score(fit, _changes(fit, catalogue, pool))
     return Round(tuple(scores), p_value(scores), added, tuple(scored_in_windows(fit, catalogue, pool))), fit
 
 
-def _changes(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> list[Change]:
+def _changes(fit: Fit, catalogue: Catalogue, pool: ThreadPoolExecutor | None) -> Iterator[Change]:
     """Changes that the whole catalogue makes at a fit: they are told from what its parameters do only where these are linearised."""
     known = trajectories(fit)
     return changes_of(known, guesses(catalogue, fit.model, sizes_along(known)), pool)
 
 
-def _filters(fit: Fit, pool: ThreadPoolExecutor | None) -> list[tuple[Array, ...]]:
-    """Changes that linear filters of the past velocity and of the past actuator force make at a fit."""
-    return [column for one in filtered(trajectories(fit), pool) for column in one.columns]
+def _filters(fit: Fit, pool: ThreadPoolExecutor | None) -> Iterator[tuple[Array, ...]]:
+    """Changes that linear filters of the past velocity and of the past actuator force make at a fit, when they are asked for."""
+    for one in filtered(trajectories(fit), pool):
+        yield from one.columns
 
 
 def not_tried(nominal: Fit, catalogue: Catalogue, first: Round) -> list[tuple[tuple[str, ...], str]]:

@@ -7,8 +7,9 @@ asymptotically chi-squared with one degree of freedom when the element is absent
 (C. R. Rao, Math. Proc. Camb. Phil. Soc. 44 (1948) 50). One simulation a guess, and nothing is compiled for a model.
 """
 
+import heapq
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import cast
@@ -29,6 +30,7 @@ from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.identify.record_scales import scales
 from rhythmid.model import Model
+from rhythmid.parallel import each
 from rhythmid.simulation.effect import Path, effect_along
 from rhythmid.simulation.generated_source import DRIVES
 from rhythmid.simulation.signal import first_order_hold
@@ -288,8 +290,9 @@ def changes_of(
     known: Trajectories,
     candidates: Sequence[tuple[Element, dict[str, float]]],
     pool: ThreadPoolExecutor | None = None,
-) -> list[Change]:
-    """Changes that all guesses make; those that make the model diverge, or change nothing, are left out."""
+) -> Iterator[Change]:
+    """Changes that all guesses make, each simulated when it is nearly its turn: those of a whole catalogue over long records are large.
+    Those that make the model diverge, or change nothing, are left out."""
 
     def one(case: tuple[int, tuple[Element, dict[str, float]]]) -> Change | None:
         key, (element, values) = case
@@ -302,23 +305,32 @@ def changes_of(
             return None
         return Change(key, element, values, _kept(outputs))
 
-    cases = list(enumerate(candidates))
-    return [change for change in (pool.map(one, cases) if pool else map(one, cases)) if change is not None]
+    return (change for change in each(one, enumerate(candidates), pool) if change is not None)
 
 
 def _kept(outputs: Sequence[Array]) -> tuple[Array, ...]:
-    """Changes as they are kept for the whole catalogue: in half the memory over records that are very long."""
+    """Changes as they are scored and kept: in half the memory over records that are very long."""
     if sum(map(len, outputs)) <= FULL_PRECISION_ROWS:
         return tuple(outputs)
     return tuple(cast(Array, one.astype(np.float32)) for one in outputs)
 
 
-def score(fit: Fit, changes: Sequence[Change]) -> list[Score]:
+def score(fit: Fit, changes: Iterable[Change]) -> list[Score]:
     """Scores of all changes under the fit's noise model, best first."""
+    return sorted((one for one, _ in scored(fit, changes)), key=lambda s: -s.statistic)
+
+
+def best_changes(fit: Fit, changes: Iterable[Change], count: int) -> list[Change]:
+    """The `count` changes that score best under the fit's noise model, best first; no others are kept meanwhile."""
+    best = heapq.nlargest(count, scored(fit, changes), key=lambda pair: pair[0].statistic)
+    return [change for _, change in best]
+
+
+def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change]]:
+    """Changes with their scores under the fit's noise model; without those that the nominal parameters can make, too."""
     left, made_by = parameter_basis(fit)
     residual = fit.linearisation.residual
     residual = residual - left @ (left.T @ residual)
-    found: list[Score] = []
     for one in changes:
         white = whitened(fit, one.outputs, fit.noise)
         raw = math.sqrt(sum(float(w @ w) for w in white))
@@ -333,8 +345,7 @@ def score(fit: Fit, changes: Sequence[Change]) -> list[Score]:
             statistic = 0.0
         proportional = one.element.size and math.isfinite(one.element.absent)
         beside = dict(zip(fit.names, -made_by @ (left.T @ joined))) if proportional else {}
-        found.append(Score(one.key, one.element, one.values, statistic, size, beside))
-    return sorted(found, key=lambda s: -s.statistic)
+        yield Score(one.key, one.element, one.values, statistic, size, beside), one
 
 
 def under(fit: Fit, noise: NoiseModel, pool: ThreadPoolExecutor | None = None) -> Fit:

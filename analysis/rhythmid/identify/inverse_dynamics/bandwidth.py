@@ -103,26 +103,37 @@ def _residuals(
 ) -> tuple[list[Array], list[Array]]:
     """Efforts below the frequency, and what a free map with these lines over position leaves of them."""
     free = FreeMap(list(motions))
-    efforts, columns = [], []
+
+    def below(values: Array, motion: Motion) -> Array:
+        passed = low_pass(values, motion.period, frequency)
+        return high_pass(passed, motion.period, low)[_kept(motion, frequency)]
+
+    # the columns of one motion at a time: those of many long records would be large
+    efforts: list[Array] = []
+    products: list[Array] = []
     for motion in motions:
-        made = [free.columns(motion, np.zeros(len(motion.time))), motion.leg_position, motion.leg_velocity]
-        if not motion.driven_by_base:
-            made.append(motion.acceleration)
-        turns = [2.0 * math.pi * motion.leg_position / wavelength for wavelength in lines]
-        made += [wave(turn) for turn in turns for wave in (np.cos, np.sin)]
-        made = np.column_stack(made)
-        both = low_pass(np.column_stack([motion.effort, made]), motion.period, frequency)
-        both = high_pass(both, motion.period, low)
-        both = both[_kept(motion, frequency)]
-        efforts.append(both[:, 0])
-        columns.append(both[:, 1:])
-    matrix = np.vstack(columns)
-    norms = np.linalg.norm(matrix, axis=0)
+        both = below(np.column_stack([motion.effort, _columns(free, motion, lines)]), motion)
+        efforts.append(both[:, 0].copy())
+        products.append(both.T @ both)
+    product = np.sum(products, axis=0)
+    norms = np.sqrt(np.diag(product)[1:])
     norms[norms == 0.0] = 1.0
-    scaled = matrix / norms
-    normal = scaled.T @ scaled + RIDGE * np.eye(scaled.shape[1])
-    coefficients = np.linalg.solve(normal, scaled.T @ np.concatenate(efforts)) / norms
-    return efforts, [effort - made @ coefficients for effort, made in zip(efforts, columns, strict=True)]
+    normal = product[1:, 1:] / np.outer(norms, norms) + RIDGE * np.eye(len(norms))
+    coefficients = np.linalg.solve(normal, product[1:, 0] / norms) / norms
+    # filters are linear, so that the sum of the columns goes through them as one
+    return efforts, [
+        effort - below(_columns(free, motion, lines) @ coefficients, motion)
+        for effort, motion in zip(efforts, motions, strict=True)
+    ]
+
+
+def _columns(free: FreeMap, motion: Motion, lines: Sequence[float]) -> Array:
+    """Columns (n, q) of what may make up the effort of a motion: a free map, the motion itself and lines over position."""
+    made = [free.columns(motion, np.zeros(len(motion.time))), motion.leg_position, motion.leg_velocity]
+    if not motion.driven_by_base:
+        made.append(motion.acceleration)
+    turns = [2.0 * math.pi * motion.leg_position / wavelength for wavelength in lines]
+    return np.column_stack([*made, *(wave(turn) for turn in turns for wave in (np.cos, np.sin))])
 
 
 def _of_effort(
