@@ -1,16 +1,17 @@
-"""What a force does to a free run is taken from a part so small that the answer is in proportion to it."""
+"""What a force does to a free run: the answer is that to a force which is as small as can be."""
 
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.search import response as module
 from rhythmid.diagnose.search.response import response
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
 from rhythmid.elements.catalogue import load_catalogue
-from rhythmid.identify.output_error import estimate
+from rhythmid.identify.descent import WHITE
+from rhythmid.identify.output_error import estimate, start_only
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
+from rhythmid.simulation.signal import first_order_hold
 from rhythmid.simulation.simulate import simulate
 
 PENDULUM = """
@@ -40,15 +41,82 @@ def apart(first: np.ndarray, second: np.ndarray) -> float:
     return float(np.linalg.norm(first - second) / np.linalg.norm(second))
 
 
-def test_over_a_hundred_free_cycles_the_answer_is_that_to_a_tiny_force(swinging, monkeypatch):
+def by_difference(known: Trajectories, force: np.ndarray, share: float) -> np.ndarray:
+    """What a small part of a force does to a run, scaled back."""
+    fit, run = known.fit, known.disturbed
+    rows = run.rows(fit.model, 0, fit.starts[0], first_order_hold(known.paths[0].time, share * force))
+    assert rows is not None
+    return (rows[:, run.states] - known.outputs[0]) / share
+
+
+def test_over_a_hundred_free_cycles_the_answer_is_that_to_a_tiny_force(swinging):
     made = response(swinging, 0, friction(swinging))
-    monkeypatch.setattr(module, "SMALL", 1e-7)
-    tiny = response(swinging, 0, friction(swinging))
-    assert made is not None and tiny is not None and apart(made, tiny) < 0.05
-    monkeypatch.setattr(module, "SMALL", 1e-3)
-    monkeypatch.setattr(module, "ATTEMPTS", 1)
-    rough = response(swinging, 0, friction(swinging))
-    assert rough is not None and apart(rough, tiny) > 0.2  # a part that is too large tells something else
+    assert made is not None and apart(made, by_difference(swinging, friction(swinging), 1e-6)) < 0.01
+    rough = by_difference(swinging, friction(swinging), 1.0)
+    assert apart(made, rough) > 0.2  # a part that is too large tells something else
+
+
+@pytest.mark.parametrize(
+    "elements",
+    [
+        "force: [{linear_spring: {stiffness: {value: 200.0, unit: N/m}}}, "
+        "{elastoplastic_hysteresis: {stiffness: {value: 300.0, unit: N/m}, yield_displacement: {value: 0.003, unit: m}}}]",
+        "actuator: [{backlash: {width: {value: 0.3, unit: N}}}]\n"
+        "force: [{linear_spring: {stiffness: {value: 200.0, unit: N/m}}}]",
+        "force: [{linear_spring: {stiffness: {value: 200.0, unit: N/m}}}]\n"
+        "sensor: [{sensor_lag: {time_constant: {value: 0.02, unit: s}}}]",
+    ],
+    ids=["state", "memory", "sensor"],
+)
+@pytest.mark.parametrize("measured", ["position", "velocity", "acceleration"])
+def test_the_answer_of_a_driven_machine_is_that_to_a_tiny_force_whatever_is_measured(elements, measured):
+    unit = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}[measured]
+    text = f"inertia: {{mass: {{value: 1.0, unit: kg}}}}\n{elements}\n"
+    text = text.replace("force: [", "force: [{viscous_damper: {damping: {value: 1.5, unit: N*s/m}}}, ")
+    model = Model.from_text(text, catalogue=load_catalogue())
+    time = np.arange(0.0, 6.0, 0.005)
+    rng = np.random.default_rng(1)
+    series = prepare(
+        [
+            Record(
+                "driven",
+                output=Channel(time, 0.1 * rng.standard_normal(len(time)), unit),
+                input=Channel(time, 2.0 * np.sin(9.0 * time + 2.0 * np.sin(time)), "N"),
+                hold="zero",
+                output_kind=measured,
+            )
+        ]
+    )
+    fit = start_only(model, series, WHITE, 0.005)
+    known = trajectories(fit)
+    force = rng.standard_normal(len(known.paths[0].time))
+    made = response(known, 0, force)
+    assert known.tangents[0] is not None
+    assert made is not None and apart(made, by_difference(known, force, 1e-6)) < 0.01
+
+
+def test_a_machine_that_keeps_a_history_answers_to_a_small_force():
+    """Its feedback acts on what was measured a while ago, which is no state."""
+    text = """
+units: {force: "rad/s^2", position: rad, mass: "1"}
+inertia: {mass: {value: 1, unit: "1", fixed: true}}
+command:
+  - feedback_delay: {delay: {value: 0.02, unit: s}}
+  - position_control: {proportional: {value: 100.0, unit: "1/s^2"}, derivative: {value: 8.0, unit: "1/s"}}
+"""
+    model = Model.from_text(text, catalogue=load_catalogue())
+    time = np.arange(0.0, 6.0, 0.01)
+    record = Record(
+        "servo",
+        output=Channel(time, np.zeros(len(time)), "rad"),
+        input=Channel(time, np.sin(3.0 * time), "rad"),
+        input_kind="reference",
+    )
+    known = trajectories(start_only(model, prepare([record]), WHITE, 0.005))
+    force = np.sin(5.0 * known.paths[0].time)
+    made = response(known, 0, force)
+    assert known.tangents == (None,)
+    assert made is not None and apart(made, by_difference(known, force, 1e-4)) < 0.02
 
 
 def test_twice_the_force_does_twice_as_much_and_none_does_nothing(swinging):

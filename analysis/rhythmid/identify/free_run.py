@@ -11,6 +11,7 @@ from scipy.interpolate import PPoly
 from rhythmid.elements.element import STEP
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model
+from rhythmid.identify.inputs import Pieces
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.record.timing import nominal_period
@@ -23,6 +24,17 @@ from rhythmid.simulation.transport import command_delay, physical_times
 Array = NDArray[np.float64]
 DIVERGED = 1e100  # of any unit; squares of what is larger would overflow
 NO_SIGNAL = pieces(None)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What the compiled loop takes: the `times` (n,) of its rows, knots and coefficients of command and forcing, and the parameter vector."""
+
+    compiled: Compiled
+    times: Array
+    command: Pieces
+    forcing: Pieces
+    parameters: Array
 
 
 @dataclass(frozen=True)
@@ -50,6 +62,17 @@ class FreeRun:
         The start is the state at the first centre; what the record declares of the model's parameters replaces the model's own.
         None when the simulation diverges.
         """
+        given = self.prepared(model, index)
+        out = np.empty((len(given.times), self.states + 2))
+        force = NO_SIGNAL if disturbance is None else pieces(disturbance)
+        done = given.compiled.run(
+            given.times, *given.command, *given.forcing, *force,
+            given.parameters, np.ascontiguousarray(start), self.max_step, out,
+        )  # fmt: skip
+        return out if done == len(given.times) and float(np.abs(out[-1]).max()) < DIVERGED else None
+
+    def prepared(self, model: Model, index: int) -> Prepared:
+        """What the compiled loop takes to run a model over series `index`."""
         one = self.series[index]
         given = one.inputs
         model = own_model(model, one)
@@ -62,13 +85,7 @@ class FreeRun:
         if late is not None and len(late):
             knots = knots.copy()
             knots[1:-1] += late if varies else late[0]
-        out = np.empty((len(times), self.states + 2))
-        force = NO_SIGNAL if disturbance is None else pieces(disturbance)
-        done = compiled.run(
-            times, knots, coefficients, *given.forcing, *force,
-            compiled.layout.vector(model), np.ascontiguousarray(start), self.max_step, out,
-        )  # fmt: skip
-        return out if done == len(times) and float(np.abs(out[-1]).max()) < DIVERGED else None
+        return Prepared(compiled, times, (knots, coefficients), given.forcing, compiled.layout.vector(model))
 
     def outputs(self, model: Model, starts: Sequence[Array]) -> list[Array] | None:
         """Block-averaged outputs of all series from the given starts; None when one of them diverges."""

@@ -14,6 +14,7 @@ from rhythmid.errors import InputError
 from rhythmid.simulation.history import began, earlier, jump_until, row_at, row_until, with_room
 from rhythmid.simulation.machine_code import Module
 from rhythmid.simulation.piecewise_cubic import piece_at, slope_at, value_at
+from rhythmid.simulation.tangent_response import run as along
 
 
 @lru_cache(maxsize=256)
@@ -34,6 +35,16 @@ def pieces_module() -> Module:
         for function, signature in signatures.items()
     ]
     return Module("\n\n".join(["from numba import njit", *functions]))
+
+
+@cache
+def tangent_module() -> Module:
+    """The module with the recursion along a trajectory."""
+    signature = "int64(float64[:, :, ::1], float64, float64[::1], float64[::1])"
+    head = "import numpy as np\nfrom numba import njit"
+    return Module(
+        f'{head}\n\n\n@njit("{signature}", cache=True, nogil=True, error_model="numpy")\n{_text_of(along)}'
+    )
 
 
 @cache

@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 
 from rhythmid.diagnose.search.response import response
+from rhythmid.diagnose.search.tangent import Tangent, tangent
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element, Scales
@@ -110,7 +112,21 @@ class Trajectories:
     legs: tuple[Path, ...]
     outputs: tuple[Array, ...]  # of each series at its block centres, as the sensor says
     commands: tuple[Array, ...]
+    states: tuple[Array, ...]  # of each series at its block centres
     shaken: float  # typical acceleration (rms) of the strongest motion
+
+    @property
+    def push(self) -> float:
+        """Typical force on the mass."""
+        return self.fit.model.mass.value * self.shaken
+
+    @cached_property
+    def tangents(self) -> tuple[Tangent | None, ...]:
+        """The tangent linear model along each series; None where there is none."""
+        return tuple(
+            tangent(self.disturbed, self.fit.model, index, states, self.push or 1.0)
+            for index, states in enumerate(self.states)
+        )
 
 
 def trajectories(fit: Fit) -> Trajectories:
@@ -119,7 +135,7 @@ def trajectories(fit: Fit) -> Trajectories:
     disturbed = replace(
         prepare_run(fit.model, run.series, run.max_step, disturbed=True), max_step=run.max_step
     )
-    paths, legs, outputs, commands = [], [], [], []
+    paths, legs, outputs, commands, states = [], [], [], [], []
     q = run.states
     for index, (one, start) in enumerate(zip(run.series, fit.starts)):
         rows = disturbed.rows(fit.model, index, start)
@@ -141,9 +157,12 @@ def trajectories(fit: Fit) -> Trajectories:
             rate = _evaluate(command.derivative(), time)
             legs[-1] = replace(paths[-1], position=rows[:, 0] - signal, velocity=rows[:, 1] - rate)
         outputs.append(rows[:, q].copy())
+        states.append(rows[:, :q].copy())
         commands.append(signal)
     shaken = max(float(np.std(np.gradient(path.velocity, path.time))) for path in paths)
-    return Trajectories(fit, disturbed, tuple(paths), tuple(legs), tuple(outputs), tuple(commands), shaken)
+    return Trajectories(
+        fit, disturbed, tuple(paths), tuple(legs), tuple(outputs), tuple(commands), tuple(states), shaken
+    )
 
 
 def _evaluate(signal, time: Array) -> Array:

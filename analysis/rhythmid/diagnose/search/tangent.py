@@ -1,0 +1,100 @@
+"""The tangent linear model of a free run: what small changes of state and force lead to over each interval between two rows.
+
+The derivative of the numerical solution itself, by differences over one interval each, so that they stay small however freely the
+machine swings (F. Rabier, P. Courtier, Q. J. R. Meteorol. Soc. 118 (1992) 649, linearise along a trajectory in the same way).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.identify.free_run import NO_SIGNAL, FreeRun
+from rhythmid.identify.inputs import Pieces
+from rhythmid.model import Model
+from rhythmid.simulation.kernel_source import tangent_module
+from rhythmid.simulation.machine_code import load_run
+from rhythmid.simulation.signal import FAR
+
+Array = NDArray[np.float64]
+# of the scatter of a state or of the given force, that is moved for a difference: the rounding of the outcome, 1e-16 of it, and
+# its curvature both leave the derivative to five digits
+STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """Maps (n - 1, q + 1, q + 2) from the change of state and of the force at both ends of an interval to that of the next state and
+    output; `direct` is what the force does to the first output."""
+
+    maps: Array
+    direct: float
+
+    def response(self, force: Array) -> Array:
+        """Change (n,) of the output that a small force (n,) makes, straight between its values."""
+        found = np.empty(len(force))
+        load_run(tangent_module())(self.maps, self.direct, np.ascontiguousarray(force), found)
+        return found
+
+
+def tangent(run: FreeRun, model: Model, index: int, states: Array, force: float) -> Tangent | None:
+    """The tangent linear model along a run of series `index`, in which disturbances act.
+
+    Parameters
+    ----------
+    states : (n, q) at the block centres, as the run has them.
+    force : typical size of a force on the mass.
+
+    Returns None for a model that keeps a history, and where a difference diverges.
+    """
+    given = run.prepared(model, index)
+    if given.compiled.layout.history:
+        return None
+    times, q = given.times, states.shape[1]
+    scatter = states.std(axis=0)
+    moved = STEP * np.where(scatter > 0.0, scatter, np.maximum(np.abs(states).max(axis=0), 1e-12))
+    pushed = STEP * force
+    command, forcing = _Stretches(given.command, times), _Stretches(given.forcing, times)
+    maps, ends = np.empty((len(times) - 1, q + 1, q + 2)), np.empty((2, q + 2))
+    direct = 0.0
+
+    def end(k: int, start: Array, disturbance: Pieces) -> Array:
+        given.compiled.run(
+            times[k : k + 2], *command.at(k), *forcing.at(k), *disturbance,
+            given.parameters, start, run.max_step, ends,
+        )  # fmt: skip
+        return ends[1, : q + 1]
+
+    for k in range(len(times) - 1):
+        start = states[k].copy()
+        base, first = end(k, start, NO_SIGNAL).copy(), ends[0, q]
+        for i in range(q):
+            start[i] = states[k, i] + moved[i]
+            maps[k, :, i] = (end(k, start, NO_SIGNAL) - base) / moved[i]
+            start[i] = states[k, i]
+        for i, values in enumerate(((pushed, 0.0), (0.0, pushed))):
+            maps[k, :, q + i] = (end(k, start, _straight(times[k], times[k + 1], *values)) - base) / pushed
+            if k == i == 0:
+                direct = (ends[0, q] - first) / pushed
+    return Tangent(maps, direct) if np.isfinite(maps).all() else None
+
+
+class _Stretches:
+    """The pieces of a signal that act in each interval between times (n,)."""
+
+    def __init__(self, signal: Pieces, times: Array) -> None:
+        self.knots, self.coefficients = signal
+        self.first = np.searchsorted(self.knots, times, side="right") - 1
+
+    def at(self, k: int) -> Pieces:
+        first, last = self.first[k], self.first[k + 1]
+        part = np.ascontiguousarray(self.coefficients[:, first : last + 1])
+        return self.knots[first : last + 2], part
+
+
+def _straight(begin: float, end: float, first: float, last: float) -> Pieces:
+    """A force that is straight between two values at two times, and constant outside."""
+    coefficients = np.zeros((4, 3))
+    coefficients[0] = first, first, last
+    coefficients[1, 1] = (last - first) / (end - begin)
+    return np.array([-FAR, begin, end, FAR]), coefficients
