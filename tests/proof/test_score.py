@@ -1,11 +1,13 @@
 """Answers held against opened truths, and the card made of the scores."""
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import pytest
 
 from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.output import write_json
+from rhythmid.proof.campaign import read_score
 from rhythmid.proof.card import confusion, coverage, markdown, summary
 from rhythmid.proof.rate import Rate, rate
 from rhythmid.proof.reliability import EDGES, reliability
@@ -269,3 +271,12 @@ def test_a_family_is_right_where_something_of_it_was_concealed_or_is_clutter():
     other = judged(truth("second_mode"), answer("undecided") | {"families": families})
     assert not other.kind_right and "| 0/1 = 0.0 %" in markdown([other], "proof")
     assert not judged(truth("coulomb_friction"), answer("undecided")).kinds
+
+
+def test_a_score_is_read_as_it_was_written(tmp_path):
+    families = [{"family": "friction", "laws": [], "share": 0.9, "probability": 0.93}]
+    said = answer("missing_physics", "coulomb_friction", families=[("coulomb_friction", "backlash")])
+    made = judged(truth("coulomb_friction", clutter=("sensor_lag",)), said | {"families": families})
+    path = tmp_path / "score.json"
+    write_json(path, asdict(made))
+    assert read_score(path) == made and made.kinds_stated and made.effects

@@ -14,6 +14,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.output import write_json, write_text
@@ -22,7 +24,7 @@ from rhythmid.proof.draw import KINDS, Kind, draw_case
 from rhythmid.proof.examine import examine
 from rhythmid.proof.machines.designs import DESIGNS
 from rhythmid.proof.perform import perform
-from rhythmid.proof.score import Estimated, Score, Stated, score
+from rhythmid.proof.score import Score, score
 from rhythmid.proof.seal import seal, truth_of, unseal
 
 SHARES: dict[Kind, int] = {"single": 3, "null": 3, "pairs": 1, "left-out": 1}  # of a campaign of all kinds
@@ -142,14 +144,7 @@ def _open(task: Task, out: Path, told: str, keep: bool) -> Score:
 
 def read_score(path: Path) -> Score:
     """A score written before."""
-    data = json.loads(path.read_text(encoding="utf-8"))
-    for name in ("effects", "machine"):
-        data[name] = tuple(Estimated(**one) for one in data[name])
-    data["stated"] = tuple(Stated(**one) for one in data["stated"])
-    for name in ("true", "clutter", "named", "absent"):
-        data[name] = tuple(data[name])
-    data["families"] = tuple(tuple(group) for group in data["families"])
-    return Score(**data)
+    return TypeAdapter(Score).validate_python(json.loads(path.read_text(encoding="utf-8")))
 
 
 def _begin(cores: Sequence[int], parent: int) -> None:
