@@ -32,7 +32,7 @@ CONTRACT = [
     "switching_threshold", "position_dependent_damping", "cubic_stiffness", "quadratic_stiffness",
     "bilinear_stiffness", "ground_contact_loss", "end_stop_contact", "position_ripple",
     "elastoplastic_hysteresis", "viscoelastic_relaxation", "second_mode", "stiffness_drift", "stiffness_jump",
-    "periodic_disturbance", "actuator_lag", "command_lag", "actuator_saturation", "actuator_deadband",
+    "periodic_disturbance", "actuator_lag", "command_lag", "actuator_saturation", "torque_speed_limit", "actuator_deadband",
     "actuator_nonlinearity", "backlash", "actuator_gain", "actuator_fade", "command_hold", "command_jitter",
     "sensor_lag", "sensor_nonlinearity", "sensor_gain", "sensor_offset", "sensor_drift", "sensor_quantisation",
     "measurement_jitter", "clock_skew", "delay_drift",

@@ -97,6 +97,12 @@ def actuator_saturation(value, t, x, v, f, m, p, s, ds, held, accepted):
     return clip(value, -p[0], p[0])
 
 
+@equation("actuator", "speed", "slope")
+def torque_speed_limit(value, t, x, v, f, m, p, s, ds, held, accepted):
+    free, lost = p
+    return clip(value, -lost * (free + v), lost * (free - v))
+
+
 @equation("actuator", "threshold")
 def actuator_deadband(value, t, x, v, f, m, p, s, ds, held, accepted):
     if value > p[0]:

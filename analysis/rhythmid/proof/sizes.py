@@ -112,6 +112,17 @@ def _limit(size: str, peak: float, lowest: float) -> Sized:
     return lambda strength: {size: peak * (1.0 - (1.0 - lowest) * strength)}
 
 
+def _torque_speed_limit(rng: Rng, m: Motion) -> Sized:
+    slope = m.effort / m.velocity * _log(rng, 0.3, 3.0)
+
+    def sized(strength: float) -> dict[str, float]:
+        # from where the largest force is left at three times the usual speed down to where half of it is at none
+        fastest, slowest = 3.0 * m.velocity + m.effort / slope, 0.5 * m.effort / slope
+        return {"speed": fastest + (slowest - fastest) * strength, "slope": slope}
+
+    return sized
+
+
 def _end_stop(rng: Rng, m: Motion) -> Sized:
     side = _sign(rng)
     stiffness, damping = m.stiffness * _log(rng, 3.0, 30.0), rng.uniform(0.05, 0.4)
@@ -148,6 +159,7 @@ SIZES: dict[str, Callable[[Rng, Motion], Sized]] = {
     "reference_rate_limit": lambda rng, m: _limit("rate", m.reference_rate, 0.1),
     "actuator_lag": lambda rng, m: _of("time_constant", 0.4 / m.natural),
     "actuator_saturation": lambda rng, m: _limit("limit", m.effort, 0.3),
+    "torque_speed_limit": _torque_speed_limit,
     "actuator_rate_limit": lambda rng, m: _limit("rate", m.slope, 0.2),
     "actuator_deadband": lambda rng, m: _of("threshold", 0.6 * m.unit),
     "actuator_nonlinearity": lambda rng, m: _of("coefficient", _sign(rng) * 0.3 / m.effort**2),

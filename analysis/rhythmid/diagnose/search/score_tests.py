@@ -1,10 +1,10 @@
 """Score tests: which elements of the catalogue would explain the residual of the nominal fit?
 
 For each first guess of each element the change of the free run is found by adding the element's force along the fitted
-trajectory as a disturbance (its change of the output, for sensors; the changed stamps, for timing). Projected off what
+trajectory as a disturbance of its tangent linear model (its change of the output, for sensors; the changed stamps, for timing). Projected off what
 the nominal parameters and initial states can do, its correlation with the residual is Rao's score statistic,
 asymptotically chi-squared with one degree of freedom when the element is absent
-(C. R. Rao, Math. Proc. Camb. Phil. Soc. 44 (1948) 50). One simulation a guess, and nothing is compiled for a model.
+(C. R. Rao, Math. Proc. Camb. Phil. Soc. 44 (1948) 50). Nothing is compiled or fitted for a guess.
 """
 
 import heapq

@@ -12,7 +12,7 @@ RATES = (200, 500, 1000)  # [Hz]
 EFFECTS = (
     "coulomb_friction", "asymmetric_coulomb_friction", "stribeck_friction", "load_dependent_friction",
     "quadratic_drag", "pendulum_gravity", "constant_force", "actuator_deadband", "actuator_saturation",
-    "actuator_nonlinearity", "actuator_lag", "second_mode",
+    "actuator_nonlinearity", "torque_speed_limit", "actuator_lag", "second_mode",
 )  # fmt: skip
 
 
