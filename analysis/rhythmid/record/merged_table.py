@@ -21,9 +21,10 @@ def is_merged(columns: Iterable[Array]) -> bool:
     present = [there for value in columns if (there := np.isfinite(value)).any()]
     if len(present) < 2:
         return False
-    return all(there.mean() <= 1.0 - OFTEN for there in present) and bool(
-        np.logical_and.reduce(present).mean() <= TOGETHER
-    )
+    together = float(np.logical_and.reduce(present).mean())
+    if together == 0.0:  # however few messages one of them has
+        return True
+    return all(there.mean() <= 1.0 - OFTEN for there in present) and together <= TOGETHER
 
 
 def is_sampled_rarely(value: Array) -> bool:
