@@ -22,10 +22,12 @@ LEAST = 3  # samples, of which one has two neighbours
 
 def held_note(given: Channel, answer: Channel) -> str | None:
     """What to tell of a channel that drives where it is far sparser than what answers and changes in steps; None where it is not."""
-    if len(given) < 2 or np.ptp(given.value) == 0.0:
+    (time, first), (of_answer, _) = (np.unique(one.time, return_index=True) for one in (given, answer))
+    value = given.value[first]
+    if len(time) < 2 or len(of_answer) < 2 or np.ptp(value) == 0.0:
         return None
-    usual, of_answer = (float(np.median(np.diff(one.time))) for one in (given, answer))
-    if usual < SPARSE * of_answer or _is_resolved(given.time, given.value):
+    usual = float(np.median(np.diff(time)))
+    if usual < SPARSE * float(np.median(np.diff(of_answer))) or _is_resolved(time, value):
         return None
     return (
         f"its {len(given)} samples, usually {usual:.3g} s apart, change in steps and are far sparser than the output's: each is taken as "

@@ -19,7 +19,7 @@ LONGEST = (
 def is_merged(columns: Iterable[Array]) -> bool:
     """Whether the columns (n,) each, without the time, come from streams whose rows were merged. Empty columns say nothing."""
     present = [there for value in columns if (there := np.isfinite(value)).any()]
-    if len(present) < 2:
+    if len(present) < 2 or any(there.all() for there in present) or len({len(one) for one in present}) > 1:
         return False
     together = float(np.logical_and.reduce(present).mean())
     if together == 0.0:  # however few messages one of them has
