@@ -149,7 +149,7 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
         heading, time = heading_of(name), every
         if name in parts:
             continue
-        if clock.kind == "column" and (name == clock.column or is_time(name, value)):
+        if clock.kind == "column" and (name == clock.column or is_time(name, value[~np.isnan(value)])):
             continue
         if clock.kind == "rate" and (is_time(name, value) or (name.isdigit() and is_even(value))):
             left.append(f"{name}: goes forward like a time")

@@ -285,7 +285,7 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         if conflicts > AMBIGUOUS * len(samples.time):
             raise InputError(
                 f"{label}: {conflicts} of {len(samples.time)} samples have the time of another one with another value: "
-                f"two publishers, a clock set back or too coarse stamps; {mend}"
+                f"two publishers, a clock set back or too coarse stamps; {mend}{_evenly(clocks[role])}"
             )
         judgement[role] = judged(
             str(samples.source), samples.time, samples.lateness, time, value, stamped and role == "output", samples.missing, conflicts
@@ -301,6 +301,15 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         quality=replace(quality, channels=judgement, notes=notes), parameters=signals.declared(name), stamped=stamped,
         **channels,
     )  # fmt: skip
+
+
+def _evenly(clock: str) -> str:
+    """What else mends stamps that several rows share."""
+    return (
+        ", or, where the rows were taken evenly, give their rate: time: {sample_rate: HZ}, of init --rate HZ"
+        if clock == "column"
+        else ""
+    )
 
 
 def _conflicts(samples: Samples, time: NDArray[np.float64], value: NDArray[np.float64]) -> int:
