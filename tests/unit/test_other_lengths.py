@@ -6,6 +6,7 @@ import pytest
 from foreign import moved, roles_of, tones
 from scipy.io import savemat
 
+from rhythmid.errors import InputError
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.other_lengths import length_notes
 from rhythmid.record.signals import Signals
@@ -60,3 +61,9 @@ def test_an_array_that_lies_across_is_read_a_row_a_signal_as_simulink_writes_it(
     table = Table.load(tmp_path / "run.mat")
     np.testing.assert_array_equal(table.column("log_theta[2]"), X)
     assert str(guess(tmp_path / "run.mat").inventory.clock.column) == "log_theta[0]"
+
+
+def test_a_file_of_arrays_that_are_too_wide_is_refused_with_their_shape(tmp_path):
+    savemat(tmp_path / "run.mat", {"image": np.zeros((70, 80))})
+    with pytest.raises(InputError, match=r"no column of numbers; image: has 80 columns \(70 x 80\)"):
+        guess(tmp_path / "run.mat")
