@@ -75,6 +75,12 @@ def test_records_in_units_a_thousand_apart_are_refused_by_name(given, factor):
     check_comparable(prepare(given))
 
 
+@pytest.mark.parametrize("zero", [-80.0, 327.0])
+def test_records_whose_encoders_have_zeros_far_apart_are_of_one_machine(given, zero):
+    other = replace(given[1], output=replace(given[1].output, value=given[1].output.value + zero))
+    check_comparable(prepare([given[0], other]))
+
+
 def test_an_output_that_never_changes_is_refused(given):
     still = replace(
         given[0], output=replace(given[0].output, value=np.full(len(given[0].output.value), 0.15))

@@ -4,7 +4,9 @@ import foreign
 import numpy as np
 import pytest
 from foreign import moved, roles_of, tones
+from scipy.io import savemat
 
+from rhythmid.errors import InputError
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.other_lengths import length_notes
 from rhythmid.record.signals import Signals
@@ -22,7 +24,8 @@ SIGNALS = "time: {column: t}\ninput: {column: f, unit: N}\noutput: {column: x, u
     [
         (np.zeros(500), "has 500 values, the time 4000"),
         (np.zeros((500, 3)), "has 500 rows (500 x 3), the time 4000"),
-        (np.zeros((3, 4000)), "lies across (3 x 4000): transpose it"),
+        (np.zeros((3, 3000)), "has 3000 rows (3000 x 3), the time 4000"),
+        (np.zeros((70, 4000)), "lies across (70 x 4000): transpose it"),
         (np.zeros((4000, 70)), "has 70 columns (4000 x 70); at most 64 are read"),
         (np.zeros((40, 3, 3)), "has 3 dimensions (40 x 3 x 3)"),
         (np.zeros(4000, dtype=complex), "holds complex numbers"),
@@ -51,3 +54,16 @@ def test_many_parameters_do_not_hide_the_recording(tmp_path):
     parameters = {f"gains{number}": np.arange(3.0) for number in range(6)}
     np.savez(tmp_path / "run.npz", t=TIME, x=X, f=FORCE, **parameters)
     assert roles_of(tmp_path / "run.npz") == {"input": "f", "output": "x"}
+
+
+def test_an_array_that_lies_across_is_read_a_row_a_signal_as_simulink_writes_it(tmp_path):
+    savemat(tmp_path / "run.mat", {"log_theta": np.vstack([TIME, FORCE, X])})
+    table = Table.load(tmp_path / "run.mat")
+    np.testing.assert_array_equal(table.column("log_theta[2]"), X)
+    assert str(guess(tmp_path / "run.mat").inventory.clock.column) == "log_theta[0]"
+
+
+def test_a_file_of_arrays_that_are_too_wide_is_refused_with_their_shape(tmp_path):
+    savemat(tmp_path / "run.mat", {"image": np.zeros((70, 80))})
+    with pytest.raises(InputError, match=r"no column of numbers; image: has 80 columns \(70 x 80\)"):
+        guess(tmp_path / "run.mat")

@@ -69,3 +69,9 @@ def test_a_smooth_motion_without_noise_that_is_read_evenly_lies_on_no_grid(motio
 
 def test_rounding_that_grows_with_the_size_is_no_jitter_of_the_stamps() -> None:
     assert stamp_jitter([(TIME, SCALE * written(angle() ** 2 / 600.0, 4))]) is None
+
+
+def test_steps_that_do_not_follow_the_size_of_the_numbers_are_no_number_of_digits() -> None:
+    few = np.arange(200)
+    value = np.concatenate([0.15 + 1e-5 * few, 0.45 + 2.5671234e-3 * few])  # 2^8 apart at thrice the size
+    assert resolution(value) == 0.0

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
+from rhythmid.record.angle_wrap import wrap_notes
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block
 from rhythmid.record.cleaning import LeftOut, cleaned
@@ -194,7 +195,7 @@ def quality_report(
         for begin, one in parts.items():
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             notes += [note for note in one.quality.notes if note not in notes]
-            notes += [f"{begin}{note}" for note in (*copy_notes(one), *unsigned_notes(one))]
+            notes += [f"{begin}{note}" for note in (*copy_notes(one), *unsigned_notes(one), *wrap_notes(one))]
             if begin and (still := standstill(one)) is not None:
                 notes.append(f"{begin}output: {still}")
         duration = max(one.duration for one in parts.values())

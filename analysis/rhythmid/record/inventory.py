@@ -126,8 +126,10 @@ def inventory(source: str | Path, rate: float | None = None) -> Inventory:
 def _of_table(table: Table, rate: float | None) -> Inventory:
     columns = list(table.vectors())
     if not columns:
-        of_matlab = f"; {OBJECTS}" if table_suffix(table.path) == ".mat" else ""
-        raise InputError(f"{table.path}: holds no column of numbers{of_matlab}")
+        arrays = "; ".join(map(str, unequal_arrays(table, 0)))
+        of_matlab = OBJECTS if table_suffix(table.path) == ".mat" else ""
+        why = f"; {arrays or of_matlab}" if arrays or of_matlab else ""
+        raise InputError(f"{table.path}: holds no column of numbers{why}")
     count = _rows_of(columns)
     unequal = [(name, value) for name, value in columns if len(value) != count]
     columns = [(name, value) for name, value in columns if len(value) == count]
@@ -149,7 +151,7 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
         heading, time = heading_of(name), every
         if name in parts:
             continue
-        if clock.kind == "column" and (name == clock.column or is_time(name, value)):
+        if clock.kind == "column" and (name == clock.column or is_time(name, value[~np.isnan(value)])):
             continue
         if clock.kind == "rate" and (is_time(name, value) or (name.isdigit() and is_even(value))):
             left.append(f"{name}: goes forward like a time")

@@ -19,11 +19,12 @@ LONGEST = (
 def is_merged(columns: Iterable[Array]) -> bool:
     """Whether the columns (n,) each, without the time, come from streams whose rows were merged. Empty columns say nothing."""
     present = [there for value in columns if (there := np.isfinite(value)).any()]
-    if len(present) < 2:
+    if len(present) < 2 or any(there.all() for there in present) or len({len(one) for one in present}) > 1:
         return False
-    return all(there.mean() <= 1.0 - OFTEN for there in present) and bool(
-        np.logical_and.reduce(present).mean() <= TOGETHER
-    )
+    together = float(np.logical_and.reduce(present).mean())
+    if together == 0.0:  # however few messages one of them has
+        return True
+    return all(there.mean() <= 1.0 - OFTEN for there in present) and together <= TOGETHER
 
 
 def is_sampled_rarely(value: Array) -> bool:

@@ -17,6 +17,7 @@ from rhythmid.record.clocks import clock_notes
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.held_back import evened
+from rhythmid.record.held_command import held_note
 from rhythmid.record.judged import judged
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
 from rhythmid.record.punctuality import punctuality_notes
@@ -26,7 +27,6 @@ from rhythmid.record.signals import Signals, Sinusoid, Source
 from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
 from rhythmid.record.timing import put_in_order
 from rhythmid.record.unit_notes import unit_notes
-from rhythmid.simulation.signal import Hold
 
 MOSTLY = 0.5  # share of samples that are no number, beyond which a channel is useless
 LARGEST = 1e100  # of a measured value: its square is still a number
@@ -173,7 +173,8 @@ def read_tables(signals: Signals) -> Record:
         name = signals.path.resolve().parent.name  # tells more
     quality = Quality({}, notes=unit_notes(signals))
     record = _record(name, _since_start(made), signals, SPLIT, quality)
-    return _finish(replace(record, hold=signals.hold or _measured_hold(record)), signals)
+    record = replace(record, hold=signals.hold) if signals.hold else _with_hold(record)
+    return _finish(record, signals)
 
 
 def _is_merged(table: Table, signals: Signals) -> bool:
@@ -284,7 +285,7 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         if conflicts > AMBIGUOUS * len(samples.time):
             raise InputError(
                 f"{label}: {conflicts} of {len(samples.time)} samples have the time of another one with another value: "
-                f"two publishers, a clock set back or too coarse stamps; {mend}"
+                f"two publishers, a clock set back or too coarse stamps; {mend}{_evenly(clocks[role])}"
             )
         judgement[role] = judged(
             str(samples.source), samples.time, samples.lateness, time, value, stamped and role == "output", samples.missing, conflicts
@@ -300,6 +301,15 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
         quality=replace(quality, channels=judgement, notes=notes), parameters=signals.declared(name), stamped=stamped,
         **channels,
     )  # fmt: skip
+
+
+def _evenly(clock: str) -> str:
+    """What else mends stamps that several rows share."""
+    return (
+        ", or, where the rows were taken evenly, give their rate: time: {sample_rate: HZ}, of init --rate HZ"
+        if clock == "column"
+        else ""
+    )
 
 
 def _conflicts(samples: Samples, time: NDArray[np.float64], value: NDArray[np.float64]) -> int:
@@ -375,11 +385,15 @@ def _pumping_frequency(record: Record) -> float:
     return law.frequency if law is not None and law.amplitude != 0.0 else 0.0
 
 
-def _measured_hold(record: Record) -> Hold:
-    """How a tabulated, measured input continues: band-limited if evenly spaced but for gaps, else by straight lines."""
+def _with_hold(record: Record) -> Record:
+    """A table's record with how its input continues: as steps where these are events, else as what was measured does: band-limited if evenly
+    spaced but for gaps, by straight lines if not."""
     if record.input is None:
-        return "zero"
+        return record
+    if note := held_note(record.input, record.output):
+        quality = replace(record.quality, notes=(*record.quality.notes, f"input: {note}"))
+        return replace(record, hold="zero", quality=quality)
     step = np.diff(record.input.time)
     periods = np.rint(step / record.input.period)  # more than one where samples are missing
     even = len(step) > 2 and np.abs(step - periods * record.input.period).max() < 2e-9 and periods.min() > 0.0
-    return "band_limited" if even else "linear"
+    return replace(record, hold="band_limited" if even else "linear")

@@ -81,19 +81,23 @@ def _bands(value: Array) -> tuple[Array, Array] | None:
     if count < 2:
         return None
     span = float(np.ptp(value))
-    steps = np.zeros(count)
+    steps, least, largest = np.zeros(count), np.zeros(count), np.zeros(count)
     for k in range(count):
-        step, on_grid = _grid(levels[k * BAND : (k + 1) * BAND + 1], span)
+        band = levels[k * BAND : (k + 1) * BAND + 1]
+        least[k], largest[k] = band[0], band[-1]
+        step, on_grid = _grid(band, span)
         if len(on_grid) >= LEVELS and on_grid.mean() > ON_GRID:
             steps[k] = step
-    steps = np.maximum.accumulate(_ladder(steps))
+    steps = np.maximum.accumulate(_ladder(steps, least, largest))
     steps[:-1] = np.where(steps[:-1] > 0.0, steps[1:], 0.0)
-    return levels[: count * BAND : BAND], steps
+    return least, steps
 
 
-def _ladder(steps: Array) -> Array:
+def _ladder(steps: Array, least: Array, largest: Array) -> Array:
     """Those of the steps (m,) of bands that are one of them times a power of 10 or of 2; the others 0, and all where such powers differ
-    in no two of them, or too many are others."""
+    in no two of them, too many are others, or the powers do not follow the size of the levels, from `least` to `largest` (m,) in each band:
+    so many digits are one step from one power of the base to the next, wherever a scale has moved these.
+    """
     for base in BASES:
         seen = steps > 0.0
         if not seen.any():
@@ -101,7 +105,11 @@ def _ladder(steps: Array) -> Array:
         power = np.log(steps[seen] / np.median(steps[seen])) / np.log(base)
         whole = np.round(power)
         on = np.abs(power - whole) * np.log(base) < RUNG
-        if on.mean() >= LADDER and np.ptp(whole[on]) > 0.0:
+        if on.mean() < LADDER or np.ptp(whole[on]) == 0.0:
+            continue
+        with np.errstate(divide="ignore"):
+            low, high = (np.log(size[seen][on]) / np.log(base) - whole[on] for size in (least, largest))
+        if low.max() - high.min() <= 1.0:
             kept = np.zeros(len(steps))
             kept[np.flatnonzero(seen)[on]] = steps[seen][on]
             return kept

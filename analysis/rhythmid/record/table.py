@@ -74,7 +74,11 @@ class Table:
         except Exception as error:  # the readers of damaged .mat and .npz files raise anything
             raise InputError(f"{path}: cannot be read as a table: {' '.join(str(error).split())}") from None
         return cls(
-            path, {name: unwrapped(one) if is_called_time(name) else one for name, one in columns.items()}
+            path,
+            {
+                name: unwrapped(one) if is_called_time(name) else _upright(one)
+                for name, one in columns.items()
+            },
         )
 
     def vectors(self) -> Iterator[tuple[str, NDArray[np.float64]]]:
@@ -140,6 +144,15 @@ class Table:
     def _check_real(self, name: str, values: NDArray[Any]) -> None:
         if values.dtype.kind not in "fiub":
             raise InputError(f"{self.path}: column {name!r} does not hold real numbers")
+
+
+def _upright(values: Any) -> Any:
+    """An array as columns, also where it lies across, as Simulink's To File writes it: a row each signal, more values in it than any array
+    has columns."""
+    across = (
+        isinstance(values, np.ndarray) and values.ndim == 2 and 1 < len(values) <= WIDEST < values.shape[1]
+    )
+    return values.T if across else values
 
 
 def _is_number(cell: str) -> bool:

@@ -52,7 +52,7 @@ def _is_coarse(value: Array) -> bool:
 
 
 def _called(name: str) -> str:
-    return heading_of(name).name.rsplit(".", 1)[-1].replace(" ", "_")
+    return re.split(r"[./]", heading_of(name).name)[-1].replace(" ", "_")
 
 
 def _forward(value: Array) -> bool:

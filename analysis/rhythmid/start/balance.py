@@ -16,7 +16,13 @@ from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
 LATEST_ACTION = 0.2  # s by which what drives may act later than it was recorded, in a first guess
-LATER = 0.9  # of what is left without a delay: by so much a delay has to lower it to be guessed
+EARNS_PLACE = (
+    0.9  # of what a balance leaves: by so much an element has to lower it to be among the first guesses
+)
+# of the power of what drives, that it has to explain, too: less is a matter of friction, ripple and noise, which anything takes up at random.
+# Of a delay of half a radian, inertia, damper and spring leave (ω τ)²/2 of the size, which is as much; of a shorter one less
+WORTH = 0.015
+STEADY = 1e-9  # of its size, within which what drives never changes: the rounding of the filters
 COLUMNS = ("acceleration", "velocity", "position", "sine", "cosine", "constant")
 POSITIVE = frozenset({"acceleration", "velocity", "position"})
 MOST_ROWS = 4000  # of the balance: more would not make a first guess better
@@ -31,6 +37,10 @@ class Law:
     coefficients: dict[str, float]
     left: float
     delay: float = 0.0
+
+    def earns_place(self, simpler: "Law") -> bool:
+        """Whether it explains clearly more than a simpler law, of what that leaves and of what drives."""
+        return self.left < EARNS_PLACE * simpler.left and simpler.left - self.left >= WORTH
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +76,18 @@ class Rows:
             max(float(np.ptp(one.leg_position)) for one in motions), chosen, motions[0].driven_by_base,
         )  # fmt: skip
 
+    @property
+    def steady(self) -> bool:
+        """Whether what drives never changes: then a constant balances it, and tells nothing of the machine."""
+        every = np.concatenate(self.drives)
+        return not self.by_base and bool(np.ptp(every) <= STEADY * np.abs(every).max())
+
     def delay(self, names: Sequence[str]) -> float:
-        """By how much later [s] what drives acts, where that makes the balance of these columns clearly better; else 0."""
-        if self.by_base or self.is_fed_back():
+        """By how much later [s] what drives acts, where that makes the balance of these columns clearly better; else 0.
+
+        A balance that is still getting better at the end of the range shows no delay.
+        """
+        if self.by_base or self.steady or self.is_fed_back():
             return 0.0
         period = max(self.period)
         most = min(
@@ -77,7 +96,8 @@ class Rows:
         delays = [number * period for number in range(1, int(most / period) + 1)]
         at_once = self.fit(names)
         best = min((self.fit(names, one) for one in delays), key=lambda law: law.left, default=at_once)
-        return best.delay if best.left < LATER * at_once.left else 0.0
+        at_the_end = not delays or best.delay == delays[-1]
+        return best.delay if best.earns_place(at_once) and not at_the_end else 0.0
 
     def is_fed_back(self) -> bool:
         """Whether what drives is −k times the position and a constant: a delayed balance would tell of that law, not of the machine."""
@@ -109,7 +129,7 @@ class Rows:
         size[~told] = 1.0
         low = [0.0 if name in POSITIVE else -np.inf for name in names]
         solved = lsq_linear(matrix / size, side, (low, np.inf))
-        power = float(np.sum((side - side.mean()) ** 2)) or float(side @ side) or 1.0
+        power = float(np.sum((side - (0.0 if self.steady else side.mean())) ** 2)) or 1.0
         return Law(
             dict(zip(names, np.where(told, solved.x / size, 0.0).tolist(), strict=True)),
             2.0 * float(solved.cost) / power,

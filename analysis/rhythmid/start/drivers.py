@@ -120,8 +120,12 @@ def _reference(rest: list[Known], output: Recorded, measured: Quantity) -> tuple
         ]
         able = [one for one in able if one.meaning.joint == meaning_of(output).joint] or able
         if able and (quantity == measured or quantity == "velocity"):
-            scored = [(abs(follows(one.one, output).correlation), one) for one in able]
-            ranked = ranked_by_worth(scored)
+            scored = [(follows(one.one, output), one) for one in able]
+            if quantity == measured:
+                scored = [(told, one) for told, one in scored if told.is_answer or told.correlation > COPY]
+            if not scored:
+                continue
+            ranked = ranked_by_worth([(abs(told.correlation), one) for told, one in scored])
             told = follows(ranked[0][1], output)
             why = next(one.meaning.reason for one in able if one.one is ranked[0][1])
             reason = f"a {quantity} that was asked for: {why}"

@@ -32,7 +32,7 @@ class Joint:
             return True
         if meaning.joint in self.motion:
             return False
-        said = set(words_of(one.topic))
+        said = {*words_of(one.topic), *words_of(meaning.joint)}  # tau_cal_3 is of joint 3, whatever cal is
         if set(words_of(self.name)) <= said:
             return True
         return not any(set(words_of(other)) <= said for other in self.others)

@@ -20,7 +20,7 @@ WORDS: dict[Quantity, frozenset[str]] = {
     "velocity": frozenset("velocity velocities vel speed rate omega twist dq qd qdot thetadot dtheta xdot dx angvel".split()),
     "acceleration": frozenset("acceleration accelerations accel acc ddq qdd xddot ddx".split()),
     "effort": frozenset(
-        "effort efforts torque torques tau force forces wrench current currents cur voltage volt volts pwm duty trq "
+        "effort efforts torque torques tor torq tau force forces wrench current currents cur voltage volt volts pwm duty trq "
         "moment iq".split()
     ),
 }  # fmt: skip
@@ -62,7 +62,7 @@ GENERIC = frozenset(
 )
 JOINT = frozenset("joint joints".split())  # what drivers add to a joint's name at will
 ROTARY = frozenset(
-    "angle angles theta phi alpha torque torques tau q rotation rotary omega revolute hinge encoder moment trq dof joint joints "
+    "angle angles theta phi alpha torque torques tor torq tau q rotation rotary omega revolute hinge encoder moment trq dof joint joints "
     "qpos qvel knee hip ankle thigh calf shoulder elbow wrist arm pan tilt roll pitch yaw pendulum".split()
 )
 LINEAR = frozenset(

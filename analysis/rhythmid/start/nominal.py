@@ -18,9 +18,6 @@ from rhythmid.start.roles import Roles
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
 from rhythmid.value import Value
 
-EARNS_PLACE = (
-    0.9  # of what a balance leaves: by so much an element has to lower it to be among the first guesses
-)
 LAW_KEPT = (
     0.5  # share of an effort that the law of a controller may leave at most, to be taken for what made it
 )
@@ -100,6 +97,12 @@ def _shown(law: Law, rows: Rows) -> tuple[float, dict[str, str]]:
     """The inertia of a balance, and what is doubtful about it: none is seen that follows damper and spring within an
     interval of the filtered motion, a sample or a tenth of the shortest period that stands out of the noise."""
     found, period = law.coefficients, max(rows.period)
+    if rows.steady and found["acceleration"] > 0.0:
+        doubt = (
+            "what drives never changes: all values are by how far from its zero it holds the machine, so that this has to be the place where "
+            "nothing drives it"
+        )
+        return found["acceleration"], {INERTIA: doubt}
     least = max(found["velocity"] * period, found.get("position", 0.0) * period**2)
     if found["acceleration"] >= least:
         return found["acceleration"], {}
@@ -114,24 +117,25 @@ def _shown(law: Law, rows: Rows) -> tuple[float, dict[str, str]]:
 def _restoring(rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:
     """The balance with what brings the machine back, if anything does: a spring, gravity of a pendulum, or neither."""
     moving = ["acceleration", "velocity"] if inertial else ["velocity"]
-    full = [*moving, "position", "constant"]
+    level = [] if rows.steady else ["constant"]  # a constant would balance what never changes
+    full = [*moving, "position", *level]
     delay = rows.delay(full)
     plain = rows.fit(moving, delay)
     options: dict[str, Law] = {
-        "constant": rows.fit([*moving, "constant"], delay),
+        "constant": rows.fit([*moving, *level], delay),
         "spring": rows.fit(full, delay),
     }
     if rotary and rows.span >= 2.0 * LEAST_SWING:
-        options["pendulum"] = rows.fit([*moving, "sine", "cosine"], delay)
+        options["pendulum"] = rows.fit([*moving, "sine", *(["cosine"] if level else [])], delay)
     if options["spring"].coefficients["position"] <= 0.0:
         del options["spring"]
     law, kind = plain, "free"
-    if options["constant"].left < EARNS_PLACE * law.left:
+    if options["constant"].earns_place(law):
         law, kind = options["constant"], "constant"
     back = [name for name in ("spring", "pendulum") if name in options]
     if back:
         best = min(back, key=lambda name: options[name].left)
-        if options[best].left < EARNS_PLACE * law.left:
+        if options[best].earns_place(law):
             law, kind = options[best], best
     return law, kind
 
@@ -143,7 +147,7 @@ def _forces(
     found, reasons = law.coefficients, {}
     if kind == "spring":
         stiffness = found["position"]
-        rest = -found["constant"] / stiffness
+        rest = -found.get("constant", 0.0) / stiffness
         values = {"stiffness": _short(stiffness), "rest_length": _short(rest)}
         model = model.with_element(catalogue["linear_spring"], values)
         reasons["linear_spring"] = "a force proportional to the position brings it back"
@@ -156,10 +160,8 @@ def _forces(
                 "; at so small an angle a pendulum's gravity does the same: pendulum_gravity: {moment: …}"
             )
     elif kind == "pendulum":
-        moment, hanging = (
-            math.hypot(found["sine"], found["cosine"]),
-            math.atan2(-found["cosine"], found["sine"]),
-        )
+        sine, cosine = found["sine"], found.get("cosine", 0.0)
+        moment, hanging = math.hypot(sine, cosine), math.atan2(-cosine, sine)
         model = model.with_element(
             catalogue["pendulum_gravity"], {"moment": _short(moment), "reference": _short(hanging)}
         )

@@ -24,21 +24,29 @@ SURE = 5.0  # times what chance makes of a prediction's gain, from which it is n
 GOES_ALONG = 0.5  # coherence from which two plainly have to do with each other
 HARDLY = 0.3  # coherence with the output below which a number without a name is not taken for what drives
 RATIO = 0.3  # by which the slope of a position may differ from the velocity, before their units are doubted
+NEARLY = 0.8  # of the greatest correlation of any sign and lag: what an answer has, too, where its clock is a little early
 SAME_SIZE = (0.5, 2.0)  # ratio within which an answer is of its command's size
 
 
 @dataclass(frozen=True)
 class Follows:
-    """How well `answer` is a later copy of `command`: correlation, lag [s] and the ratio of sizes."""
+    """How well `answer` is a later copy of `command`: correlation, lag [s] and the ratio of sizes; `later` is the greatest correlation of
+    the same sign at once or later, 0 where there is none."""
 
     correlation: float
     lag: float
     ratio: float
+    later: float = 0.0
 
     @property
     def is_copy(self) -> bool:
         """Whether it is the same quantity, in the same unit."""
         return SAME_SIZE[0] < self.ratio < SAME_SIZE[1]
+
+    @property
+    def is_answer(self) -> bool:
+        """Whether the answer may have been made to follow: neither against the command nor before it. One sine goes both ways after another."""
+        return self.later >= NEARLY * abs(self.correlation)
 
 
 def together(first: Recorded, second: Recorded) -> tuple[float, Array, Array]:
@@ -104,7 +112,8 @@ def follows(command: Recorded, answer: Recorded) -> Follows:
     lags = np.concatenate([np.arange(most + 1), np.arange(-most, 0)])
     best = int(lags[int(np.argmax(np.abs(product[lags])))])
     size = math.sqrt(float(u @ u) * float(y @ y))
-    return Follows(float(product[best]) / size, best * period, float(np.std(y) / np.std(u)))
+    later = max(float(product[: most + 1].max()) / size, 0.0)
+    return Follows(float(product[best]) / size, best * period, float(np.std(y) / np.std(u)), later)
 
 
 def coherent(first: Recorded, second: Recorded) -> float:

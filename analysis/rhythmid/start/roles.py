@@ -9,6 +9,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.inventory import Inventory, Recorded
 from rhythmid.record.output_copy import doubt_of_copy
 from rhythmid.record.signals import InputKind, OutputKind
+from rhythmid.record.standstill import FLICKER
 from rhythmid.start.by_data import by_data, note_of_unknown, output_by_data
 from rhythmid.start.carried import carried_motion
 from rhythmid.start.copies import copies_output, note_of_copy
@@ -205,8 +206,10 @@ def _output(known: list[Known], ask: Ask, place: str) -> tuple[Choice, list[Know
 
 
 def _worth_as_output(one: Known) -> float:
-    """How much it moves; what is said to be measured, or is called by a word, counts before what is not."""
+    """How much it moves; what shows more than a few values counts before what does not, as do what is said to be measured, or is called by
+    a word."""
     moved = float(np.nanstd(one.one.value))
+    moved *= 1e6 if len(np.unique(one.one.value[np.isfinite(one.one.value)])) > FLICKER else 1.0
     return moved * (1e3 if one.meaning.certain else 1.0) * (1e3 if one.meaning.commanded is False else 1.0)
 
 

@@ -4,10 +4,14 @@ import json
 import textwrap
 from collections.abc import Sequence
 
+import numpy as np
+
 from rhythmid.elements.element import SLOTS
 from rhythmid.model import INERTIA, Term
 from rhythmid.record.heading import heading_of
+from rhythmid.record.held_command import held_note
 from rhythmid.record.inventory import Inventory, Recorded, header_clock
+from rhythmid.record.record import Channel
 from rhythmid.record.signals import ROLES, Clock
 from rhythmid.start.known import Choice
 from rhythmid.start.meaning import driving_unit_of, meaning_of, tells_unit
@@ -41,6 +45,7 @@ def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clo
             lines += [
                 "",
                 *_said(role, choice),
+                *([] if role != "input" else _held_comment(choice.recorded, roles)),
                 *_unit_doubt(choice.recorded, _unit(role, choice.recorded, roles, units)),
                 f"{role}: {_channel(role, choice.recorded, roles, units, found.is_bag)}",
             ]
@@ -158,12 +163,28 @@ def _channel(role: str, one: Recorded, roles: Roles, units: Units, bag: bool) ->
     if role == "input":
         if roles.input_kind != "force":
             parts.append(f"kind: {roles.input_kind}")
-        held = roles.input_kind == "reference" or meaning_of(one).commanded is True
+        held = (
+            roles.input_kind == "reference"
+            or meaning_of(one).commanded is True
+            or bool(_held_note(one, roles))
+        )
         if not bag and held:
             parts.append("hold: zero")
         elif bag and not held:
             parts.append("hold: linear")
     return f"{{{', '.join(parts)}}}"
+
+
+def _held_note(one: Recorded, roles: Roles) -> str | None:
+    """What to tell of the input where its samples show that each is held until the next one."""
+    there = [(each, np.isfinite(each.value)) for each in (one, roles.choices["output"].recorded)]
+    return held_note(*(Channel(each.time[kept], each.value[kept], each.unit) for each, kept in there))
+
+
+def _held_comment(one: Recorded, roles: Roles) -> list[str]:
+    """A comment where the samples of what drives show that it is held, and no name says so."""
+    note = None if meaning_of(one).commanded or roles.input_kind == "reference" else _held_note(one, roles)
+    return comment(f"  CHECK: {note}.") if note else []
 
 
 def _unit(role: str, one: Recorded, roles: Roles, units: Units) -> str:

@@ -1,0 +1,59 @@
+"""What a first balance of forces names: only what explains a share of what drives, and nothing that a constant could balance."""
+
+from pathlib import Path
+
+import foreign
+import numpy as np
+import pytest
+from foreign import moved, tones
+
+from rhythmid.start.start import Start, start
+
+TIME = foreign.STEP * np.arange(12_000)
+LATE = 0.08  # s
+FORCE = tones(1, TIME)
+
+
+def begun(folder: Path, force: np.ndarray, position: np.ndarray) -> Start:
+    np.savez(folder / "run.npz", t=TIME, force=force, x=position)
+    return start([folder / "run.npz"])
+
+
+def labels(found: Start) -> set[str]:
+    return {term.label for term in found.nominal.model.terms}
+
+
+def late(force: np.ndarray, by: float) -> np.ndarray:
+    """What acts so much later than it was recorded."""
+    steps = round(by / foreign.STEP)
+    return np.concatenate([np.full(steps, force[0]), force[: len(force) - steps]])
+
+
+def test_a_delay_that_explains_much_is_guessed(tmp_path):
+    found = begun(tmp_path, FORCE, moved(late(FORCE, LATE), 0.05, 0.5, 6.0)[0])
+    assert found.nominal.model.value("input_delay.delay") == pytest.approx(LATE, abs=0.01)
+    assert "linear_spring" in labels(found)
+
+
+def test_a_delay_beyond_the_range_is_not_guessed_to_be_at_its_end(tmp_path):
+    found = begun(tmp_path, FORCE, moved(late(FORCE, 0.4), 0.05, 0.5, 6.0)[0])
+    assert "input_delay" not in labels(found)
+
+
+@pytest.mark.parametrize("dry", [0.1, 0.2])
+def test_what_dry_friction_leaves_of_one_sine_is_neither_delay_nor_spring(tmp_path, dry):
+    force = np.sin(2.0 * np.pi * TIME)
+    found = begun(tmp_path, force, 300.0 + moved(force, 0.008, 0.28, 0.0, dry)[0])
+    assert labels(found) == {"viscous_damper"}
+    assert found.nominal.model.value("viscous_damper.damping") == pytest.approx(0.28, rel=0.6)
+
+
+@pytest.mark.parametrize("level", [0.3, -2.0])
+def test_a_step_that_never_changes_tells_inertia_and_spring_by_where_it_holds_the_machine(tmp_path, level):
+    held = np.full(len(TIME), level)
+    found = begun(tmp_path, held, moved(held, 0.05, 0.02, 6.0)[0])
+    model = found.nominal.model
+    assert model.value("inertia.mass") == pytest.approx(0.05, rel=0.05)
+    assert model.value("linear_spring.stiffness") == pytest.approx(6.0, rel=0.05)
+    assert labels(found) == {"linear_spring", "viscous_damper"}
+    assert "never changes: all values are by how far from its zero" in " ".join(found.lines())

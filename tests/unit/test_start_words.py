@@ -1,0 +1,75 @@
+"""Words and numbers in names as robots' logs have them, and references that the output does not follow."""
+
+from pathlib import Path
+
+import foreign
+import numpy as np
+import pytest
+from foreign import joint_state, moved, roles_of, servo, tones
+
+from rhythmid.errors import InputError
+from rhythmid.start.start import guess
+
+TIME = np.arange(8000) * foreign.STEP
+FORCE, OTHER = tones(1, TIME), tones(9, TIME)
+X, V = moved(FORCE, 0.05, 0.3, 6.0)
+NOW = 1.7e9
+
+
+def table(folder: Path, **columns: np.ndarray) -> Path:
+    np.savez(folder / "run.npz", t=TIME, **columns)
+    return folder / "run.npz"
+
+
+def test_tor_is_a_torque_and_des_says_that_it_was_asked_for(tmp_path):
+    path = table(tmp_path, torDes=FORCE, posAct=X, velAct=V, torAct=FORCE + 0.1 * OTHER)
+    found = roles_of(path)
+    assert found == {"output": "posAct", "velocity": "velAct", "input": "torDes", "effort": "torAct"}
+    assert guess(path).roles.rotary
+
+
+def test_a_number_tells_the_joint_whatever_words_stand_beside_it(tmp_path):
+    still = 0.01 * tones(5, TIME)
+    path = table(tmp_path, tau_cal_2=FORCE + 2.0 * OTHER, tau_cal_3=FORCE, joint_pos_2=X, joint_pos_3=still)
+    assert roles_of(path) == {"output": "joint_pos_2", "input": "tau_cal_2"}
+
+
+@pytest.mark.parametrize("lag", [-0.3, 0.06])
+def test_what_the_output_goes_against_is_no_reference(tmp_path, lag):
+    shifted = -np.interp(TIME + lag, TIME, X) + 0.2 * X.std() * OTHER
+    found = roles_of(table(tmp_path, target_pos=shifted, pos=X, torque=FORCE))
+    assert found == {"output": "pos", "input": "torque"}
+
+
+def test_what_the_output_follows_is_a_reference(tmp_path):
+    asked = tones(2, TIME, 0.3, 0.2, 1.5)
+    x, _, torque = servo(asked)
+    found = roles_of(table(tmp_path, target_pos=asked, pos=x, torque=torque))
+    assert found == {"output": "pos", "effort": "torque", "reference": "target_pos"}
+
+
+def test_an_output_of_two_values_is_not_taken_where_another_shows_a_motion(tmp_path):
+    levels = np.where(np.sin(TIME) > 0.0, 3.0, -3.0)
+    rows = range(0, 8000, 4)
+    topics = {
+        "/servo/in/state": [(NOW + TIME[k], joint_state(NOW + TIME[k], ["q3", "q1"], position=[levels[k], 0.1 * levels[k]])) for k in rows],
+        "/servo/out/state": [(NOW + TIME[k] + 1e-4, joint_state(NOW + TIME[k], [], position=[0.0, X[k]])) for k in rows],
+    }  # fmt: skip
+    assert roles_of(foreign.write(tmp_path / "bag", topics))["output"] == "/servo/out/state position[1]"
+
+
+def test_the_stamps_of_a_stream_are_times(tmp_path):
+    lines = ["__time,/states/header/stamp,/states/joint0/position,/effort/data.0"]
+    for k in range(0, 8000, 4):
+        lines += [f"{NOW + TIME[k]:.4f},{NOW + TIME[k]:.4f},{X[k]:.9g},", f"{NOW + TIME[k] + 1e-3:.4f},,,{FORCE[k]:.9g}"]  # fmt: skip
+    (tmp_path / "run.csv").write_text("\n".join(lines) + "\n")
+    found = guess(tmp_path / "run.csv")
+    assert found.inventory.clock.column == "__time" and "not used" not in found.signals
+
+
+def test_the_refusal_of_stamps_that_rows_share_tells_of_the_rate(tmp_path):
+    coarse = np.floor(TIME / 0.002) * 0.002
+    np.savez(tmp_path / "run.npz", t=coarse, force=FORCE, x=X)
+    with pytest.raises(InputError, match="coarse stamps; .* init --rate HZ"):
+        guess(tmp_path / "run.npz")
+    assert roles_of(tmp_path / "run.npz", rate=1000.0)["output"] == "x"
