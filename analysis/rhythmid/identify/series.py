@@ -17,6 +17,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.inputs import Inputs, Pieces
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.spread import relative_spreads
+from rhythmid.motion_power import motion_power
 from rhythmid.record.record import Record
 from rhythmid.record.rounding import resolution
 from rhythmid.record.timing import nominal_period
@@ -156,8 +157,8 @@ class Series:
         return samples / self.spread[part].reshape(-1, *[1] * (samples.ndim - 1))
 
     def power(self, chosen: Mask) -> float:
-        """Sum of squares of the motion over the chosen averages, which an error is a share of."""
-        return float(np.sum((self.averaged[chosen] - self.averaged.mean()) ** 2))
+        """Sum of squares of the motion that errors of the chosen averages are a share of; see `motion_power`."""
+        return motion_power(self.averaged, chosen)
 
 
 def _extended(samples: Array, count: int) -> Array:
