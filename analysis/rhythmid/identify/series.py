@@ -22,7 +22,7 @@ from rhythmid.record.record import Record
 from rhythmid.record.rounding import resolution
 from rhythmid.record.timing import nominal_period
 from rhythmid.simulation.generated_source import InputKind, OutputKind
-from rhythmid.simulation.signal import continuous, fast_length, spline
+from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, spline
 
 ERASED = 0.02  # share of a motion's power that a Hann window leaves (of a steady one 3/8), below which the motion is gone
 LEAST_PART = 16  # samples in which a frequency can still be seen
@@ -82,6 +82,30 @@ class Series:
     def blocks(self) -> int:
         """Number of block averages."""
         return len(self.time) // self.block
+
+    @cached_property
+    def commanded(self) -> bool:
+        """Whether the command changes while the series lasts: one that is constant drives nothing."""
+        return bool(np.ptp(self._told(self.command)) > 0.0)
+
+    @cached_property
+    def driven(self) -> bool:
+        """Whether command or forcing change while the series lasts."""
+        return self.commanded or bool(np.ptp(self._told(self.forcing)) > 0.0)
+
+    @cached_property
+    def drive(self) -> Array:
+        """Command and forcing together at the samples (n,)."""
+        return self._told(self.command) + self._told(self.forcing)
+
+    def _told(self, signal: PPoly | None) -> Array:
+        """Values (n,) of a signal at the samples, continued as `pieces` does; one that begins within a sample period of the record
+        began with it, and makes no step there."""
+        if signal is None:
+            return np.zeros(len(self.time))
+        told = signal(np.clip(self.time, signal.x[0], min(signal.x[-1], FOR_EVER)))
+        held = signal.c.shape[0] == 1
+        return np.where(held & (self.time < signal.x[0] - self.period), 0.0, told)
 
     def average(self, samples: Array) -> Array:
         """Block averages of samples (n,) or (n, q), shape (n // block, …)."""
