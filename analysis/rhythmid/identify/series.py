@@ -49,7 +49,7 @@ class Series:
     `zero` is what was taken off the samples because the output's zero is not that of the first record, as far as that is known; None
     where it is; see `record_zero`. `origin` is where the motion begins that the model integrates, which nothing measures: of a stretch of a
     record of a speed, the displacement since the record began; see `displacement`. `inputs` are command and forcing as the compiled loop
-    takes them, made by itself.
+    takes them, made by itself. `one_clock` is that of `Record`.
     """
 
     name: str
@@ -71,6 +71,7 @@ class Series:
     colour: NoiseModel | None = None
     zero: float | None = None
     origin: float = 0.0
+    one_clock: bool = False
     inputs: Inputs = field(default=Inputs(None, None), repr=False)
 
     def __post_init__(self) -> None:
@@ -291,6 +292,7 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
                 parameters=record.parameters,
                 record=record.whole,
                 resolution=resolution(value),
+                one_clock=record.one_clock,
             )
         )
     if block is None:

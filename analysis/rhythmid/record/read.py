@@ -173,7 +173,9 @@ def read_tables(signals: Signals) -> Record:
         name = signals.path.resolve().parent.name  # tells more
     quality = Quality({}, notes=unit_notes(signals))
     record = _record(name, _since_start(made), signals, SPLIT, quality)
-    return _finish(replace(record, hold=signals.hold or _measured_hold(record)), signals)
+    clocks = {(source.file, source.clock(signals.time)) for source in signals.channels.values()}
+    hold = signals.hold or _measured_hold(record)
+    return _finish(replace(record, hold=hold, one_clock=len(clocks) == 1), signals)
 
 
 def _is_merged(table: Table, signals: Signals) -> bool:
