@@ -76,7 +76,8 @@ def test_windows_of_a_speed_begin_where_the_record_has_come_to():
 
 
 @pytest.mark.parametrize(
-    ("begins", "changes", "idle"), [(0.0, 0.0, True), (0.002, 0.0, True), (3.0, 0.0, False), (0.0, 0.1, False)]
+    ("begins", "changes", "idle"),
+    [(0.0, 0.0, True), (0.002, 0.0, True), (3.0, 0.0, False), (0.0, 0.1, False)],
 )
 def test_an_input_that_is_constant_drives_nothing(begins, changes, idle):
     """Unless it begins within the record: no command had arrived before."""
