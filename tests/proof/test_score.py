@@ -1,15 +1,18 @@
 """Answers held against opened truths, and the card made of the scores."""
 
+import json
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
+from pathlib import Path
 
 import pytest
 
 from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.proof.campaign import read_score
 from rhythmid.proof.card import confusion, coverage, markdown, summary
 from rhythmid.proof.rate import Rate, rate
 from rhythmid.proof.reliability import EDGES, reliability
-from rhythmid.proof.score import Estimated, score
+from rhythmid.proof.score import Estimated, Stated, score
 
 CATALOGUE = load_catalogue()
 
@@ -269,3 +272,13 @@ def test_a_family_is_right_where_something_of_it_was_concealed_or_is_clutter():
     other = judged(truth("second_mode"), answer("undecided") | {"families": families})
     assert not other.kind_right and "| 0/1 = 0.0 %" in markdown([other], "proof")
     assert not judged(truth("coulomb_friction"), answer("undecided")).kinds
+
+
+def test_a_score_is_read_as_it_was_written(tmp_path: Path):
+    kind = {"family": "friction", "laws": ["coulomb_friction"], "share": 0.9, "probability": 0.9}
+    made = judged(
+        truth("coulomb_friction"), answer("missing_physics", "coulomb_friction") | {"families": [kind]}
+    )
+    (tmp_path / "score.json").write_text(json.dumps(asdict(made)), encoding="utf-8")
+    read = read_score(tmp_path / "score.json")
+    assert read == made and isinstance(read.kinds[0], Stated) and read.kinds_stated

@@ -145,7 +145,8 @@ def read_score(path: Path) -> Score:
     data = json.loads(path.read_text(encoding="utf-8"))
     for name in ("effects", "machine"):
         data[name] = tuple(Estimated(**one) for one in data[name])
-    data["stated"] = tuple(Stated(**one) for one in data["stated"])
+    for name in ("stated", "kinds"):
+        data[name] = tuple(Stated(**one) for one in data.get(name, ()))
     for name in ("true", "clutter", "named", "absent"):
         data[name] = tuple(data[name])
     data["families"] = tuple(tuple(group) for group in data["families"])
