@@ -116,5 +116,5 @@ def test_a_change_too_large_to_square_is_left_out_without_a_warning(monkeypatch)
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        kept = changes_of(cast(Trajectories, None), [(element, {}), (element, {})])
+        kept = list(changes_of(cast(Trajectories, None), [(element, {}), (element, {})]))
     assert [one.key for one in kept] == [1]

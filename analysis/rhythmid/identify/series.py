@@ -94,7 +94,7 @@ class Series:
         """Whether command or forcing change while the series lasts."""
         return self.commanded or bool(np.ptp(self._told(self.forcing)) > 0.0)
 
-    @cached_property
+    @property
     def drive(self) -> Array:
         """Command and forcing together at the samples (n,)."""
         return self._told(self.command) + self._told(self.forcing)
