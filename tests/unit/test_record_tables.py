@@ -378,3 +378,13 @@ def test_a_published_table_is_read_in_place(tmp_path):
     assert len(record.output) > 100_000 and record.hold == "band_limited"
     assert record.quality.gaps == 0 and record.output.period == pytest.approx(2**14 / 1e7, rel=1e-12)
     assert 0.01 < np.std(record.output.value) < 0.2 and np.std(record.input.value) > 0.01
+
+
+def test_columns_of_one_table_have_one_clock_unless_a_channel_has_times_of_its_own(tmp_path):
+    (tmp_path / "run.csv").write_text(text(head="t,u,y,s", rows=zip(TIME, U, Y, TIME)))
+    assert read_record(signals(tmp_path, "run.csv")).one_clock
+    own = SIGNALS.replace("column: u}", "column: u, time: {column: s}}")
+    assert not read_record(signals(tmp_path, "run.csv", own)).one_clock
+    (tmp_path / "other.csv").write_text(text())
+    other = SIGNALS.replace("{file: FILE, column: u}", "{file: other.csv, column: u}")
+    assert not read_record(signals(tmp_path, "run.csv", other)).one_clock

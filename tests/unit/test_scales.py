@@ -11,7 +11,7 @@ from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.multiple_shooting import windows
 from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series
-from rhythmid.simulation.signal import spline
+from rhythmid.simulation.signal import spline, zero_order_hold
 
 
 def forced(frequency: float, seconds: float) -> Series:
@@ -73,3 +73,22 @@ def test_windows_of_a_speed_begin_where_the_record_has_come_to():
     begin = first_guess(model, prepare_run(model, again))
     assert [start[0] for start in begin] == [one.origin for one in again]
     assert len(again) == 5 and np.all(np.diff([one.origin for one in again]) > 2.0)
+
+
+@pytest.mark.parametrize(
+    ("begins", "changes", "idle"),
+    [(0.0, 0.0, True), (0.002, 0.0, True), (3.0, 0.0, False), (0.0, 0.1, False)],
+)
+def test_an_input_that_is_constant_drives_nothing(begins, changes, idle):
+    """Unless it begins within the record: no command had arrived before."""
+    one = replace(forced(1.0, 10.0), forcing=None)
+    time = one.time[one.time >= begins] if begins > one.period else one.time + begins
+    constant = replace(one, command=zero_order_hold(time, 0.5 + changes * np.sin(time)))
+    assert scales([constant], hopper()).idle == idle
+    assert constant.commanded != idle and constant.driven != idle
+
+
+def test_a_forcing_that_is_constant_drives_nothing_and_one_that_is_not_does():
+    one = forced(1.0, 10.0)
+    assert one.driven and not one.commanded
+    assert not replace(one, forcing=spline(one.time[:-3], np.ones(len(one.time) - 3))).driven

@@ -1,5 +1,6 @@
 """The screening of candidates: first guesses with what goes with them, and the line that a residual holds."""
 
+import warnings
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
@@ -8,7 +9,13 @@ import numpy as np
 import pytest
 
 import rhythmid as rh
-from rhythmid.diagnose.search.score_tests import changes_of, residual_line, score, trajectories
+from rhythmid.diagnose.search.score_tests import (
+    Trajectories,
+    changes_of,
+    residual_line,
+    score,
+    trajectories,
+)
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.output_error import Fit, estimate
 from rhythmid.identify.series import Series, prepare
@@ -99,3 +106,15 @@ def test_a_force_that_cannot_be_squared_is_no_candidate():
     cubic = load_catalogue()["cubic_stiffness"]
     found = changes_of(trajectories(fit), [(cubic, {"coefficient": size}) for size in (1e250, 1.0)])
     assert [one.values["coefficient"] for one in found] == [1.0]
+
+
+def test_a_change_too_large_to_square_is_left_out_without_a_warning(monkeypatch):
+    element, sizes = load_catalogue()["linear_spring"], iter([1e200, 1e3])
+    monkeypatch.setattr(
+        "rhythmid.diagnose.search.score_tests.change_of_output",
+        lambda *_: [next(sizes) * np.ones(20)],
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        kept = list(changes_of(cast(Trajectories, None), [(element, {}), (element, {})]))
+    assert [one.key for one in kept] == [1]

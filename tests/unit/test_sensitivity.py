@@ -7,6 +7,9 @@ import pytest
 
 from rhythmid.identify.descent import WHITE, first_guess
 from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.multiple_shooting import windows
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.output_error import minimise
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
@@ -18,6 +21,16 @@ force:
   - linear_spring: {{stiffness: {{value: 100.0, unit: N/m}}}}
   - viscous_damper: {{damping: {{value: 0.4, unit: N*s/m}}}}
   - viscoelastic_relaxation: {{stiffness: {{value: {creep}, unit: N/m}}, time_constant: {{value: 0.1, unit: s}}}}
+"""
+FAINT = """
+inertia: {mass: {value: 1.0, unit: kg, fixed: true}}
+force:
+  - linear_spring: {stiffness: {value: 100.0, unit: N/m}, rest_length: {value: 0.0, unit: m, fixed: true}}
+  - viscous_damper: {damping: {value: 0.4, unit: N*s/m}}
+  - second_mode:
+      mass: {value: 1.0e-4, unit: kg, fixed: true}
+      frequency: {value: 3.0, unit: Hz, fixed: true}
+      damping_ratio: {value: 0.05, unit: "1", fixed: true}
 """
 
 
@@ -53,3 +66,29 @@ def test_steps_settle_where_each_moves_the_outputs_by_a_ten_thousandth(creep):
     again = settled(creep, 13)
     np.testing.assert_allclose(again[0], steps, rtol=0.2)
     np.testing.assert_allclose(again[1], states, rtol=0.2)
+
+
+def test_a_fit_that_is_repeated_from_its_end_stays_there_whatever_states_the_elements_have():
+    """A free decay by dry friction, and in its place a mode of hardly any mass: from fit to fit its start must not wander off."""
+    model = Model.from_text(FAINT)
+    time = np.arange(0.0, 10.0, 0.01)
+    decay = np.maximum(1.0 - 0.08 * time, 0.0) * np.cos(10.0 * time)
+    run = prepare_run(model, prepare([Record("decay", Channel(time, decay, "m"))]))
+    noise = NoiseModel(np.empty(0), 3e-3)
+    fits = [minimise(model, run, model.free, noise)]
+    for _ in range(4):
+        fits.append(minimise(fits[-1].model, run, model.free, noise, fits[-1].starts))
+    np.testing.assert_allclose(fits[-1].starts[0], fits[1].starts[0], rtol=0.05)
+    assert fits[-1].chi2 == pytest.approx(fits[1].chi2, rel=1e-3)
+
+
+def test_all_windows_of_a_record_have_the_widest_usual_range_of_its_states():
+    model = Model.from_text(FAINT)
+    time = np.arange(0.0, 10.0, 0.01)
+    decay = np.exp(-0.5 * time) * np.cos(10.0 * time)
+    run = prepare_run(model, windows(prepare([Record("decay", Channel(time, decay, "m"))]), 2.0))
+    problem = Problem(run, (), WHITE, None)
+    problem.learn_hidden(model, first_guess(model, run))
+    scatters = np.array([scatter for _, scatter in problem.hidden])
+    assert len(scatters) > 3 and np.ptp(scatters, axis=0) == pytest.approx(0.0)
+    assert scatters[0][0] > 0.5

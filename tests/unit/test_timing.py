@@ -9,7 +9,7 @@ from machines import CATALOGUE, hopper, record, records
 from rhythmid.elements.random_delay import uniform_delay
 from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.joint import JointFit, joint_likelihood
-from rhythmid.identify.output_error import minimise
+from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.identify.series import prepare
 from rhythmid.identify.timing import (
     _first_samples,
@@ -47,6 +47,25 @@ def test_a_skewed_clock_is_found_and_taken_out():
     found, notes = compensated(fitted(concealing("clock_skew", skew=5e-5)))
     assert len(notes) == 1 and "µs/s" in notes[0]
     assert near(found, U, DELAYS[0]) and near(found, Y, DELAYS[1])
+
+
+def test_channels_of_one_clock_have_no_skew():
+    joint = fitted(concealing("clock_skew", skew=5e-5))
+    series = tuple(replace(one, one_clock=True) for one in joint.fit.run.series)
+    same = replace(joint, fit=replace(joint.fit, run=replace(joint.fit.run, series=series)))
+    found, notes = compensated(same)
+    assert found.fit.model.term("clock_skew") is None and not any("clocks" in note for note in notes)
+
+
+def test_a_drift_that_the_scores_of_blocks_do_not_bear_out_is_none(monkeypatch):
+    joint = fitted(concealing("clock_skew", skew=5e-5))
+
+    def doubtful(fit: Fit) -> Fit:
+        return replace(fit, covariance=fit.covariance * 1e8)
+
+    monkeypatch.setattr("rhythmid.identify.timing.with_robust_covariance", doubtful)
+    found, notes = compensated(joint)
+    assert notes == () and found.fit is joint.fit
 
 
 def test_a_drifting_input_delay_is_found_and_taken_out():

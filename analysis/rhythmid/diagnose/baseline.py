@@ -59,10 +59,10 @@ def with_delays(model: Model, series: Sequence[Series], catalogue: Catalogue) ->
     any. Either may come out negative by up to a sample and a half: that is how an input that is not held, but simulated as
     held, shows.
     """
-    if not any(one.command is not None for one in series):
+    own = model.term("input_delay") is not None
+    if not any(one.commanded or (own and one.command is not None) for one in series):
         return model
     period = max(one.period for one in series)
-    own = model.term("input_delay") is not None
     if not own:
         model = model.with_element(catalogue["input_delay"], {"delay": 0.0})
     current = model.parameters[INPUT_DELAY]

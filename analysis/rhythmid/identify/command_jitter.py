@@ -106,8 +106,9 @@ def weighed(fit: Fit, jitter: CommandJitter) -> Fit:
 
 
 def _held(one: Series) -> bool:
-    if one.command is None or one.kind != "force" or one.ignored is not None or one.spread is not None:
+    if not one.commanded or one.kind != "force" or one.ignored is not None or one.spread is not None:
         return False
+    assert one.command is not None
     return one.command.c.shape[0] == 1 and len(one.command.x) > LEAST and one.blocks > LEAST
 
 

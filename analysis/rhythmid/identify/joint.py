@@ -157,13 +157,9 @@ def explained(fit: Fit, pumping: Pumping | None) -> Search:
     motion = fit.nrmse() if all(one.ignored is None for one in fit.run.series) else 0.0
     least = max(floor, 1e-18 * response)
     unexplained = float(np.sqrt(left / max(explained, 0.01 * response)))
-    if pumping is not None and all(_silent(one) for one in fit.run.series):
+    if pumping is not None and not any(one.commanded for one in fit.run.series):
         unexplained = 0.0  # there is no response to a command, only the cycle
     return Search(motion, unexplained, float(np.sqrt(left / least)))
-
-
-def _silent(one: Series) -> bool:
-    return one.command is None or float(np.ptp(one.command(one.centres))) == 0.0
 
 
 def _start(model: Model, records: Sequence[Record], pumping: Pumping | None) -> list[Model]:

@@ -11,7 +11,6 @@ from rhythmid.elements.element import Scales
 from rhythmid.identify.series import Series, displacement, dominant_frequency
 from rhythmid.identify.swing_frequency import swing_frequencies
 from rhythmid.model import Model
-from rhythmid.simulation.signal import FOR_EVER
 
 Array = NDArray[np.float64]
 REST_LENGTH = "linear_spring.rest_length"
@@ -34,12 +33,8 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     driven = any(term.element.acts in ("drive", "feedback") for term in model.terms)
     fed = any(term.element.takes for term in model.terms)  # by a voltage, say: what is recorded is no force
     for one in series:
-        total = np.zeros(len(one.time))
-        for signal in (one.command, one.forcing):
-            if signal is not None:
-                inside = (one.time >= signal.x[0]) & (one.time <= min(signal.x[-1], FOR_EVER))
-                total[inside] += signal(one.time[inside])
-        driven = driven or bool(np.any(total))
+        total = one.drive
+        driven = driven or one.driven
         if one.kind == "reference":
             reference = max(reference, float(np.std(total)))
         elif not fed:

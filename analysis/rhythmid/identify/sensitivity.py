@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.identify.free_run import FreeRun
+from rhythmid.identify.free_run import FreeRun, start_of
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.record_zero import zero_place
+from rhythmid.identify.series import record_of
 from rhythmid.model import Model
 
 Array = NDArray[np.float64]
@@ -70,21 +71,43 @@ class Problem:
         return [output - one.averaged for output, one in zip(outputs, self.run.series)]
 
     def learn_hidden(self, model: Model, starts: Sequence[Array]) -> None:
-        """Take the usual values of the elements' own states from a run.
+        """Take the usual values of the elements' own states from a run in which they begin as the motion has them.
 
         A hidden state hardly differs from a kick to the velocity when its element is fast; knowing its usual range keeps
-        it from wandering off. A zero of its own, which never moves in a run, is within the outputs' reach.
+        it from wandering off. A run from the starts themselves would take for usual whatever they have wandered off to: from fit to fit
+        a mode of next to no mass would begin further away, until it is a force of its own. All windows of a record share their range,
+        for what rings in one was excited in another. A zero of its own, which never moves in a run, is within the outputs' reach.
         """
-        self.hidden = []
+        if self.run.states == 2:
+            self.hidden = [(np.empty(0), np.empty(0)) for _ in starts]
+            return
         zero = zero_place(self.run.compiled.layout.states)
-        for index, start in enumerate(starts):
-            rows = self.run.rows(model, index, start)
-            # all of the run: a free decay is at its largest where it begins
-            states = rows[:, 2 : self.run.states] if rows is not None else np.zeros((1, self.run.states - 2))
+        means: list[Array] = []
+        ranges: dict[str, Array] = {}
+        for index, (one, start) in enumerate(zip(self.run.series, starts, strict=True)):
+            states = self._usual(model, index, start, zero)
+            means.append(states.mean(axis=0))
             scatter = 3.0 * states.std(axis=0) + 1e-12
-            if zero is not None and self.run.series[index].zero is not None:
+            widest = ranges.setdefault(record_of(one), scatter)
+            np.maximum(widest, scatter, out=widest)
+        self.hidden = []
+        for one, mean in zip(self.run.series, means, strict=True):
+            scatter = ranges[record_of(one)].copy()
+            if zero is not None and one.zero is not None:
                 scatter[zero - 2] = self.reach
-            self.hidden.append((states.mean(axis=0), scatter))
+            self.hidden.append((mean, scatter))
+
+    def _usual(self, model: Model, index: int, start: Array, zero: int | None) -> Array:
+        """States of elements (n, h) along series `index`, which begin as the position and velocity of its start have them; as the start
+        has them where the model diverges from there."""
+        begin = start_of(model, self.run, index, float(start[0]), float(start[1]))
+        if zero is not None:
+            begin[zero] = start[zero]
+        rows = self.run.rows(model, index, begin)
+        if rows is None:
+            rows = self.run.rows(model, index, start)
+        # all of the run: a free decay is at its largest where it begins
+        return np.zeros((1, self.run.states - 2)) if rows is None else rows[:, 2 : self.run.states]
 
     def departure(self, index: int, start: Array) -> Array:
         """Element states of a start, as multiples of their usual scatter from their usual mean."""

@@ -17,11 +17,12 @@ from rhythmid.errors import InputError
 from rhythmid.identify.inputs import Inputs, Pieces
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.spread import relative_spreads
+from rhythmid.motion_power import motion_power
 from rhythmid.record.record import Record
 from rhythmid.record.rounding import resolution
 from rhythmid.record.timing import nominal_period
 from rhythmid.simulation.generated_source import InputKind, OutputKind
-from rhythmid.simulation.signal import continuous, fast_length, spline
+from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, spline
 
 ERASED = 0.02  # share of a motion's power that a Hann window leaves (of a steady one 3/8), below which the motion is gone
 LEAST_PART = 16  # samples in which a frequency can still be seen
@@ -48,7 +49,7 @@ class Series:
     `zero` is what was taken off the samples because the output's zero is not that of the first record, as far as that is known; None
     where it is; see `record_zero`. `origin` is where the motion begins that the model integrates, which nothing measures: of a stretch of a
     record of a speed, the displacement since the record began; see `displacement`. `inputs` are command and forcing as the compiled loop
-    takes them, made by itself.
+    takes them, made by itself. `one_clock` is that of `Record`.
     """
 
     name: str
@@ -70,6 +71,7 @@ class Series:
     colour: NoiseModel | None = None
     zero: float | None = None
     origin: float = 0.0
+    one_clock: bool = False
     inputs: Inputs = field(default=Inputs(None, None), repr=False)
 
     def __post_init__(self) -> None:
@@ -81,6 +83,30 @@ class Series:
     def blocks(self) -> int:
         """Number of block averages."""
         return len(self.time) // self.block
+
+    @cached_property
+    def commanded(self) -> bool:
+        """Whether the command changes while the series lasts: one that is constant drives nothing."""
+        return bool(np.ptp(self._told(self.command)) > 0.0)
+
+    @cached_property
+    def driven(self) -> bool:
+        """Whether command or forcing change while the series lasts."""
+        return self.commanded or bool(np.ptp(self._told(self.forcing)) > 0.0)
+
+    @property
+    def drive(self) -> Array:
+        """Command and forcing together at the samples (n,)."""
+        return self._told(self.command) + self._told(self.forcing)
+
+    def _told(self, signal: PPoly | None) -> Array:
+        """Values (n,) of a signal at the samples, continued as `pieces` does; one that begins within a sample period of the record
+        began with it, and makes no step there."""
+        if signal is None:
+            return np.zeros(len(self.time))
+        told = signal(np.clip(self.time, signal.x[0], min(signal.x[-1], FOR_EVER)))
+        held = signal.c.shape[0] == 1
+        return np.where(held & (self.time < signal.x[0] - self.period), 0.0, told)
 
     def average(self, samples: Array) -> Array:
         """Block averages of samples (n,) or (n, q), shape (n // block, …)."""
@@ -156,8 +182,8 @@ class Series:
         return samples / self.spread[part].reshape(-1, *[1] * (samples.ndim - 1))
 
     def power(self, chosen: Mask) -> float:
-        """Sum of squares of the motion over the chosen averages, which an error is a share of."""
-        return float(np.sum((self.averaged[chosen] - self.averaged.mean()) ** 2))
+        """Sum of squares of the motion that errors of the chosen averages are a share of; see `motion_power`."""
+        return motion_power(self.averaged, chosen)
 
 
 def _extended(samples: Array, count: int) -> Array:
@@ -266,6 +292,7 @@ def prepare(records: Sequence[Record], block: int | None = None) -> list[Series]
                 parameters=record.parameters,
                 record=record.whole,
                 resolution=resolution(value),
+                one_clock=record.one_clock,
             )
         )
     if block is None:

@@ -49,7 +49,7 @@ def free_runs(
                 used=one.used,
                 hidden=np.zeros_like(one.used) if heldout else _hidden(one),
                 heldout=heldout,
-                quiet=_quiet(one),
+                quiet=not one.commanded,
                 labels=labels,
                 switches=switches_of(after.model) if one.measured == "position" else None,
             )
@@ -64,7 +64,3 @@ def _hidden(one: Series) -> NDArray[np.bool_]:
     if len(last):
         hidden[last[-1] + 1 :] = True
     return hidden if hidden.sum() > 3 else np.zeros_like(one.used)
-
-
-def _quiet(one: Series) -> bool:
-    return one.command is None or not np.any(one.command.c)

@@ -21,6 +21,7 @@ from rhythmid.identify.identification import Estimate
 from rhythmid.identify.joint import JointFit
 from rhythmid.identify.output_error import Fit, estimate, minimise
 from rhythmid.identify.record_scales import scales
+from rhythmid.identify.robust_covariance import with_robust_covariance
 from rhythmid.identify.sample_clock.clock import clock_of
 from rhythmid.identify.sensitivity import Problem
 from rhythmid.identify.series import Series
@@ -79,15 +80,24 @@ def drift_score(fit: Fit, element: str) -> tuple[float, float]:
     return -float(own @ fit.linearisation.residual) / square, 1.0 / math.sqrt(square)
 
 
+def _possible_drifts(series: Sequence[Series]) -> tuple[str, ...]:
+    """The drifts that records could show: none where nothing drives the machine, whose own pace is then the only one, and none between
+    the clocks of channels that have one clock."""
+    if not any(one.driven for one in series):
+        return ()
+    return tuple(name for name in DRIFTS if name != "clock_skew" or not any(one.one_clock for one in series))
+
+
 def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tuple[JointFit, tuple[str, ...]]:
     """The fit with every drift of clock or delay that shows made part of the model, or a command held at a slower rate;
     and what was found, in words."""
     fit, notes = joint.fit, []
     catalogue = load_catalogue()
-    for _ in DRIFTS:
+    possible = _possible_drifts(fit.run.series)
+    for _ in possible:
         scores = {
             name: drift_score(fit, name)
-            for name in DRIFTS
+            for name in possible
             if not any(t.element.name in (name, *catalogue[name].same_as) for t in fit.model.terms)
             and (name != "input_delay_drift" or fit.model.term("input_delay") is not None)
         }
@@ -99,7 +109,8 @@ def compensated(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tupl
         extended = fit.model.with_element(catalogue[name], {catalogue[name].size: scores[name][0]})
         fit = estimate(extended, fit.run.series, pool=pool, max_step=fit.run.max_step)
         parameter = f"{name}.{catalogue[name].size}"
-        value, std = fit.model.value(parameter), fit.std[parameter]
+        # as the blocks' scores bear it out: what the model lacks leads a drift further astray than noise does
+        value, std = fit.model.value(parameter), with_robust_covariance(fit).std[parameter]
         small = abs(value) * max(float(np.ptp(one.time)) for one in fit.run.series) < 1e-6
         if abs(value) < EVIDENT_BY * std or small or fit.noise.variance > before.noise.variance:
             fit = before

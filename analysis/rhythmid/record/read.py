@@ -172,9 +172,10 @@ def read_tables(signals: Signals) -> Record:
     if name == "signals":
         name = signals.path.resolve().parent.name  # tells more
     quality = Quality({}, notes=unit_notes(signals))
+    clocks = {(source.file, source.clock(signals.time)) for source in signals.channels.values()}
     record = _record(name, _since_start(made), signals, SPLIT, quality)
     record = replace(record, hold=signals.hold) if signals.hold else _with_hold(record)
-    return _finish(record, signals)
+    return _finish(replace(record, one_clock=len(clocks) == 1), signals)
 
 
 def _is_merged(table: Table, signals: Signals) -> bool:

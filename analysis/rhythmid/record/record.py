@@ -131,6 +131,8 @@ class Record(Result):
         Name of the record that this one is a stretch of; empty for a whole one.
     stamped
         Whether the output's times are stamps, which may jitter; they are none where they follow from a declared rate.
+    one_clock
+        Whether all channels are columns of one table with one time, so that their clocks cannot run apart.
 
     Examples
     --------
@@ -162,6 +164,7 @@ class Record(Result):
     parameters: Mapping[str, float] = field(default_factory=dict)
     whole: str = ""
     stamped: bool = True
+    one_clock: bool = False
 
     @property
     def channels(self) -> dict[str, Channel]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
+from rhythmid.motion_power import motion_power
 from rhythmid.report.state_map import state_map
 from rhythmid.statistics import NORMAL_95
 
@@ -115,7 +116,7 @@ def error_of(runs: Sequence[Run], which: Which, hidden: bool = False) -> Error |
             continue
         squares.append(run.residual(which)[mask] ** 2)
         if run.size is None:
-            spread += float(np.sum((run.measured[mask] - run.measured[mask].mean()) ** 2))
+            spread += motion_power(run.measured, mask)
         else:
             spread += run.size**2 * int(mask.sum())
     if not squares or spread <= 0.0:

@@ -128,7 +128,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         ),
         chosen=result.selection.chosen.elements,
         families=decision.families,
-        assumptions=(ONE_CLOCK,) if any(one.command is not None for one in series) else (),
+        assumptions=(ONE_CLOCK,) if any(one.commanded for one in series) else (),
     )
 
 

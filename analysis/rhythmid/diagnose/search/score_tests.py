@@ -316,13 +316,12 @@ def changes_of(
     def one(case: tuple[int, tuple[Element, dict[str, float]]]) -> Change | None:
         key, (element, values) = case
         outputs = change_of_output(known, element, values)
-        if (
-            outputs is None
-            or not all(np.isfinite(o).all() for o in outputs)
-            or not any(np.any(o) for o in outputs)
-        ):
+        if outputs is None or not any(np.any(o) for o in outputs):
             return None
-        return Change(key, element, values, _kept(outputs))
+        with np.errstate(over="ignore", invalid="ignore"):
+            kept = _kept(outputs)
+            finite = all(math.isfinite(o @ o) for o in kept)  # the squares, too, of which scores are made
+        return Change(key, element, values, kept) if finite else None
 
     return (change for change in each(one, enumerate(candidates), pool) if change is not None)
 
@@ -351,11 +350,12 @@ def scored(fit: Fit, changes: Iterable[Change]) -> Iterator[tuple[Score, Change]
     residual = fit.linearisation.residual
     residual = residual - left @ (left.T @ residual)
     for one in changes:
-        white = whitened(fit, one.outputs, fit.noise)
-        raw = math.sqrt(sum(float(w @ w) for w in white))
-        joined = projected(fit, white)
-        change = joined - left @ (left.T @ joined)
-        strength = float(change @ change)
+        with np.errstate(over="ignore", invalid="ignore"):  # what whitening makes too large is left out
+            white = whitened(fit, one.outputs, fit.noise)
+            raw = math.sqrt(sum(float(w @ w) for w in white))
+            joined = projected(fit, white)
+            change = joined - left @ (left.T @ joined)
+            strength = float(change @ change)
         if not math.isfinite(strength) or raw == 0.0 or strength <= (1e-6 * raw) ** 2:
             continue  # the nominal parameters do the same
         size = -float(change @ residual) / strength

@@ -54,9 +54,7 @@ def scanned(
     """
     period = clock_of(model)
     mean = model.parameters[INPUT_DELAY].value if INPUT_DELAY in model.parameters else 0.0
-    driven = [
-        (one, start) for one, start in zip(series, starts) if one.command is not None and one.kind == "force"
-    ]
+    driven = [(one, start) for one, start in zip(series, starts) if one.commanded and one.kind == "force"]
     if period is None or mean <= 0.0 or not driven:
         return []
     slowest = max(0.45 / mean, SLOWEST * max(dominant_frequency(one) for one, _ in driven))
