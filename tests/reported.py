@@ -63,6 +63,7 @@ def result(
         ],
         "remainder": {"share": 0.0, "significant": False, "goes_with": None, "curve": None},
         "scoring": {"kind": "free_run", "bandwidth": None, "reason": "the model follows the records of the fit in free run"},
+        "families": [],
         "assumptions": ["the forcing acts undelayed on the mass"],
         "notes": [],
     }  # fmt: skip

@@ -19,6 +19,7 @@ from rhythmid.diagnose.answer.result import (
     Scored,
     Untried,
 )
+from rhythmid.diagnose.family import MissingFamily
 from rhythmid.diagnose.hypothesis import Kind
 from rhythmid.diagnose.joints.printed import left_words
 from rhythmid.diagnose.rejections import Rejection
@@ -188,3 +189,13 @@ def test_several_names_come_with_their_joint_probability():
 )
 def test_what_is_left_at_a_joint_is_a_plain_share_and_nothing_where_nothing_is_missing(verdict, left, words):
     assert left_words(replace(ANSWER, verdict=verdict, remainder=left)) == words
+
+
+def test_of_an_undecided_answer_the_families_are_told_with_their_probability():
+    family = MissingFamily("friction", ("coulomb_friction", "stribeck_friction"), 0.9, 0.93)
+    told = printed(replace(ANSWER, verdict="undecided", families=(family,)))
+    assert (
+        "some form of friction: probability 93 %, 90 % of the mismatch: coulomb_friction, stribeck_friction"
+        in told
+    )
+    assert "some form of" not in printed(replace(ANSWER, families=(family,)))

@@ -116,3 +116,15 @@ def test_an_unknown_effect_is_never_said_to_be_explained() -> None:
     html = render(diagnosis_page(findings(result("unknown_physics"))))
     assert "leaves nothing that a free function" not in html
     assert "seems to be" in html
+
+
+def test_of_an_undecided_answer_the_families_stand_with_their_probability() -> None:
+    family = {
+        "family": "friction",
+        "laws": ["coulomb_friction", "stribeck_friction"],
+        "share": 0.9,
+        "probability": 0.93,
+    }
+    told = result("undecided") | {"families": [family]}
+    (row,) = rows_with(render(diagnosis_page(findings(told))), "Coulomb friction, Stribeck friction")
+    assert "friction" in row and "93" in row and "90" in row

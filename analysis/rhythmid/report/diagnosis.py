@@ -10,6 +10,7 @@ from rhythmid.report.blocks import (
     Heading,
     Paragraph,
     Section,
+    Table,
     Tile,
     Tiles,
 )
@@ -162,7 +163,7 @@ def _what(found: Findings) -> Section:
         "undecided": "The best explanation so far",
         "unknown_physics": "The nearest known effects, not the name",
     }.get(result["verdict"], "What was added")
-    blocks: list[Block] = []
+    blocks: list[Block] = _families(found) if result["verdict"] == "undecided" else []
     for effect in result["missing"]:
         blocks.append(Heading(found.title(effect["element"])))
         blocks.append(Equation(effect["equation"]))
@@ -175,11 +176,36 @@ def _what(found: Findings) -> Section:
         if known is not None:
             names = f"Also known as {_joined(known.also_known_as)}. " if known.also_known_as else ""
             blocks.append(Paragraph(f"{names}Reference: {sentence(known.reference)}", "note"))
-    blocks += _families(found)
+    blocks += _not_separated(found)
     return Section(title, tuple(blocks))
 
 
 def _families(found: Findings) -> list[Block]:
+    """The kinds of physics that are missing, whose laws share their evidence."""
+    rows = [
+        (
+            str(one["family"]),
+            probability(one["probability"]),
+            percent(one["share"]),
+            ", ".join(found.title(name) for name in one["laws"]),
+        )
+        for one in found.result["families"]
+    ]
+    if not rows:
+        return []
+    caption = (
+        "Laws of one family share their evidence, so that the family may be certain where the law is not."
+    )
+    columns = (
+        "family",
+        "probability that a law of it is missing",
+        "share of the mismatch",
+        "laws that are open",
+    )
+    return [Table(caption, columns, tuple(rows))]
+
+
+def _not_separated(found: Findings) -> list[Block]:
     groups = found.result["indistinguishable"]
     if not groups:
         return [Paragraph("No other single element explains these records equally well.", "note")]

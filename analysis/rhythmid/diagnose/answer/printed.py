@@ -33,6 +33,9 @@ def show(found: Diagnosis, console: Console) -> None:
         print_estimates(
             console, "", {name: asdict(one) for name, one in effect.parameters.items()}, "parameter"
         )
+    for family in found.families if found.verdict == "undecided" else ():
+        sizes = f"probability {_probability(family.probability)}, {_percent(family.share)} of the mismatch"
+        lines.said(f"some form of {family.family}", f"{sizes}: {', '.join(family.laws)}")
     if len(found.missing) > 1 and found.verdict == "missing_physics":
         lines.said("joint probability of these names", _probability(found.joint_probability))
     for group in found.indistinguishable:
