@@ -44,10 +44,11 @@ def axis(
     amplitude: float = 1.0,
     free: bool = False,
     length: float = LONG,
+    load: float = 0.0,
 ) -> Record:
     """An axis of 1 kg with 2 N s/m and Coulomb friction [N] that follows five sines under PD control; position and force with
     noise (a share of the force), stamps jittered by a share of the sample period. With `gravity` [N m] its position is an
-    angle; `free`, it is a spring's mass in a light oscillation that hardly any force drives."""
+    angle; `free`, it is a spring's mass in a light oscillation that hardly any force drives. `load` is the share of the motor's force that acts as friction, too."""
     rng = np.random.default_rng(seed)
     count = round(length / STEP)
     time = STEP * np.arange(count)
@@ -60,7 +61,7 @@ def axis(
     position, effort = np.empty(count), np.empty(count)
     for i in range(count):
         u = 400.0 * (reference[i] - x) + 40.0 * (rate[i] - v)
-        force = -2.0 * v - friction * np.tanh(v / 4e-3) - gravity * np.sin(x)
+        force = -2.0 * v - (friction + load * abs(u)) * np.tanh(v / 4e-3) - gravity * np.sin(x)
         if free:
             u, force = 0.05 * reference[i], -100.0 * x - 0.02 * v
         position[i], effort[i] = x, u

@@ -12,7 +12,7 @@ from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.diagnose.effort import search as module
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.held_out import HeldOut
-from rhythmid.diagnose.effort.kin import kin
+from rhythmid.diagnose.effort.kin import contained
 from rhythmid.diagnose.effort.reference import residual_with_map
 from rhythmid.diagnose.effort.remainder import remainder_of
 from rhythmid.diagnose.effort.search import EffortSearch, search_effort
@@ -20,6 +20,7 @@ from rhythmid.diagnose.evidence import predict
 from rhythmid.diagnose.rejections import RULES, SHAPES, Claim, Rejection, rejections_of
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import variation_of
+from rhythmid.model import Model
 
 KEPT = ("coulomb_friction", "quadratic_drag", "cubic_stiffness")
 FEW = CATALOGUE.without(*(name for name in CATALOGUE if name not in (*KEPT, "viscous_damper")))
@@ -61,10 +62,24 @@ def test_all_hypotheses_predict_the_same_rows(friction):
     assert len(friction.reference.residual) == count
 
 
-def test_kin_compete_for_one_place(friction):
+def test_of_laws_of_which_one_contains_the_other_one_stands_alone(friction):
     for one in friction.hypotheses:
         elements = [term.element for label in one.elements if (term := one.fit.model.term(label)) is not None]
-        assert not any(kin(a, b) for i, a in enumerate(elements) for b in elements[i + 1 :])
+        assert not any(contained(a, b) for i, a in enumerate(elements) for b in elements[i + 1 :])
+
+
+def test_a_friction_that_grows_with_the_load_is_found_beside_one_that_does_not():
+    record = axis(gravity=4.0, amplitude=4.0, load=0.3)
+    weight = "force: [{pendulum_gravity: {moment: {value: 3.0, unit: N*m}}}, "
+    model = Model.from_text(
+        "inertia: {mass: {value: 1.3, unit: kg*m^2}}\n"
+        + weight
+        + "{viscous_damper: {damping: {value: 3.0, unit: N*m*s/rad}}}]\n",
+        catalogue=CATALOGUE,
+    )
+    found = search_effort([record], model, CATALOGUE)
+    assert set(found.chosen.elements) == {"coulomb_friction", "load_dependent_friction"}
+    assert found.chosen.model.value("load_dependent_friction.coefficient") == pytest.approx(0.3, abs=0.05)
 
 
 def test_what_the_effort_cannot_show_is_told(friction):

@@ -66,6 +66,13 @@ def test_the_remainder_is_the_one_of_the_decision_with_the_curve_over_the_quanti
         assert (told.curve is not None) is (quantity == "velocity")
 
 
+@pytest.mark.parametrize(("verdict", "said"), [("undecided", "not located"), ("consistent", "nowhere")])
+def test_an_answer_without_a_name_says_nowhere_only_where_nothing_is_missing(answer, verdict, said):
+    result = replace(answer.result, decision=replace(answer.result.decision, verdict=verdict, named=()))
+    told = compose_effort(Case(axis_model(), [axis()], [axis(1)], CATALOGUE), result, ())
+    assert told.location.where.startswith(said)
+
+
 def test_the_chosen_hypothesis_is_among_those_that_are_listed(answer):
     listed = [one.elements for one in answer.diagnosis.hypotheses]
     assert answer.diagnosis.chosen == ("coulomb_friction",) and answer.diagnosis.chosen in listed

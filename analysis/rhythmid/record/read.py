@@ -25,16 +25,13 @@ from rhythmid.record.quality import ChannelQuality, Quality
 from rhythmid.record.record import SHORTEST, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
 from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
+from rhythmid.record.time_origin import CALENDAR, counted_from, origin_of
 from rhythmid.record.timing import put_in_order
 from rhythmid.record.unit_notes import unit_notes
 
 MOSTLY = 0.5  # share of samples that are no number, beyond which a channel is useless
 LARGEST = 1e100  # of a measured value: its square is still a number
 AMBIGUOUS = 0.01  # share of samples that may have the time of another one with another value
-RUN_CLOCK = 10.0  # seconds; a clock that reads less at the first sample started with the run
-CALENDAR = (
-    1e8  # seconds, three years: a clock that reads more counts from 1970, not from the start of a machine
-)
 SPLIT = "sort the table, or take it apart with  rhythmid split"
 SAMPLES_PER_CYCLE = 100  # of a forcing that is given by formula
 MOST_OF_FORMULA = 50_000_000  # samples of it, 400 MB: an hour at 100 Hz has 36 million
@@ -125,7 +122,7 @@ def read_bag(bag: Bag, signals: Signals | None = None) -> Record:
         if not (role in chosen.optional and source.topic not in bag.topics)
     ]
     first = min(int(stamp_ns.min()) for _, stamp_ns, _ in samples)
-    start_ns = 0 if 0 <= first < RUN_CLOCK * 1e9 else first
+    start_ns = first if origin_of(first * 1e-9) else 0
     made = {role: replace(part, time=(stamp_ns - start_ns) * 1e-9) for role, stamp_ns, part in samples}
     mend = "use  time: receive" if chosen.time.kind == "header" else "split the recording there"
     quality = Quality({}, bag.truncated, (*bag.notes, *notes, *punctuality_notes(description)))
@@ -173,9 +170,13 @@ def read_tables(signals: Signals) -> Record:
         name = signals.path.resolve().parent.name  # tells more
     quality = Quality({}, notes=unit_notes(signals))
     clocks = {(source.file, source.clock(signals.time)) for source in signals.channels.values()}
-    record = _record(name, _since_start(made), signals, SPLIT, quality)
+    first = min((float(samples.time.min()) for samples in made.values() if len(samples.time)), default=0.0)
+    if first >= CALENDAR:  # what is used of it is told from its first row on
+        made = {role: replace(samples, time=samples.time - first) for role, samples in made.items()}
+    record = _record(name, made, signals, SPLIT, quality)
     record = replace(record, hold=signals.hold) if signals.hold else _with_hold(record)
-    return _finish(replace(record, one_clock=len(clocks) == 1), signals)
+    record = _finish(replace(record, one_clock=len(clocks) == 1), signals)
+    return record if first >= CALENDAR else counted_from(record, origin_of(first))
 
 
 def _is_merged(table: Table, signals: Signals) -> bool:
@@ -183,14 +184,6 @@ def _is_merged(table: Table, signals: Signals) -> bool:
     clocks = [source.clock(signals.time) for source in signals.channels.values() if source.file == table.path]
     times = {str(clock.column) for clock in clocks if clock.kind == "column"}
     return bool(times) and is_merged(value for name, value in table.vectors() if name not in times)
-
-
-def _since_start(made: Mapping[str, Samples]) -> dict[str, Samples]:
-    """Samples of tables, their times counted from the first of all where they are a calendar's."""
-    first = min((float(samples.time.min()) for samples in made.values() if len(samples.time)), default=0.0)
-    if first < CALENDAR:
-        return dict(made)
-    return {role: replace(samples, time=samples.time - first) for role, samples in made.items()}
 
 
 def is_run(topic: Topic) -> bool:

@@ -17,7 +17,7 @@ from rhythmid.diagnose.answer.result import (
     Untried,
     settled,
 )
-from rhythmid.diagnose.answer.wording import freed_value, listed, recalibrated, summary_of
+from rhythmid.diagnose.answer.wording import NOT_LOCATED, freed_value, listed, recalibrated, summary_of
 from rhythmid.diagnose.case import Case
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.run import EffortResult
@@ -43,9 +43,10 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     if result.selection.chosen.kind == "freed_value":
         freed = freed_value(case.nominal, chosen.fit.model, chosen.elements)
     slots = list(dict.fromkeys(effect.slot for effect in missing))
-    where = (
-        "; and ".join(SENTENCES[slot] for slot in slots)
-        or "nowhere: the refitted nominal model explains the effort"
+    where = "; and ".join(SENTENCES[slot] for slot in slots) or (
+        "nowhere: the refitted nominal model explains the effort"
+        if decision.verdict == "consistent"
+        else NOT_LOCATED
     )
     remainder = _remainder(result)
     if not slots and decision.verdict == "unknown_physics":

@@ -14,6 +14,8 @@ from rhythmid.elements.places import SENTENCES
 from rhythmid.model import Model
 from rhythmid.report.quantity import in_words, number, rounded
 
+NOT_LOCATED = "not located"
+
 
 def location_of(
     found: Search, missing: Sequence[MissingEffect], before: Sequence[Dependence], verdict: Verdict
@@ -37,7 +39,7 @@ def location_of(
         return Location(slots[0], where, tuple(evidence))
     best = max(by_slot, key=lambda slot: by_slot[slot], default=None)
     top = before[0] if before else None
-    where = SENTENCES.get(best or "", "not located")
+    where = SENTENCES.get(best or "", NOT_LOCATED)
     if top is not None and top.explained > 0.2:
         where += f"; it varies with {top.quantity}"
     return Location(best, where, tuple(evidence))

@@ -14,8 +14,13 @@ def kin(first: Element, second: Element) -> bool:
     """Whether two elements are forms of one thing."""
     if first.name == second.name and first.repeats:
         return False
+    return (first.family != "" and first.family == second.family) or contained(first, second)
+
+
+def contained(first: Element, second: Element) -> bool:
+    """Whether one of two elements is the other, or its special case, so that one of them says what both do."""
     return (
-        (first.family != "" and first.family == second.family)
+        first.name == second.name
         or second.name in first.special_case_of
         or first.name in second.special_case_of
     )

@@ -29,7 +29,7 @@ from rhythmid.diagnose.effort.candidate import (
     widest,
 )
 from rhythmid.diagnose.effort.fitted import Fitted
-from rhythmid.diagnose.effort.kin import at_values_of, kin, shortlist
+from rhythmid.diagnose.effort.kin import at_values_of, contained, kin, shortlist
 from rhythmid.diagnose.effort.reference import reference_of
 from rhythmid.diagnose.effort.scales import scales_at, scales_of
 from rhythmid.diagnose.evidence import Blocks, Linearised, predict
@@ -235,18 +235,19 @@ class _Search:
         return [one for one in shortlist if (late if one.start.kind == "delay" else one.gain > least)]
 
     def _bases(self, parent: Fitted, start: Start) -> list[Fitted]:
-        """What an addition is put to: the parent, or where that holds its kin, the parent without it."""
+        """What an addition is put to: the parent, or where that holds its kin, the parent without them, and with those that say another thing:
+        a machine may have a friction of its own and one that grows with the load."""
         if start.element is None:
             return [] if start.name in parent.elements else [parent]
-        related = [
-            label
-            for label in parent.elements
-            if (term := parent.fit.model.term(label)) is not None and kin(term.element, start.element)
-        ]
-        base = parent
+        model = parent.fit.model
+        terms = {label: term for label in parent.elements if (term := model.term(label)) is not None}
+        related = [label for label, term in terms.items() if kin(term.element, start.element)]
+        base = beside = parent
         for label in related:
             base = self.without(base, label)
-        return [base]
+            if contained(terms[label].element, start.element):
+                beside = self.without(beside, label)
+        return [base] if beside.elements == base.elements else [base, beside]
 
     def without(self, fitted: Fitted, label: str) -> Fitted:
         """The hypothesis less one of its additions, fitted again; one that was fitted before is taken as it is."""
