@@ -51,8 +51,10 @@ WORTH = 10.0
 SHARE = 5e-4  # of what is explained already, below which a further effect is an imperfection of the others
 LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
 GROUPS = 3  # of so many elements that are refitted for the first effect, one after the other, while none does better
-# difference of the criterion within which models are compared again under the noise that they leave
-NEAR = 60.0
+# difference of the criterion within which models are compared again under the noise that they leave, and the same as a share of what
+# the best of them gains: a noise model that is coloured by what is missing puts a surrogate ahead by so much (Silverbox: a ripple before the
+# cubic spring by 0.15 % of the gain)
+NEAR, NEAR_SHARE = 60.0, 0.01
 # gain in the criterion from which a model is worth a second look where a better one does not hold under the noise that it
 # leaves; and how many of them get it
 PLAIN, SECOND = 100.0, 2
@@ -242,7 +244,8 @@ def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State
     if not found:
         return state, None
     best, here = state.best, state.here
-    near = [one for one in found if one.bic() - found[0].bic() < NEAR]
+    within = max(NEAR, NEAR_SHARE * (here.bic() - found[0].bic()))
+    near = [one for one in found if one.bic() - found[0].bic() < within]
     hopeful = [[one] for one in found[len(near) :] if here.bic() - one.bic() > PLAIN][:SECOND]
     for group in (near, *hopeful):
         top = _most_likely(group, task.series, here.noise, state.step, task.floor)
