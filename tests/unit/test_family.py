@@ -34,6 +34,15 @@ def test_of_two_laws_of_one_family_that_predict_alike_the_family_is_stated_and_n
     assert said.startswith("The model lacks some form of friction (9") and "but the law is undecided" in said
 
 
+def test_a_simpler_law_that_is_chosen_is_among_the_open_ones_whatever_its_weight():
+    plain = supposed(
+        "coulomb", predicted(0.02, 700.0), free=6, richer={"coulomb": ("stribeck",)}, family=FRICTION
+    )
+    rich = supposed("stribeck", predicted(0.0199, 706.5, seed=1), free=8, family=FRICTION)
+    decision = told(plain, rich)
+    assert decision.named == ("coulomb",) and set(decision.families[0].laws) == {"coulomb", "stribeck"}
+
+
 def test_of_two_laws_of_different_families_neither_family_is_stated():
     decision = told(law("coulomb", 0.02), law("spring", 0.02, seed=1))
     assert decision.verdict == "undecided"

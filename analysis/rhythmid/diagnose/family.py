@@ -21,7 +21,7 @@ class MissingFamily:
     Parameters
     ----------
     family : its name.
-    laws : names of its laws that the evidence leaves open, the one with the largest weight first.
+    laws : names of its laws that the evidence leaves open, the one with the largest weight first; the chosen ones among them.
     share : share of the mismatch on held-out data that the laws of the chosen hypothesis explain.
     probability : that the truth has a law of this family.
     """
@@ -58,7 +58,10 @@ def families_of(
         others = [label for label in open_ if label not in mine]
         laws, held = _laws(contest, family, weights)
         chance = chance_of_law(share, left + removed_by(others, chosen, contest)) * held
-        found.append(MissingFamily(family, laws, share, chance))
+        own = [
+            name for name in chosen.names if chosen.family.get(name) == family
+        ]  # as good as those with more weight
+        found.append(MissingFamily(family, tuple(dict.fromkeys((*laws, *own))), share, chance))
     return tuple(sorted(found, key=lambda one: -one.share))
 
 
