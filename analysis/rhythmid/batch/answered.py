@@ -27,9 +27,9 @@ from rhythmid.record.joint_record import JointRecord, JointSignals, load_joint_r
 from rhythmid.record.read import load_records
 from rhythmid.record.record import Record
 from rhythmid.record.signals import Signals
+from rhythmid.record.time_origin import CALENDAR
 from rhythmid.report.page import Page, render
 
-CALENDAR = 1e8  # [s], three years: a clock that reads more counts from 1970, not from the start of a machine
 KIBIBYTE = (
     1 if sys.platform == "darwin" else 1024
 )  # bytes in which the system counts the largest memory of a process

@@ -21,7 +21,7 @@ EARNS_PLACE = (
 )
 # of the power of what drives, that it has to explain, too: less is a matter of friction, ripple and noise, which anything takes up at random.
 # Of a delay of half a radian, inertia, damper and spring leave (ω τ)²/2 of the size, which is as much; of a shorter one less
-WORTH = 0.015
+OF_THE_DRIVE = 0.015
 STEADY = 1e-9  # of its size, within which what drives never changes: the rounding of the filters
 COLUMNS = ("acceleration", "velocity", "position", "sine", "cosine", "constant")
 POSITIVE = frozenset({"acceleration", "velocity", "position"})
@@ -40,7 +40,7 @@ class Law:
 
     def earns_place(self, simpler: "Law") -> bool:
         """Whether it explains clearly more than a simpler law, of what that leaves and of what drives."""
-        return self.left < EARNS_PLACE * simpler.left and simpler.left - self.left >= WORTH
+        return self.left < EARNS_PLACE * simpler.left and simpler.left - self.left >= OF_THE_DRIVE
 
 
 @dataclass(frozen=True, eq=False)

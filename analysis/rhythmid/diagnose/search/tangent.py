@@ -19,7 +19,7 @@ from rhythmid.simulation.signal import FAR
 Array = NDArray[np.float64]
 # of the scatter of a state or of the given force, that is moved for a difference: the rounding of the outcome, 1e-16 of it, and
 # its curvature both leave the derivative to five digits
-STEP = 1e-5
+DIFFERENCE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ def tangent(run: FreeRun, model: Model, index: int, states: Array, force: float)
         return None
     times, q = given.times, states.shape[1]
     scatter = states.std(axis=0)
-    moved = STEP * np.where(scatter > 0.0, scatter, np.maximum(np.abs(states).max(axis=0), 1e-12))
-    pushed = STEP * force
+    moved = DIFFERENCE * np.where(scatter > 0.0, scatter, np.maximum(np.abs(states).max(axis=0), 1e-12))
+    pushed = DIFFERENCE * force
     command, forcing = _Stretches(given.command, times), _Stretches(given.forcing, times)
     maps, ends = np.empty((len(times) - 1, q + 1, q + 2)), np.empty((2, q + 2))
     direct = 0.0

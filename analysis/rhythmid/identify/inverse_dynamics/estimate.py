@@ -198,7 +198,7 @@ def fit_effort(
 
 
 def _divides(model: Model, name: str) -> bool:
-    """Whether a parameter is one that cannot be 0: the inertia, or a constant of the motor that turns a signal into a force."""
+    """Whether a parameter is one that cannot be 0: the inertia, or a constant of the motor: what turns a signal into a force, and what limits that."""
     term = model.term(name.split(".")[0])
     return name == INERTIA or (term is not None and term.element.acts == "transducer")  # pyright: ignore[reportUnnecessaryComparison]
 
