@@ -123,6 +123,11 @@ def test_an_empty_cell_is_no_number_in_any_column(tmp_path):
         ("velMa", "velMa", "", 1.0),
         ("xcm", "xcm", "", 1.0),
         ("x [counts]", "x [counts]", "", 1.0),
+        ("rpm", "rpm", "rad/s", math.pi / 30),
+        ("rpm_left", "left", "rad/s", math.pi / 30),
+        ("Target RPM 2", "Target 2", "rad/s", math.pi / 30),
+        ("knee.deg.actual", "knee.actual", "rad", math.pi / 180),
+        ("degree_of_freedom", "degree_of_freedom", "", 1.0),
         ("data.q", "data.q", "", 1.0),
     ],
 )

@@ -31,6 +31,7 @@ SUFFIXES = (
     "ms", "usec", "us", "nsec", "ns", "nanoseconds", "milliseconds", "seconds", "secs", "sec", "s",
 )  # fmt: skip
 COUNTERS = ("millis", "micros", "nanos")  # of Arduino's clock: names that are units
+WORDS = ("rpm", "deg", "degrees", "radians", "dps")  # mean nothing else, wherever in a name they stand
 LETTERS = {  # a single letter is a unit only behind a word that it suits: pos_a is no current
     "s": "t time timestamp stamp elapsed", "m": "pos position x y z height displacement disp length travel stroke",
     "n": "f force load thrust", "a": "i iq current cur", "v": "u voltage volt supply",
@@ -73,8 +74,8 @@ class Heading:
 
 
 def heading_of(column: str) -> Heading:
-    """The heading `column` taken apart: a unit in brackets, behind a slash, as a suffix after an underscore or with a capital, or
-    glued to a name that it suits."""
+    """The heading `column` taken apart: a unit in brackets, behind a slash, as a suffix after an underscore or with a capital, glued
+    to a name that it suits, or a word of the name."""
     column = column.strip()
     if column.lower() in COUNTERS and (known := _unit(column)) is not None:
         return Heading(column, *known, column)
@@ -92,7 +93,16 @@ def heading_of(column: str) -> Heading:
             known = _unit(_spelled(suffix))
             assert known is not None
             return Heading(column[: -len(suffix) - 1], *known, column[-len(suffix) :])
-    return Heading(column)
+    return _with_word(column)
+
+
+def _with_word(column: str) -> Heading:
+    """The heading of a column of whose name one word is a unit, as in `rpm`, `rpm_left` and `Motor RPM 2`."""
+    words = [match for match in re.finditer(r"[A-Za-z]+", column) if match[0].lower() in WORDS]
+    if len(words) != 1 or (known := _unit(words[0][0])) is None:
+        return Heading(column)
+    before, after = column[: words[0].start()].rstrip(" ._"), column[words[0].end() :]
+    return Heading((before + after).strip(" ._") or column, *known, words[0][0])
 
 
 def _glued(column: str) -> str:
