@@ -101,7 +101,9 @@ def test_windows_in_which_nothing_is_missing_tell_what_a_free_run_says(monkeypat
         replace(plain, verdict=verdict),
     ]
     fit = SimpleNamespace(fit=SimpleNamespace(model=hopper()))
-    monkeypatch.setattr(module, "settle", lambda *_, **__: [SimpleNamespace(kind="windows")] * 2)
+    effort = SimpleNamespace(applies=False, free_run_means_something=True, effort_share=0.0, notes=())
+    monkeypatch.setattr(module, "applicable", lambda *_: effort)
+    monkeypatch.setattr(module, "settle", lambda *_: [SimpleNamespace(kind="windows")] * 2)
     monkeypatch.setattr(module, "free_run", lambda *_: SimpleNamespace(search=fit))
     monkeypatch.setattr(module, "compose", lambda *_: made.pop(0))
     found = diagnose(records(hopper(), SHORT[1:2]), hopper(), catalogue=CATALOGUE).diagnosis
@@ -225,10 +227,18 @@ def test_the_reason_for_a_free_run_says_how_far_it_follows_the_records_of_the_fi
     assert one.reason == reason and "the records of the fit" in reason and "machine" not in reason
 
 
-def asked(monkeypatch: pytest.MonkeyPatch, means: bool, share: float, error: float = 0.2) -> list[str]:
-    """What is scored, in order, where nothing is named and the model does not follow the machine in free run.
+def asked(
+    monkeypatch: pytest.MonkeyPatch,
+    means: bool,
+    share: float,
+    error: float = 0.2,
+    follows: bool = False,
+    verdict="undecided",
+) -> list[str]:
+    """What is scored, in order, where nothing is named.
 
-    `means` says whether a free run means something, `share` is the effort's of the inertial force, `error` what is left of it.
+    `means` says whether a free run means something, `follows` whether the model then follows the machine, `verdict` to what it comes by its
+    motion; `share` is the effort's of the inertial force, `error` what is left of it.
     """
     order: list[str] = []
 
@@ -247,10 +257,13 @@ def asked(monkeypatch: pytest.MonkeyPatch, means: bool, share: float, error: flo
     monkeypatch.setattr(module, "applicable", lambda *_: effort)
     monkeypatch.setattr(module, "_by_effort", by_effort)
     monkeypatch.setattr(
-        module, "settle", lambda *given: [SimpleNamespace(kind="windows")] if given[-1] else []
-    )
+        module,
+        "settle",
+        lambda *given: [SimpleNamespace(kind="free_run")] if follows and not given[-1]
+        else [SimpleNamespace(kind="windows")] if given[-1] else [],
+    )  # fmt: skip
     monkeypatch.setattr(module, "free_run", free_run)
-    monkeypatch.setattr(module, "compose", lambda *_: diagnosed("undecided", kind="windows"))
+    monkeypatch.setattr(module, "compose", lambda *_: diagnosed(verdict, kind=order[-1]))
     found = diagnose(records(hopper(), SHORT[2:]), hopper(), catalogue=CATALOGUE).diagnosis
     assert found.scoring.kind == order[0]
     return order
@@ -268,3 +281,14 @@ def test_an_effort_that_moves_the_machine_comes_before_windows_and_one_beside_wh
     monkeypatch, share, expected
 ):
     assert asked(monkeypatch, True, share) == expected
+
+
+@pytest.mark.parametrize(
+    ("verdict", "expected"), [("undecided", ["free_run", "effort"]), ("consistent", ["free_run"])]
+)
+def test_what_a_free_run_leaves_without_a_name_is_looked_for_in_the_effort(monkeypatch, verdict, expected):
+    assert asked(monkeypatch, True, 0.5, follows=True, verdict=verdict) == expected
+
+
+def test_the_effort_of_a_quasi_static_machine_comes_before_a_free_run_that_follows_it(monkeypatch):
+    assert asked(monkeypatch, True, 20.0, follows=True) == ["effort", "windows"]

@@ -89,6 +89,9 @@ LEFT = 0.05
 # effort, as a share of the inertial force, from which it is scored before windows are: it moves the machine against other forces.
 # Where it is smaller the machine swings by itself, and the effort shows little of what else acts
 DRIVES_IT = 1.0
+# the same share, from which it is scored before a free run is: the motion is what is left of large forces that cancel, an error of the effort
+# moves the machine far, and the effort itself says what it works against (inertia below a tenth of it)
+QUASI_STATIC = 10.0
 # error, as a share of the motion, below which a model follows the machine: a run that is lost altogether is wrong by 1 or more,
 # and the effects of the proof at full size leave less than this
 FOLLOWS = 0.3

@@ -19,7 +19,7 @@ from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis, Untried
 from rhythmid.diagnose.baseline import causal, check_free
 from rhythmid.diagnose.case import LEAST_CALIBRATION, SEARCHED, Budget, Case
-from rhythmid.diagnose.constants import DRIVES_IT, LEFT
+from rhythmid.diagnose.constants import DRIVES_IT, LEFT, QUASI_STATIC
 from rhythmid.diagnose.effort.candidate import SEEN
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST_EFFECTS
@@ -276,8 +276,8 @@ def _answers(
 ) -> Iterator[Answer]:
     """Answers of all ways to score that apply, the most telling way first; they are worked out as they are asked for.
 
-    A free run that follows the machine comes first. Else the recorded effort does where it is at least as large as the
-    inertial force, so that it moves the machine against other forces, and windows where the machine swings by itself.
+    A free run that follows the machine comes first, unless the machine is quasi-static. Else the recorded effort does where it is at
+    least as large as the inertial force, so that it moves the machine against other forces, and windows where the machine swings by itself.
     Effort is scored on the `whole` case, whose records nothing cuts. With an answer in hand no further way begins once the budget
     is spent; what the next one would have been joins `untried`.
     """
@@ -289,7 +289,8 @@ def _answers(
             untried.append(Untried(way, SPENT))
         return case.budget.spent
 
-    if effort.applies and not effort.free_run_means_something:
+    quasi_static = effort.effort_share >= QUASI_STATIC
+    if effort.applies and (quasi_static or not effort.free_run_means_something):
         answer = _by_effort(whole, effort, effort_notes)
         yield answer
         if answer.diagnosis.augmented.train_nrmse < LEFT or late(BY_MOTION):
@@ -309,14 +310,16 @@ def _answers(
             model = without_record_zero(without_free_maps(result.search.fit.model))
             yield Answer(diagnosis, causal(model), result)
 
-    if not effort.applies or not effort.free_run_means_something:
+    if not effort.applies or quasi_static or not effort.free_run_means_something:
         yield from by_motion(windows=True)
         return
-    told = 0
+    verdict = None
     for answer in by_motion(windows=False):
-        told += 1
+        verdict = answer.diagnosis.verdict
         yield answer
-    if told:
+    if verdict is not None:
+        if verdict != "consistent" and not late(BY_EFFORT):
+            yield _by_effort(whole, effort, effort_notes)
         return
     if driven:
         yield _by_effort(whole, effort, effort_notes)

@@ -203,7 +203,7 @@ SIZES: dict[str, Callable[[Rng, Motion], Sized]] = {
     "end_stop_contact": _end_stop,
     "travel_stop": _end_stop,
     "position_ripple": lambda rng, m: _of(
-        "amplitude", 0.5 * m.unit, wavelength=(m.high - m.low) / _log(rng, 1.5, 10.0),
+        "amplitude", 0.5 * m.unit, wavelength=(m.high - m.low) / _log(rng, 2.2, 10.0),
         phase=rng.uniform(-math.pi, math.pi),
     ),
     "periodic_disturbance": _disturbance,

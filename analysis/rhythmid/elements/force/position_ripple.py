@@ -2,8 +2,8 @@
 
 (A, phi) and (-A, phi + pi) are the same ripple, so A is kept positive. A fit in lambda has one minimum for every
 period that fits into the range of motion: it needs a grid of starts, and where a rotor turns many times the lines over
-position that are left. A period about as long as the whole travel makes it but a spring with a cubic term, so the search
-keeps to shorter ones.
+position that are left. Fewer than two periods in the travel repeat nothing: such a force is a smooth law of the position, which springs
+that harden or soften describe as well.
 """
 
 import math
@@ -17,8 +17,8 @@ def kernel(x, v, t, f, amplitude, wavelength, phase):
 
 def starts(scales):
     wavelengths = [
-        4.0 * scales.position / 1.25**k for k in range(12)
-    ]  # from one period in the usual travel to a dozen
+        2.0 * scales.position / 1.18**k for k in range(12)
+    ]  # from two periods in the usual travel to a dozen
     return [
         {"amplitude": 0.01 * scales.force, "wavelength": wavelength, "phase": phase}
         for wavelength in (*scales.residual_wavelengths, *wavelengths)
@@ -40,7 +40,7 @@ ELEMENT = Element(
     acts="body",
     size="amplitude",
     starts=starts,
-    ranges=lambda s: {"wavelength": (0.0, 0.75 * (s.high - s.low))},
+    ranges=lambda s: {"wavelength": (0.0, 0.5 * (s.high - s.low))},
     also_known_as=("cogging", "detent force", "torque ripple", "gear eccentricity"),
     family="ripple",
     repeats=True,  # pole pairs, slots and gears have a wavelength each
