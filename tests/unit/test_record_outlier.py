@@ -152,11 +152,22 @@ def test_a_motion_that_begins_or_ends_with_a_step_has_no_outlier():
 
 
 def test_a_lone_peak_far_beyond_an_acceleration_is_kept_and_told():
-    value = motion(np.random.default_rng(2), 1e-3)
-    record = Record("run", Channel(TIME, value, "m/s^2"), None, output_kind="acceleration")
-    assert peak_note(record) is None
-    value[700] = 67110626.0
-    assert not cleaned(record).left_out
-    assert (told := peak_note(record)) is not None and "1 of 5000 samples stand far off" in told
-    value[700] = 0.1  # as much as an impact makes
-    assert peak_note(record) is None
+    def record(peak: float) -> Record:
+        value = motion(np.random.default_rng(2), 1e-3)
+        value[700] += peak
+        return Record("run", Channel(TIME, value, "m/s^2"), None, output_kind="acceleration")
+
+    assert peak_note(record(0.0)) is None
+    assert peak_note(record(0.1)) is None  # as much as an impact makes
+    told = peak_note(record(67110626.0))
+    assert told is not None and "1 of 5000 samples stand far off" in told
+    assert not cleaned(record(67110626.0)).left_out
+
+
+@pytest.mark.parametrize("size", [0.1, 10.0, 1e3, 67110626.0])
+def test_an_outlier_of_any_size_is_found_and_leaves_the_rounding_as_it_is(size):
+    value = np.round(motion(np.random.default_rng(2), 1e-2), 5)
+    before = resolution(value)
+    value[700] += size
+    assert resolution(value) == pytest.approx(before)
+    assert np.flatnonzero(outlying_samples(value)).tolist() == [700]
