@@ -27,7 +27,7 @@ from rhythmid.start.meaning import (
     says_who_asks,
 )
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along
-from rhythmid.start.step_before import BEFORE, step_before
+from rhythmid.start.step_before import BEFORE, set_point_before, step_before
 from rhythmid.start.unnamed_reference import with_reference
 from rhythmid.start.unsigned_effort import without_unsigned
 
@@ -102,6 +102,10 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     step = None if more else step_before(found.constant, chosen)
     if step is not None:
         more = {"input": Choice(step, "the only effort, and nothing else drives", doubts=(BEFORE,))}
+    if not more and (step := set_point_before(found.constant, chosen, output.recorded, measured)) is not None:
+        reason = f"a {measured} that was asked for, to which the output goes, and nothing else drives"
+        more = {"input": Choice(step, reason, doubts=(BEFORE,))}
+        kind, reference_of = "reference", measured
     choices |= {role: _doubted(choice, copies) for role, choice in more.items()}
     if not more:
         rest, told = with_reference(own, rest)
