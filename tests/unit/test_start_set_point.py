@@ -25,7 +25,10 @@ def test_a_constant_set_point_drives_a_machine_that_starts_away_from_it(tmp_path
     columns = {asked: np.full(len(TIME), 100.0), output: 95.0 * RISE + NOISE}
     found = guess(log(tmp_path, **columns))
     roles = found.roles
-    assert {role: str(one.recorded) for role, one in roles.choices.items()} == {"output": output, "input": asked}
+    assert {role: str(one.recorded) for role, one in roles.choices.items()} == {
+        "output": output,
+        "input": asked,
+    }
     assert (roles.input_kind, roles.reference_of, roles.output_kind) == ("reference", kind, kind)
     assert any(line.startswith("CHECK input: it never changes: taken for a step") for line in found.lines())
 
@@ -35,11 +38,17 @@ def test_the_gain_of_a_step_is_told_by_how_fast_the_speed_rises(tmp_path):
     assert start([path]).nominal.model.value("velocity_control.gain") == pytest.approx(1.0 / 0.3, rel=0.3)
 
 
-@pytest.mark.parametrize("speed", [100.0 + NOISE, 500.0 * RISE + NOISE, -90.0 * RISE], ids=["there", "past it", "from it"])
+@pytest.mark.parametrize(
+    "speed", [100.0 + NOISE, 500.0 * RISE + NOISE, -90.0 * RISE], ids=["there", "past it", "from it"]
+)
 def test_a_set_point_to_which_the_output_does_not_go_drives_nothing(tmp_path, speed):
-    assert set(guess(log(tmp_path, speed_ref=np.full(len(TIME), 100.0), speed=speed)).roles.choices) == {"output"}
+    assert set(guess(log(tmp_path, speed_ref=np.full(len(TIME), 100.0), speed=speed)).roles.choices) == {
+        "output"
+    }
 
 
 def test_an_effort_that_changes_comes_before_a_set_point_that_does_not(tmp_path):
-    path = log(tmp_path, speed_ref=np.full(len(TIME), 100.0), speed=95.0 * RISE + NOISE, torque=np.exp(-TIME / 0.3))
+    path = log(
+        tmp_path, speed_ref=np.full(len(TIME), 100.0), speed=95.0 * RISE + NOISE, torque=np.exp(-TIME / 0.3)
+    )
     assert str(guess(path).roles.choices["input"].recorded) == "torque"
