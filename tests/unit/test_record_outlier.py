@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rhythmid.record.cleaning import cleaned, peak_note
 from rhythmid.record.outlier import outlying_samples, repeated_samples
 from rhythmid.record.quality import clipped_samples
+from rhythmid.record.record import Channel, Record
 from rhythmid.record.rounding import resolution
 
 seeds = st.integers(0, 10_000)
@@ -134,3 +136,38 @@ def test_a_plateau_at_a_stop_is_not_clipping():
     value = np.minimum(4.0 * phase, 0.5) - np.where(phase > 0.3, 12.0 * (phase - 0.3) ** 2, 0.0)
     assert np.count_nonzero(value == 0.5) > 400
     assert not clipped_samples(value).any()
+
+
+@pytest.mark.parametrize("place", [1, len(TIME) - 2])
+def test_an_outlier_beside_the_first_or_the_last_sample_is_found(place):
+    value = motion(np.random.default_rng(2), 1e-3)
+    value[place] += 0.5
+    assert np.flatnonzero(outlying_samples(value)).tolist() == [place]
+
+
+def test_a_motion_that_begins_or_ends_with_a_step_has_no_outlier():
+    value = motion(np.random.default_rng(2), 1e-3)
+    value[0] = value[-1] = 0.5
+    assert not outlying_samples(value).any()
+
+
+def test_a_lone_peak_far_beyond_an_acceleration_is_kept_and_told():
+    def record(peak: float) -> Record:
+        value = motion(np.random.default_rng(2), 1e-3)
+        value[700] += peak
+        return Record("run", Channel(TIME, value, "m/s^2"), None, output_kind="acceleration")
+
+    assert peak_note(record(0.0)) is None
+    assert peak_note(record(0.1)) is None  # as much as an impact makes
+    told = peak_note(record(67110626.0))
+    assert told is not None and "1 of 5000 samples stand far off" in told
+    assert not cleaned(record(67110626.0)).left_out
+
+
+@pytest.mark.parametrize("size", [0.1, 10.0, 1e3, 67110626.0])
+def test_an_outlier_of_any_size_is_found_and_leaves_the_rounding_as_it_is(size):
+    value = np.round(motion(np.random.default_rng(2), 1e-2), 5)
+    before = resolution(value)
+    value[700] += size
+    assert resolution(value) == pytest.approx(before)
+    assert np.flatnonzero(outlying_samples(value)).tolist() == [700]

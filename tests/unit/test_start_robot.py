@@ -116,6 +116,20 @@ def test_entries_of_an_array_are_told_by_their_places(tmp_path, robot, run):
     assert 'output: {column: "q[*]"}' in found.signals and 'effort: {column: "tau[*]"' in found.signals
 
 
+def test_of_several_efforts_the_one_that_was_measured_is_taken_and_the_others_are_named(tmp_path, robot, run):
+    run = {**run, "friction": 0.1 * run["effort"], "measured": 0.9 * run["effort"]}
+    heads = [f"{name}{joint}" for name in ("pos_meas", "tau_con", "tau_fric", "tau_meas") for joint in (1, 2)]
+    path = table(tmp_path / "run.csv", run, heads, "position", "effort", "friction", "measured")
+    found = begun(path, robot)
+    assert 'effort: {column: "tau_meas*"' in found.signals
+    checks = [line for line in found.told if line.startswith("CHECK effort")]
+    assert any("tau_con*" in line for line in checks) and any("tau_fric*" in line for line in checks)
+    assert "# CHECK effort: tau_con* is what" in found.signals
+    found = begun(table(tmp_path / "run.csv", run, heads[:4], "position", "effort"), robot)
+    assert 'effort: {column: "tau_con*"' in found.signals
+    assert any("what the actuators were asked for" in line for line in found.told)
+
+
 def test_references_alone_get_controllers_whose_gains_are_to_be_checked(tmp_path, robot, run):
     names = ["shoulder_joint", "elbow_joint"]
     times = NOW + run["time"]

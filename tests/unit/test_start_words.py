@@ -73,3 +73,46 @@ def test_the_refusal_of_stamps_that_rows_share_tells_of_the_rate(tmp_path):
     with pytest.raises(InputError, match="coarse stamps; .* init --rate HZ"):
         guess(tmp_path / "run.npz")
     assert roles_of(tmp_path / "run.npz", rate=1000.0)["output"] == "x"
+
+
+@pytest.mark.parametrize("word", ["con", "ctl", "ctr", "ctrl"])
+def test_a_controllers_output_is_the_command_beside_the_torque_that_was_measured(tmp_path, word):
+    names = {f"tau_{word}": FORCE, "pos_meas": X, "tau_meas": FORCE + 0.1 * OTHER}
+    found = roles_of(table(tmp_path, **names))
+    assert found == {"output": "pos_meas", "input": f"tau_{word}", "effort": "tau_meas"}
+
+
+def test_the_force_of_a_contact_is_not_called_a_controllers_output(tmp_path):
+    path = table(tmp_path, pos=X, force_con=FORCE)
+    assert guess(path).roles.choices["input"].reason.startswith("an effort, and nothing else drives")
+
+
+def test_of_efforts_the_one_that_a_sensor_read_comes_before_one_that_was_worked_out(tmp_path):
+    path = table(tmp_path, pos=X, tau_fric=FORCE, tau_meas=FORCE + 0.3 * OTHER)
+    choice = guess(path).roles.choices["input"]
+    assert choice.recorded.column == "tau_meas"
+    assert any("tau_fric" in doubt for doubt in choice.doubts)
+
+
+@pytest.mark.parametrize(
+    ("heads", "output"),
+    [
+        (("xAccl", "gyr_y"), "gyr_y"), (("accel_x", "u"), "accel_x"), (("acc_x", "zGyro"), "zGyro"), (("linacc", "u"), "linacc"),
+        (("accX", "pos"), "pos"),
+    ],
+)  # fmt: skip
+def test_abbreviations_of_accelerations_and_of_gyros_are_words(tmp_path, heads, output):
+    found = guess(table(tmp_path, **{heads[0]: np.gradient(V, TIME), heads[1]: V})).roles
+    assert found.choices["output"].recorded.column == output
+    assert (
+        found.output_kind
+        == {"g": "velocity", "z": "velocity", "a": "acceleration", "l": "acceleration", "p": "position"}[
+            output[0]
+        ]
+    )
+
+
+def test_a_letter_beside_a_word_that_is_not_known_is_doubted(tmp_path):
+    (doubt,) = guess(table(tmp_path, xBlorf=X, u=FORCE)).roles.choices["output"].doubts
+    assert "'x'" in doubt and "'blorf'" in doubt
+    assert not guess(table(tmp_path, x=X, u=FORCE)).roles.choices["output"].doubts

@@ -260,6 +260,36 @@ def test_a_table_of_matlab_7_3_is_read_as_matlab_shows_it(tmp_path):
     np.testing.assert_array_equal(table.column("robot.q[1]"), -Q)
 
 
+@pytest.mark.parametrize(
+    ("kind", "advice"),
+    [
+        ("Simulink.SimulationData.Dataset", r"writetimetable\(extractTimetable\(data\), 'run.csv'\)"),
+        ("timeseries", r"timeseries2timetable\(data\)"), ("robotarm", "save its numbers as arrays"),
+    ],
+)  # fmt: skip
+def test_a_file_of_matlabs_objects_is_refused_with_what_writes_them_as_a_table(tmp_path, kind, advice):
+    import h5py
+
+    with h5py.File(tmp_path / "run.mat", "w", userblock_size=512) as file:
+        stored = file.create_dataset("data", data=np.array([[0xDD000000, 2, 1, 1, 1, 1]], dtype="u4"))
+        stored.attrs["MATLAB_class"], stored.attrs["MATLAB_object_decode"] = np.bytes_(kind), np.int32(3)
+        file.create_dataset("#sigstream#/0/#data#", data=np.arange(100, dtype="u1"))
+    with pytest.raises(
+        InputError, match=f"'data' is an object of MATLAB's class {kind}.*{advice}"
+    ) as refused:
+        inventory(tmp_path / "run.mat", rate=1000.0)
+    assert "\n" not in str(refused.value) and "--rate" not in str(refused.value)
+    with h5py.File(tmp_path / "run.mat", "a") as file:
+        file["t"], file["q"] = TIME, Q
+    assert list(Table.load(tmp_path / "run.mat").columns) == ["q", "t"]
+
+
+def test_a_few_values_are_no_recording_of_which_a_rate_would_tell_the_times(tmp_path):
+    np.savez(tmp_path / "run.npz", data=np.array([7.0, 2.0, 1.0, 1.0, 1.0, 1.0]))
+    with pytest.raises(InputError, match=r"holds no recording: its columns have 6 values \(data\)"):
+        inventory(tmp_path / "run.npz")
+
+
 def test_hdf5_that_claims_to_hold_too_much_is_refused(tmp_path):
     import h5py
 

@@ -12,7 +12,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.angle_wrap import wrap_notes
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block
-from rhythmid.record.cleaning import LeftOut, cleaned
+from rhythmid.record.cleaning import LeftOut, cleaned, peak_note
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.gaps import Cut, cut_at_gaps
 from rhythmid.record.joint_record import JointSignals, names_joints, read_joint_record
@@ -210,6 +210,8 @@ def quality_report(
             notes += [*clean.notes, *cut.notes]
             if (still := standstill(clean.record)) is not None:
                 notes.append(f"output: {still}")
+            if (peaks := peak_note(record)) is not None:
+                notes.append(peaks)
         except InputError as error:
             problems.append(str(error))
     if not is_bag(source):

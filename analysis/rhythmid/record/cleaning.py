@@ -16,6 +16,8 @@ from rhythmid.record.record import Record
 Mask = NDArray[np.bool_]
 Reason = Literal["outlier", "repeated", "clipped"]
 MOSTLY = 0.5  # share of clipped samples beyond which a record is useless
+# times the range of all other samples, from which a lone peak of an acceleration is beyond what an impact makes beside its own ringing
+BEYOND = 10.0
 WORDS: dict[Reason, str] = {
     "outlier": "stand far off their neighbours",
     "repeated": "repeat the one before while the motion goes on",
@@ -97,6 +99,22 @@ def cleaned(record: Record) -> Cleaned:
         found.append(LeftOut(reason, int(bad.sum()), total, float(channel.time[bad][0]), limits))
         record = replace(record, output=replace(channel, time=channel.time[~bad], value=channel.value[~bad]))
     return Cleaned(record, tuple(found))
+
+
+def peak_note(record: Record) -> str | None:
+    """What to tell of lone peaks of an acceleration, which are kept, that are far beyond all that it is else; None where there are none."""
+    value = record.output.value
+    if record.output_kind != "acceleration" or not (peaks := outlying_samples(value)).any():
+        return None
+    span = float(np.ptp(value[~peaks]))
+    far = peaks & (np.abs(value - np.median(value)) > BEYOND * span)
+    if not far.any():
+        return None
+    first = float(record.output.time[far][0])
+    return (
+        f"output: {far.sum()} of {len(value)} samples stand far off, the first at t = {first:.6g} s with {value[far][0]:.6g}, where all "
+        f"others span {span:.3g} {record.output.unit}; they are kept, because an impact may be one; take out what a wire or a bit made"
+    )
 
 
 def cleaned_joints(records: Sequence[JointRecord]) -> tuple[list[JointRecord], tuple[str, ...]]:

@@ -15,6 +15,14 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 STARTS = (0, 512)  # bytes in front of it that are looked behind: MATLAB writes a header of its own there
 OF_MATLAB = "MATLAB_class"  # attribute by which MATLAB says what a dataset is
 NUMBERS = "fiub"  # kinds of data types
+OF_OBJECT = "MATLAB_object_decode"  # the same of an object, of which the dataset holds where it is kept, and no number of it
+# what MATLAB is told to write an object of a class as a table
+WRITTEN_BY = {
+    "Simulink.SimulationData.Dataset": "writetimetable(extractTimetable({name}), 'run.csv')",
+    "timeseries": "writetimetable(timeseries2timetable({name}), 'run.csv')",
+    "timetable": "writetimetable({name}, 'run.csv')",
+    "table": "writetable({name}, 'run.csv')",
+}
 REFERENCES = "#"  # with which MATLAB begins the names of the groups to which its structs and cells refer
 DEEPEST = 4  # structs and cells within one another that are looked into
 
@@ -43,18 +51,29 @@ def read_hdf5(path: Path) -> dict[str, NDArray[Any]]:
         reader = _Reader(largest(path.stat().st_size))
         with h5py.File(path, "r") as file:
             reader.take_all("", file)
+        if reader.objects and not reader.found:
+            raise ValueError(_complaint(reader.objects))
         return reader.found
 
     return dict(arrays_in_own_process(read, f"{path}: cannot be read as a table"))
 
 
+def _complaint(objects: dict[str, str]) -> str:
+    """Why a file of nothing but MATLAB's objects holds no table, and what to do."""
+    name, kind = next(iter(objects.items()))
+    written = WRITTEN_BY.get(kind, "").format(name=name)
+    mend = f"in MATLAB  {written}" if written else "in MATLAB save its numbers as arrays"
+    return f"{name!r} is an object of MATLAB's class {kind}, which no other program can read; {mend}"
+
+
 @dataclass
 class _Reader:
-    """Collects arrays by the path to them, of no more than `most` bytes."""
+    """Collects arrays by the path to them, of no more than `most` bytes, and the classes of MATLAB's objects."""
 
     most: int
     left: int = field(init=False)
     found: dict[str, NDArray[Any]] = field(default_factory=dict)
+    objects: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.left = self.most
@@ -73,6 +92,9 @@ class _Reader:
         import h5py
 
         if not isinstance(one, h5py.Dataset) or one.external or one.is_virtual:
+            return
+        if OF_OBJECT in one.attrs:
+            self.objects[name] = bytes(one.attrs.get(OF_MATLAB, b"")).decode(errors="replace")
             return
         of_matlab, refers = one.attrs.get(OF_MATLAB), h5py.check_ref_dtype(one.dtype) is h5py.Reference
         is_number = one.dtype.kind in NUMBERS and one.ndim in (1, 2) and of_matlab != b"char"

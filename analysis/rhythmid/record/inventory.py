@@ -133,7 +133,7 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
     count = _rows_of(columns)
     unequal = [(name, value) for name, value in columns if len(value) != count]
     columns = [(name, value) for name, value in columns if len(value) == count]
-    notes = length_notes(table, count)
+    notes = (*table.notes, *length_notes(table, count))
     if rate is not None:
         clock, reason, every = Clock("rate", rate=rate), "as given with --rate", np.arange(count) / rate
     else:

@@ -28,7 +28,8 @@ Mask = NDArray[np.bool_]
 
 
 def outlying_samples(value: Array) -> Mask:
-    """Whether samples (n,) stand far off the line that the samples before and after them make, at most three in a row.
+    """Whether samples (n,) stand far off the line that the samples before and after them make, at most three in a row; of the two
+    good ones on either side, the outer one may be missing at an end.
 
     A kink in the signal, such as an impact makes, changes the slope and is none; nor is what happens too often.
     """
@@ -39,14 +40,14 @@ def outlying_samples(value: Array) -> Mask:
     usual = USUAL * np.maximum(median_filter(uneven, NEAR), np.median(uneven))
     limit = FAR_OFF * np.maximum(np.concatenate([usual[:1], usual, usual[-1:]]), resolutions(value))
     for width in range(1, WIDEST + 1):
-        first = np.arange(2, len(value) - width - 1)  # between two good samples on either side
+        first = np.arange(1, len(value) - width)
         last = first + width
         slope = (value[last] - value[first - 1]) / (width + 1)
         off = np.stack([value[first + k] - value[first - 1] - slope * (k + 1) for k in range(width)])
         least = np.abs(off).min(axis=0)
-        bent = np.maximum(
-            np.abs(value[first - 1] - value[first - 2] - slope), np.abs(value[last + 1] - value[last] - slope)
-        )
+        bent = np.zeros(len(first))
+        bent[1:] = np.abs(value[first[1:] - 1] - value[first[1:] - 2] - slope[1:])
+        bent[:-1] = np.maximum(bent[:-1], np.abs(value[last[:-1] + 1] - value[last[:-1]] - slope[:-1]))
         lone = (least > limit[first]) & (bent < PASSING * least)
         for k in range(width):
             found[first[lone] + k] = True

@@ -168,7 +168,8 @@ def read_tables(signals: Signals) -> Record:
     name = table_name(signals.path)
     if name == "signals":
         name = signals.path.resolve().parent.name  # tells more
-    quality = Quality({}, notes=unit_notes(signals))
+    told = (note for table in tables.values() for note in table.notes)
+    quality = Quality({}, notes=(*unit_notes(signals), *told))
     clocks = {(source.file, source.clock(signals.time)) for source in signals.channels.values()}
     first = min((float(samples.time.min()) for samples in made.values() if len(samples.time)), default=0.0)
     if first >= CALENDAR:  # what is used of it is told from its first row on

@@ -17,6 +17,8 @@ ON_GRID = (
     0.99  # share of the steps between levels that are whole multiples, from which the levels lie on a grid
 )
 OFF = 0.05  # of a step, that a level on the grid may be off it
+# times the range of most samples, from which the others are no part of the signal: beyond it, steps of that range come near a hair
+FAR = 1e3
 BAND = 64  # levels next to each other in size whose own grid is sought: too many to be multiples of one step by chance
 BASES = (10.0, 2.0)  # of the digits that numbers are written with, or held in
 RUNG = 0.02  # of a step, that it may be off a power of the base times another one
@@ -56,18 +58,26 @@ def _resolution(value: Array) -> float:
     levels, count = np.unique(value, return_counts=True)
     if len(levels) < 2:
         return 0.0
-    step, on_grid = _grid(levels, float(np.ptp(value)))
+    step, on_grid = _grid(levels, _span(value))
     if step == 0.0 or on_grid.mean() > ON_GRID:
         return step
     common = levels[count > 1]  # a value that was not rounded hardly comes twice
     if len(common) < LEVELS:
         return 0.0
-    step, on_grid = _grid(common, float(np.ptp(value)))
+    step, on_grid = _grid(common, _span(value))
     if step == 0.0:
         return 0.0
     away = (value - common[np.argmax(count[count > 1])]) / step
     hit = np.abs(away - np.round(away)) < OFF
     return step if on_grid.mean() > ON_GRID and hit.mean() > ROUNDED else 0.0
+
+
+def _span(value: Array) -> float:
+    """The range of the values (n,); that of most of them where a few others are far beyond it, as where a bit fell over."""
+    span = float(np.ptp(value))
+    low, high = np.quantile(value, [0.5 * (1.0 - ROUNDED), 0.5 * (1.0 + ROUNDED)])
+    usual = float(high - low)
+    return usual if 0.0 < usual and FAR * usual < span else span
 
 
 def _bands(value: Array) -> tuple[Array, Array] | None:
@@ -80,7 +90,7 @@ def _bands(value: Array) -> tuple[Array, Array] | None:
     count = len(levels) // BAND
     if count < 2:
         return None
-    span = float(np.ptp(value))
+    span = _span(value)
     steps, least, largest = np.zeros(count), np.zeros(count), np.zeros(count)
     for k in range(count):
         band = levels[k * BAND : (k + 1) * BAND + 1]

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 LEAST_SAMPLES = 200  # of fewer an autocorrelation of 0.2 is within what chance makes
 SHARE = 0.2  # of the variance, up to which what lasts is not worth the name of a motion: it is half the size of the noise
 FLICKER = 3  # values in all, up to which the sensor shows its own steps up and down and no motion
+RARELY = 0.01  # share of the samples, up to which a value is an exception, such as a bit that fell over, and tells nothing of a motion
 FEW_STEPS = 16  # of the resolution from end to end, up to which a motion is of the size of the rounding
 AVERAGED = 8  # samples that a driver may average or hold, beyond which memory is the machine's, of a motion of that size
 WHITE = 2  # the same of a larger one, whose memory may be that of a machine that is damped well
@@ -36,18 +37,29 @@ def standstill(record: Record, buried: bool = True) -> str | None:
     value = record.output.value
     if len(value) < LEAST_SAMPLES or not np.all(np.isfinite(value)):
         return None
-    levels, span, step = len(np.unique(value)), float(np.ptp(value)), resolution(value)
+    span, step = float(np.ptp(value)), resolution(value)
     size = f"its {record.output_kind} moves by {span:.3g} {record.output.unit} in all"
-    if levels == 1:
-        return _sentence(f"its {record.output_kind} never changes")
-    if levels <= FLICKER:
-        return _sentence(f"{size}, between {levels} values that its sensor shows side by side")
+    levels, count = np.unique(value, return_counts=True)
+    if len(levels) <= FLICKER:
+        return _sentence(_flicker(levels, count, record))
     small = step > 0.0 and span <= FEW_STEPS * step
     if not (small or buried) or not _noise(value, step, AVERAGED if small else WHITE) or _driven(record):
         return None
     if small:
         return _sentence(f"{size}, {span / step:.0f} steps of its resolution, as noise does that is rounded")
     return _sentence(f"{size}, no different from white noise")
+
+
+def _flicker(levels: Array, count: NDArray[np.int64], record: Record) -> str:
+    """What an output of a few values shows, each of them so often: told by those that are no exception."""
+    what, unit = record.output_kind, record.output.unit
+    often = count > RARELY * count.sum()
+    rare = ", ".join(f"{one:.6g}" for one in levels[~often])
+    but = f" but for {count[~often].sum()} of {count.sum()} samples ({rare})" if rare else ""
+    if often.sum() == 1:
+        return f"its {what} never changes{but}"
+    span = float(np.ptp(levels[often]))
+    return f"its {what} moves by {span:.3g} {unit} in all{but}, between {often.sum()} values that its sensor shows side by side"
 
 
 def _sentence(why: str) -> str:

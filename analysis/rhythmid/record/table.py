@@ -21,7 +21,7 @@ from rhythmid.record.lfs_pointer import check_content
 from rhythmid.record.own_process import arrays_in_own_process
 from rhythmid.record.table_clock import is_called_time
 from rhythmid.record.text_file import COMPRESSED
-from rhythmid.record.text_table import TEXT, read_text
+from rhythmid.record.text_table import TEXT, text_table
 
 HDF5 = (".h5", ".hdf5")
 SUFFIXES = (".mat", *HDF5, ".npz", ".parquet", *JSON, *TEXT)
@@ -44,17 +44,18 @@ def table_suffix(path: Path) -> str:
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of one file by name, in order."""
+    """Columns of one file by name, in order, and what a user should know of how it was read, one line each."""
 
     path: Path
     columns: dict[str, Any]
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def load(cls, path: Path) -> "Table":
         """Read a table. Raises InputError when the file is missing, damaged or of an unknown kind."""
         readers = {
             ".mat": _mat, ".npz": _npz, ".parquet": _parquet, **dict.fromkeys(HDF5, read_hdf5), **dict.fromkeys(JSON, read_json),
-            **dict.fromkeys(TEXT, read_text),
+            **dict.fromkeys(TEXT, text_table),
         }  # fmt: skip
         read = readers.get(table_suffix(path))
         if read is None:
@@ -64,7 +65,9 @@ class Table:
             )
         try:
             check_content(path)
-            columns = with_joined_stamps(read(path))
+            found = read(path)
+            columns, notes = found if isinstance(found, tuple) else (found, ())
+            columns = with_joined_stamps(columns)
         except FileNotFoundError:
             raise InputError(f"{path}: no such file") from None
         except InputError:
@@ -79,6 +82,7 @@ class Table:
                 name: unwrapped(one) if is_called_time(name) else _upright(one)
                 for name, one in columns.items()
             },
+            notes,
         )
 
     def vectors(self) -> Iterator[tuple[str, NDArray[np.float64]]]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.record.clock_time import DAY
 from rhythmid.record.heading import heading_of
+from rhythmid.record.record import SHORTEST
 from rhythmid.record.signals import Clock
 
 Array = NDArray[np.float64]
@@ -104,6 +105,10 @@ def table_clock(
     if anew := [name for name, value in columns if _is_plain_time(name) and _begins_anew(value)]:
         raise InputError(
             f"{path}: {anew[0]!r} begins anew or goes back; take the recordings apart with  rhythmid split {path} --out runs"
+        )
+    if len(columns[0][1]) < SHORTEST:
+        raise InputError(
+            f"{path}: holds no recording: its columns have {len(columns[0][1])} values ({names})"
         )
     why = f"; of another length than their {len(columns[0][1])} rows: {others}" if others else ""
     raise InputError(

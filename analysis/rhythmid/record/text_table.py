@@ -16,6 +16,7 @@ import numpy as np
 from rhythmid.errors import InputError
 from rhythmid.record.broken_lines import unbroken
 from rhythmid.record.clock_time import seconds
+from rhythmid.record.labelled_rows import labels_of, read_labelled
 from rhythmid.record.list_cells import list_of, lists_of
 from rhythmid.record.lvm_head import lvm_head
 from rhythmid.record.text_cells import COMMENTS, cells_of, content, is_number, number_of
@@ -52,14 +53,23 @@ class Dialect:
 
 
 def read_text(path: Path) -> dict[str, Any]:
+    """The columns of a text table; errors as of `text_table`."""
+    return text_table(path)[0]
+
+
+def text_table(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Columns of a text table by name: float64[n] each, float64[n, k] where cells are lists, dates and times of day in seconds, text[n]
-    where a column holds words.
+    where a column holds words; and what a user should know of the file, one line each.
 
     Raises InputError where the file is empty, its names are not unique or do not belong to the rows; ValueError where a row
     is damaged.
     """
     with opened(path) as file:
         begin = list(islice(unbroken(file), LOOKED_AT))
+    if labels := labels_of(begin):
+        with opened(path) as file:
+            labelled = read_labelled(file, labels)
+        return dict[str, Any](labelled.columns), labelled.notes
     dialect, lvm = dialect_of(begin, str(path)), lvm_head(begin)
     with opened(path) as file:
         lines = islice(unbroken(file), dialect.first, None)
@@ -69,7 +79,7 @@ def read_text(path: Path) -> dict[str, Any]:
     numbers = numbers_of(rows, dialect.separator, dialect.decimal, dialect.numeric)
     unnamed = dialect.names == tuple(map(str, range(count)))
     if unnamed and not words and ACROSS * len(numbers) <= count:
-        return {str(place): row for place, row in enumerate(numbers)}
+        return {str(place): row for place, row in enumerate(numbers)}, ()
     found: dict[str, Any] = {
         dialect.names[place]: column for place, column in zip(dialect.numeric, numbers.T)
     }
@@ -78,7 +88,7 @@ def read_text(path: Path) -> dict[str, Any]:
         found |= {dialect.names[place]: _words([row[place] for row in cells], rows, place) for place in words}
     if lvm is not None and lvm.step > 0.0:
         found[dialect.names[0]] = lvm.times(len(rows))
-    return {name: found[name] for name in dialect.names}
+    return {name: found[name] for name in dialect.names}, ()
 
 
 def dialect_of(lines: list[str], name: str) -> Dialect:

@@ -5,7 +5,9 @@ from functools import cache
 
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Recorded
+from rhythmid.record.output_copy import SAME, doubt_of_copy
 from rhythmid.start.carried import surely_drives
+from rhythmid.start.copies import is_second_sensor
 from rhythmid.start.direction import COPY
 from rhythmid.start.known import Choice, Known
 from rhythmid.start.meaning import (
@@ -18,7 +20,17 @@ from rhythmid.start.meaning import (
     says_that_it_drives,
 )
 from rhythmid.start.no_motion import no_motion
-from rhythmid.start.relation import GOES_ALONG, HARDLY, RATIO, coherent, derivative, drives, follows, predicts
+from rhythmid.start.relation import (
+    GOES_ALONG,
+    HARDLY,
+    RATIO,
+    Follows,
+    coherent,
+    derivative,
+    drives,
+    follows,
+    predicts,
+)
 
 SURE_INTEGRAL = (
     0.98  # correlation from which a position and a velocity belong together, where no name says so
@@ -81,9 +93,9 @@ def by_data(one: Known, output: Recorded, measured: Quantity, velocity: Choice |
         targets.append(("velocity", velocity.recorded))
     for quantity, answer in targets:
         told = follows(one.one, answer)
-        later = told.lag > 0.0 or (told.lag == 0.0 and one.meaning.commanded is True)
-        if told.correlation > COPY and told.is_copy and later:
-            reason = f"the {quantity} follows it {1e3 * told.lag:.3g} ms later ({told.correlation:.2f} correlation)"
+        if told.correlation > COPY and told.is_copy and _leads(one, answer, told):
+            when = f"{1e3 * told.lag:.3g} ms later" if told.lag else "at once"
+            reason = f"the {quantity} follows it {when} ({told.correlation:.2f} correlation)"
             return one.taken_for(quantity, reason, commanded=True)
     if poses(one.one):
         told = follows(one.one, output)
@@ -91,13 +103,26 @@ def by_data(one: Known, output: Recorded, measured: Quantity, velocity: Choice |
         return one.taken_for(measured, reason, commanded=True)
     if one.meaning.base:
         return one.taken_for("position", "its name says that it is one of the base")
+    if one.meaning.commanded or says_that_it_drives(one.one):
+        return one.taken_for("effort", _coherence(one, output))
+    for quantity, answer in targets:
+        told = follows(one.one, answer)
+        if is_second_sensor(one.one, answer, told):
+            when = f"{-1e3 * told.lag:.3g} ms after it" if told.lag < 0.0 else "at once"
+            reason = f"a copy of {answer} ({told.correlation:.2f} correlation, {when})"
+            return one.taken_for(quantity, reason, commanded=False)
     return _driver(one, output)
+
+
+def _leads(one: Known, answer: Recorded, told: Follows) -> bool:
+    """Whether the answer comes later; at once it does where a name says so, or only the past of the one tells of the other."""
+    if told.lag != 0.0 or one.meaning.commanded:
+        return told.lag >= 0.0
+    return surely_drives(one.one, answer, predicts(one.one, answer), predicts(answer, one.one))
 
 
 def _driver(one: Known, output: Recorded) -> Known:
     """What drives, where its name, its coherence with the output or its past says so; else what it was."""
-    if one.meaning.commanded or says_that_it_drives(one.one):
-        return one.taken_for("effort", _coherence(one, output))
     letter = meaning_of(one.one).quantity
     if letter == "position" and differ_in_number(one.one, output):
         return one  # a second joint or sensor
@@ -111,17 +136,21 @@ def _driver(one: Known, output: Recorded) -> Known:
         return one
     if letter == "position" and letter_of(one.one) == letter_of(output):
         return one.taken_for("position", f"a motion that goes with the output: {reason}").of_base()
-    doubt = (
-        ""
-        if share >= GOES_ALONG
-        else f"no name says that it drives, and its coherence with the output is {share:.2f} only: {OR_ELSE}"
-    )
+    told = follows(one.one, output)
+    if told.lag == 0.0 and abs(told.correlation) > SAME:
+        doubt = f"no name says that it drives, and {doubt_of_copy(told.correlation)}"
+    elif share < GOES_ALONG:
+        doubt = (
+            f"no name says that it drives, and its coherence with the output is {share:.2f} only: {OR_ELSE}"
+        )
+    else:
+        doubt = ""
     return one.taken_for("effort", reason).doubted(doubt)
 
 
 def _coherence(one: Known, output: Recorded) -> str:
     share = coherent(one.one, output)
-    return f"no motion is a copy of it, and it is coherent with the output (coherence {share:.2f})"
+    return f"it is not told to be a motion, and is coherent with the output (coherence {share:.2f})"
 
 
 def note_of_unknown(unknown: Sequence[Known], output: Recorded) -> str:

@@ -1,5 +1,6 @@
 """What drives the machine: efforts, a forcing, a reference, or the motion of its base."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from rhythmid.record.inventory import Recorded
@@ -7,8 +8,18 @@ from rhythmid.record.signals import InputKind
 from rhythmid.start.direction import COPY, doubt_of_direction
 from rhythmid.start.force_unit import doubt_of_units, matching, of_one_unit
 from rhythmid.start.known import Ask, Choice, Known, chosen, pick, ranked_by_worth, strongest
-from rhythmid.start.meaning import Quantity, meaning_of, says_base
+from rhythmid.start.meaning import Quantity, meaning_of, says_base, says_it_was_read
 from rhythmid.start.relation import HARDLY, coherent, follows
+
+SAYS_READ = "its name says that it was read from a sensor"
+
+
+def not_read(left: Sequence[str]) -> str:
+    """What to tell where an effort was preferred to others, by name, because of what its own name says."""
+    listed = ", ".join(left)
+    return (
+        f"{SAYS_READ}, and that of {listed} does not: where one of those is the machine's effort, put it here"
+    )
 
 
 def drivers(
@@ -88,12 +99,16 @@ def _driving(able: list[Known], output: Recorded, reason: str, ask: Ask) -> Choi
     """Of several efforts the one that goes best with the output."""
     if len(able) == 1:
         return chosen(able[0], f"{reason}: {able[0].meaning.reason}")
-    ranked = ranked_by_worth([(coherent(one.one, output) + 1e-9, one) for one in able])
+    read = [one for one in able if says_it_was_read(one.one)] or able
+    ranked = ranked_by_worth([(coherent(one.one, output) + 1e-9, one) for one in read])
     best = ranked[pick("What drives the machine (input)?", ranked, ask)][1]
     picked = next(one for one in able if one.one is best)
-    others = [one for _, one in ranked if one is not best]
+    others = [one.one for one in sorted(able, key=lambda one: one not in read) if one is not picked]
     along = f"of those it goes best with the output (coherence {coherent(best, output):.2f})"
-    return chosen(picked, f"{reason}: {picked.meaning.reason}; {along}", others)
+    along = along if len(read) > 1 else SAYS_READ
+    choice = chosen(picked, f"{reason}: {picked.meaning.reason}; {along}", others)
+    left = [str(one.one) for one in able if one not in read]
+    return replace(choice, doubts=(*choice.doubts, not_read(left))) if left else choice
 
 
 def _commanded_and_measured(
@@ -131,6 +146,7 @@ def _reference(rest: list[Known], output: Recorded, measured: Quantity) -> tuple
             reason = f"a {quantity} that was asked for: {why}"
             if quantity == measured:
                 when = f"{1e3 * abs(told.lag):.3g} ms {'earlier' if told.lag < 0.0 else 'later'}"
+                when = when if told.lag else "at once"
                 reason += f"; the output follows it {when} ({told.correlation:.2f} correlation)"
             doubt = doubt_of_direction(ranked[0][1], output) if quantity == measured else ""
             others = tuple(one for _, one in ranked[1:])

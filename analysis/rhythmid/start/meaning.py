@@ -17,8 +17,10 @@ WORDS: dict[Quantity, frozenset[str]] = {
         "position positions pos angle angles theta phi psi alpha pose height distance displacement disp deflection extension "
         "length travel rotation".split()
     ),
-    "velocity": frozenset("velocity velocities vel speed rate omega twist dq qd qdot thetadot dtheta xdot dx angvel".split()),
-    "acceleration": frozenset("acceleration accelerations accel acc ddq qdd xddot ddx".split()),
+    "velocity": frozenset("velocity velocities vel speed rate omega twist dq qd qdot thetadot dtheta xdot dx angvel gyro gyr gyroscope".split()),
+    "acceleration": frozenset(
+        "acceleration accelerations accel accl acceler acc linacc ddq qdd xddot ddx accelerometer".split()
+    ),
     "effort": frozenset(
         "effort efforts torque torques tor torq tau force forces wrench current currents cur voltage volt volts pwm duty trq "
         "moment iq".split()
@@ -39,13 +41,18 @@ COMMANDED = frozenset(
     "request requested".split()
 )
 COMMANDED_LETTERS = frozenset("u r".split())
+# a controller's output, of an effort; the short ones of a force are a contact's and a centre's
+CONTROLLED = frozenset("controller control ctrl contr ctl".split())
+CONTROLLED_SHORT = frozenset("con ctr".split())
 COMMANDED_COLUMNS = frozenset(
     "action actions".split()
 )  # what a policy asked for; of a topic it is a ROS action
 MEASURED = frozenset(
-    "meas measured act actual state states observation feedback fb est estimated present real raw filt filtered smoothed response "
+    "meas measured sensed act actual state states observation feedback fb est estimated present real raw filt filtered smoothed response "
     "encoder encoders enc".split()
 )
+# a reading of a sensor, of several efforts the one of the machine: not one that was filtered, estimated or modelled
+READ = frozenset("meas measured act actual feedback fb present sensed".split())
 PLACES = frozenset(
     "motor load link gear rotor shaft sensor imu camera vicon mocap optitrack laser lidar".split()
 )
@@ -57,6 +64,7 @@ SHAKEN = frozenset(
     "excitation exc shaking vibration".split()
 )  # a motion that is called so is one of the base
 DRIVING = frozenset("input in stimulus ctrl control drive".split())  # what drives, where no quantity is said
+FORCES = frozenset("force forces wrench".split())  # of a contact as well as of an actuator
 GENERIC = frozenset(
     "dof joint joints motor data robot array value values actuator axis trajectory controller controllers in out input output".split()
 )
@@ -104,7 +112,8 @@ def meaning_of(one: Recorded) -> Meaning:
     commanded: bool | None = None
     of_column = set() if one.topic else set(near) & COMMANDED_COLUMNS
     letters = set() if one.topic or certain else set(near) & COMMANDED_LETTERS
-    if asked := (every & COMMANDED) | of_column | letters:
+    of_controller = _controlled(one, near) if quantity == "effort" and certain else set[str]()
+    if asked := (every & COMMANDED) | of_column | letters | of_controller:
         commanded = True
         reason += f"; {_one(near + far, asked)!r} says that it was asked for"
     elif every & MEASURED or one.type in (
@@ -195,6 +204,20 @@ def letter_of(one: Recorded) -> str:
     return letters[0] if letters else ""
 
 
+def doubt_of_letter(one: Recorded) -> str:
+    """What is doubtful about a quantity that one letter of a name stands for, beside words that nothing is known of; empty where none is.
+
+    A joint's name is such a word, too.
+    """
+    if meaning_of(one).certain or not (letter := letter_of(one)):
+        return ""
+    unknown = [word for word in words_of(joint_of_column(one.said)) if len(word) > 1 and not word.isdigit()]
+    if not unknown or one.topic:
+        return ""
+    listed = ", ".join(map(repr, unknown))
+    return f"the letter {letter!r} is all that says it, beside {listed}, which is a joint's name or something else: set kind and unit"
+
+
 def differ_in_number(one: Recorded, other: Recorded) -> bool:
     """Whether two names differ in a number only, as those of two joints or sensors do."""
     first, second = ([word for word in words_of(each.said) if not word.isdigit()] for each in (one, other))
@@ -218,6 +241,20 @@ def same_joint(one: str, other: str) -> bool:
 def says_who_asks(one: Recorded) -> bool:
     """Whether a word of its name says that it was asked for, or that it was measured."""
     return bool({*words_of(one.said), *words_of(one.topic)} & (COMMANDED | MEASURED))
+
+
+def says_it_was_read(one: Recorded) -> bool:
+    """Whether a word of its name says that a sensor read it."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & READ)
+
+
+def _controlled(one: Recorded, near: list[str]) -> set[str]:
+    """Words of an effort's name that say that a controller made it; none where one says that it was read."""
+    words = set(near)
+    if words & READ:
+        return set()
+    of_force = bool(words & FORCES) or one.unit == "N"
+    return words & (CONTROLLED if of_force else CONTROLLED | CONTROLLED_SHORT)
 
 
 def _quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity | None, str, bool]:
@@ -257,6 +294,7 @@ def joint_of_column(said: str, side: str = "", names: Collection[str] = ()) -> s
     known = (
         COMMANDED
         | COMMANDED_COLUMNS
+        | CONTROLLED
         | MEASURED
         | GENERIC
         | FORCING
@@ -265,5 +303,8 @@ def joint_of_column(said: str, side: str = "", names: Collection[str] = ()) -> s
         | DRIVING
         | frozenset().union(*WORDS.values(), DEVICES, LETTERS)
     )
-    left = [word for word in words_of(said) if word in names or word not in known]
+    words = words_of(said)
+    if set(words) & (WORDS["effort"] - FORCES):
+        known |= CONTROLLED_SHORT
+    left = [word for word in words if word in names or word not in known]
     return "_".join([*([side] if side else []), *left])

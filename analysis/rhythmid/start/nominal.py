@@ -261,7 +261,8 @@ def _servo_law(records: Sequence[Record], of: str) -> Law:
     fallback = Law({"gain": usual**2 if of == "position" else usual, "velocity": 1.4 * usual}, 1.0)
     try:
         rows = Rows.of(as_force, _bare(TRANSLATIONAL))
-        names = ["acceleration", "velocity", *(["position"] if of == "position" else []), "constant"]
+        names = ["acceleration", "velocity", *(["position"] if of == "position" else [])]
+        names += [] if rows.steady else ["constant"]  # which alone balances a reference that never changes
         law = rows.fit(names, rows.delay(names))
     except InputError:
         return fallback

@@ -147,6 +147,32 @@ def predicts(cause: Recorded, effect: Recorded) -> float:
     return gain * rows / LAGS
 
 
+def lead(cause: Recorded, effect: Recorded) -> tuple[float, float]:
+    """By how much [s] the one comes before the other, as far as that is less than its periods, and the standard error of that.
+
+    The one is fitted by a multiple k of the other and d of its rate, and d/k is told. What drives a machine of stiffness k and damping d
+    comes before its motion by that; a filter's output comes after what it is of. Errors are of the spread between parts of the record.
+    """
+    period, u, y = together(cause, effect)
+    parts = [
+        _lead_of(*part, period) for part in zip(np.array_split(u, SEGMENTS), np.array_split(y, SEGMENTS))
+    ]
+    found = np.array([one for one in parts if one is not None])
+    if len(found) < 2:
+        return 0.0, math.inf
+    return float(found.mean()), float(found.std(ddof=1) / math.sqrt(len(found)))
+
+
+def _lead_of(u: Array, y: Array, period: float) -> float | None:
+    """Rate's over value's coefficient [s] of `u` as a law of `y`; None where there is none."""
+    if len(u) < LAGS or np.ptp(y) == 0.0:
+        return None
+    rate = (y[2:] - y[:-2]) / (2.0 * period)
+    columns = np.column_stack([y[1:-1], rate, np.ones(len(rate))])
+    k, d, _ = np.linalg.lstsq(columns, u[1:-1], rcond=1e-10)[0]
+    return float(d / k) if k else None
+
+
 def goes_along(one: Recorded, other: Recorded) -> bool:
     """Whether a channel plainly has to do with another one: by coherence, or as what helps to predict it."""
     return coherent(one, other) >= GOES_ALONG or predicts(one, other) >= SURE

@@ -6,7 +6,7 @@ asked for the references.
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,8 +18,9 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Inventory, header_clock, inventory
 from rhythmid.record.joint_record import JointSignals, load_joint_records
+from rhythmid.start.drivers import not_read
 from rhythmid.start.families import Family, families_of, joints_of
-from rhythmid.start.meaning import Quantity, meaning_of
+from rhythmid.start.meaning import Quantity, meaning_of, says_it_was_read
 from rhythmid.start.written import GUESSED, comment, time_of
 
 LITTLE = 0.02  # share of the effort that a first guess of the viscous damping takes
@@ -64,9 +65,12 @@ def start_robot(
             f"its joints: {', '.join(robot.joints)}"
         )
     joints = joints_of(list(robot.joints), list(output.members), output.told)
-    effort = _beside(families, "effort", False, output)
+    effort, others = _effort(families, output)
     reference = _beside(families, "position", True, output)
-    forward = _beside(families, "effort", True, output) if reference is not None else None
+    command = _beside(families, "effort", True, output)
+    forward = command if reference is not None else None
+    if effort is None and reference is None:
+        effort = command
     if effort is None and reference is None:
         raise InputError(
             f"{found.path}: neither efforts nor references of {', '.join(output.members)} are among "
@@ -78,7 +82,8 @@ def start_robot(
         for role, one in (("effort", effort), ("input", reference))
         if one
     ]
-    signals, doubts = _signals(found, joints, output, effort, reference, forward)
+    of_effort = _doubts_of_effort(effort, others, command)
+    signals, doubts = _signals(found, joints, output, effort, reference, forward, of_effort)
     records = load_joint_records(sources, JointSignals.from_text(signals, GUESSED))
     speeds = {
         name: float(np.std(np.gradient(one.output.value, one.output.time)))
@@ -112,14 +117,48 @@ def _chosen(
 
 def _beside(families: Sequence[Family], quantity: Quantity, commanded: bool, output: Family) -> Family | None:
     """The first family of this quantity that has every joint of the output's; a command of which nothing more is said is a position."""
+    return next(_all_beside(families, quantity, commanded, output), None)
+
+
+def _all_beside(
+    families: Sequence[Family], quantity: Quantity, commanded: bool, output: Family
+) -> Iterator[Family]:
     of = (quantity, None) if commanded and quantity == "position" else (quantity,)
-    fits = (
+    yield from (
         one
         for one in families
         if one is not output and one.quantity in of and one.commanded == commanded
         and set(one.members) >= set(output.members)
     )  # fmt: skip
-    return next(fits, None)
+
+
+def _effort(families: Sequence[Family], output: Family) -> tuple[Family | None, list[Family]]:
+    """The effort that was not asked for, one that a sensor read before others, and the others."""
+    able = sorted(
+        _all_beside(families, "effort", False, output), key=lambda one: not says_it_was_read(one.first)
+    )
+    return (able[0] if able else None), able[1:]
+
+
+def _doubts_of_effort(effort: Family | None, others: Sequence[Family], command: Family | None) -> list[str]:
+    """What is doubtful about the choice among several efforts."""
+    if effort is None:
+        return []
+    if effort is command:
+        return [
+            "effort: no other one was recorded than what the actuators were asked for, which they may not have made"
+        ]
+    doubts: list[str] = []
+    if others:
+        listed = [one.pattern for one in others]
+        why = not_read(listed) if says_it_was_read(effort.first) else f"{', '.join(listed)} may be it as well"
+        doubts.append(f"effort: {why}")
+    if command is not None:
+        doubts.append(
+            f"effort: {command.pattern} is what the actuators were asked for; {effort.pattern} is taken, because the balance of forces needs "
+            "what they made"
+        )
+    return doubts
 
 
 def _line(role: str, one: Family, bag: bool, joints: Mapping[str, str]) -> str:
@@ -134,6 +173,7 @@ def _signals(
     effort: Family | None,
     reference: Family | None,
     forward: Family | None,
+    of_effort: Sequence[str],
 ) -> tuple[str, list[str]]:
     """The text of signals.yaml, and what is doubtful about it."""
     bag, doubts = found.is_bag, list[str]()
@@ -165,8 +205,10 @@ def _signals(
         doubts.append(
             "effort: whether it was recorded before the actuator or at the joint, and as a mean or at an instant, is not told"
         )
+        doubts += of_effort
         lines += [
-            "", *comment("taken: after_actuator where a sensor at the joint measures it. sampled: mean, or instant where it was read when the reference jumps."),
+            "", *(line for doubt in of_effort for line in comment(f"CHECK {doubt}.")),
+            *comment("taken: after_actuator where a sensor at the joint measures it. sampled: mean, or instant where it was read when the reference jumps."),
             f"effort: {{{effort.channel(bag)}, taken: before_actuator}}",
         ]  # fmt: skip
     return "\n".join(lines) + "\n", doubts

@@ -12,14 +12,22 @@ from rhythmid.record.signals import InputKind, OutputKind
 from rhythmid.record.standstill import FLICKER
 from rhythmid.start.by_data import by_data, note_of_unknown, output_by_data
 from rhythmid.start.carried import carried_motion
-from rhythmid.start.copies import copies_output, note_of_copy
+from rhythmid.start.copies import copies_output, note_of_copy, note_of_sensor
 from rhythmid.start.direction import by_direction, notes_of_other_joints
 from rhythmid.start.drivers import drivers
 from rhythmid.start.joint import Joint, joint_of
 from rhythmid.start.known import Ask, Choice, Known, pick, ranked_by_worth
-from rhythmid.start.meaning import Quantity, is_ignored, is_lone_v, meaning_of, rotary_of, says_who_asks
+from rhythmid.start.meaning import (
+    Quantity,
+    doubt_of_letter,
+    is_ignored,
+    is_lone_v,
+    meaning_of,
+    rotary_of,
+    says_who_asks,
+)
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along
-from rhythmid.start.step_before import BEFORE, step_before
+from rhythmid.start.step_before import BEFORE, set_point_before, step_before
 from rhythmid.start.unnamed_reference import with_reference
 from rhythmid.start.unsigned_effort import without_unsigned
 
@@ -82,7 +90,11 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     notes += told
     rest, told = without_unsigned(rest, output.recorded, measured)
     notes += told
-    rest = [by_data(one, output.recorded, measured, velocity) for one in rest]
+    told_by_data = [(one, by_data(one, output.recorded, measured, velocity)) for one in rest]
+    notes += [
+        note_of_sensor(now) for was, now in told_by_data if was is not now and now.meaning.commanded is False
+    ]
+    rest = [now for _, now in told_by_data]
     more, kind, reference_of = drivers(rest, output.recorded, measured, ask)
     if carried is not None:
         reason = f"a motion that drives {carried.driven}, and nothing else drives"
@@ -90,6 +102,10 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     step = None if more else step_before(found.constant, chosen)
     if step is not None:
         more = {"input": Choice(step, "the only effort, and nothing else drives", doubts=(BEFORE,))}
+    if not more and (step := set_point_before(found.constant, chosen, output.recorded, measured)) is not None:
+        reason = f"a {measured} that was asked for, to which the output goes, and nothing else drives"
+        more = {"input": Choice(step, reason, doubts=(BEFORE,))}
+        kind, reference_of = "reference", measured
     choices |= {role: _doubted(choice, copies) for role, choice in more.items()}
     if not more:
         rest, told = with_reference(own, rest)
@@ -199,7 +215,10 @@ def _output(known: list[Known], ask: Ask, place: str) -> tuple[Choice, list[Know
             if len(able) > 1:
                 reason += "; of those it moves most"
             others = tuple(one for _, one in ranked if one is not picked)
-            return Choice(picked, f"a measured {quantity}: {reason}", others), known
+            doubt = doubt_of_letter(picked)
+            return Choice(
+                picked, f"a measured {quantity}: {reason}", others, (doubt,) if doubt else ()
+            ), known
     able = [one for one in known if one.quantity in (None, "position") and not one.meaning.forcing]
     measured = [one for one in able if one.meaning.commanded is not True and not one.meaning.base]
     return output_by_data(measured or able, known, place)

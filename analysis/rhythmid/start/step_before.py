@@ -1,4 +1,4 @@
-"""A step of the effort that was made as a record began: it stands still for the whole record."""
+"""A step that was made as a record began, of the effort or of what was asked for: it stands still for the whole record."""
 
 from collections.abc import Sequence
 
@@ -6,9 +6,11 @@ import numpy as np
 
 from rhythmid.record.inventory import Recorded
 from rhythmid.start.joint import Joint
-from rhythmid.start.meaning import meaning_of
+from rhythmid.start.meaning import Quantity, meaning_of
 
 BEFORE = "it never changes: taken for a step that was made as the record began; without it, delete this input"
+# of the way from where the output begins to a set point, that it keeps at most from the set point afterwards, rms: else it does not go there
+LEFT = 0.5
 
 
 def step_before(constant: Sequence[Recorded], joint: Joint) -> Recorded | None:
@@ -18,6 +20,26 @@ def step_before(constant: Sequence[Recorded], joint: Joint) -> Recorded | None:
         if (meaning := meaning_of(one)).quantity == "effort" and meaning.certain and joint.includes(one, meaning) and _is_known(one)
     ]  # fmt: skip
     return efforts[0] if len(efforts) == 1 else None
+
+
+def set_point_before(
+    constant: Sequence[Recorded], joint: Joint, output: Recorded, measured: Quantity
+) -> Recorded | None:
+    """The one set point of the output, among what stands still, to which the output goes from elsewhere; None where there is none or
+    several."""
+    asked = [
+        one for one in constant
+        if (meaning := meaning_of(one)).quantity == measured and meaning.commanded and meaning.certain
+        and joint.includes(one, meaning) and np.isfinite(one.value).all() and _goes_to(output, float(one.value[0]))
+    ]  # fmt: skip
+    return asked[0] if len(asked) == 1 else None
+
+
+def _goes_to(output: Recorded, wanted: float) -> bool:
+    """Whether an output begins far from this value and is near it afterwards, in the second half of its samples."""
+    value = output.value[np.isfinite(output.value)]
+    after = value[len(value) // 2 :] - wanted
+    return bool(float(np.sqrt(np.mean(after**2))) < LEFT * abs(float(value[0]) - wanted))
 
 
 def _is_known(one: Recorded) -> bool:

@@ -1,0 +1,54 @@
+"""A set point that never changes is a step that was made as the record began, where the output goes to it from elsewhere."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rhythmid.start.start import guess, start
+
+TIME = np.arange(1500) * 0.01
+NOISE = np.random.default_rng(1).standard_normal(len(TIME))
+RISE = 1.0 - np.exp(-TIME / 0.3)
+
+
+def log(folder: Path, **columns: np.ndarray) -> Path:
+    np.savez(folder / "run.npz", t=TIME, **columns)
+    return folder / "run.npz"
+
+
+@pytest.mark.parametrize(
+    ("asked", "output", "kind"),
+    [("setpoint_rpm", "actual_rpm", "velocity"), ("target_position", "position", "position"), ("speed_ref", "speed", "velocity")],
+)  # fmt: skip
+def test_a_constant_set_point_drives_a_machine_that_starts_away_from_it(tmp_path, asked, output, kind):
+    columns = {asked: np.full(len(TIME), 100.0), output: 95.0 * RISE + NOISE}
+    found = guess(log(tmp_path, **columns))
+    roles = found.roles
+    assert {role: str(one.recorded) for role, one in roles.choices.items()} == {
+        "output": output,
+        "input": asked,
+    }
+    assert (roles.input_kind, roles.reference_of, roles.output_kind) == ("reference", kind, kind)
+    assert any(line.startswith("CHECK input: it never changes: taken for a step") for line in found.lines())
+
+
+def test_the_gain_of_a_step_is_told_by_how_fast_the_speed_rises(tmp_path):
+    path = log(tmp_path, speed_ref=np.full(len(TIME), 10.0), speed=10.0 * RISE + 0.01 * NOISE)
+    assert start([path]).nominal.model.value("velocity_control.gain") == pytest.approx(1.0 / 0.3, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    "speed", [100.0 + NOISE, 500.0 * RISE + NOISE, -90.0 * RISE], ids=["there", "past it", "from it"]
+)
+def test_a_set_point_to_which_the_output_does_not_go_drives_nothing(tmp_path, speed):
+    assert set(guess(log(tmp_path, speed_ref=np.full(len(TIME), 100.0), speed=speed)).roles.choices) == {
+        "output"
+    }
+
+
+def test_an_effort_that_changes_comes_before_a_set_point_that_does_not(tmp_path):
+    path = log(
+        tmp_path, speed_ref=np.full(len(TIME), 100.0), speed=95.0 * RISE + NOISE, torque=np.exp(-TIME / 0.3)
+    )
+    assert str(guess(path).roles.choices["input"].recorded) == "torque"
