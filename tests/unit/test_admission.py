@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from machines import SHORT, hopper, records
-from rhythmid.diagnose.admission import admitted, check_comparable, check_driven
+from rhythmid.diagnose.admission import admitted, check_driven
 from rhythmid.errors import InputError
+from rhythmid.identify.comparable import check_comparable
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record

@@ -131,6 +131,10 @@ def test_an_exported_leg_in_a_loop_of_mujocos_own_is_nearer_to_the_recording_wit
             ["identify", "{bag}", "--model", "{leg}", "--signals", SIGNALS, "--htf", "auto"],
             "--htf is for a machine of one axis",
         ),
+        (
+            ["identify", "{bag}", "--model", "{leg}", "--signals", "{signals}", "--holdout", "{bag}"],
+            "rough: is fitted and held out",
+        ),
         (["export", "{leg}", "--to", "sdf", "--out", "{new}"], "is written as mujoco or urdf"),
         (["export", "{leg}", "--to", "urdf", "--out", "{new}"], "a file that ends in .urdf"),
         (["simulate", "{leg}", "--experiment", "{wrong}", "--out", "{new}"], "the joint 'ankle' has no path"),

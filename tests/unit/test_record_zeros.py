@@ -143,7 +143,8 @@ force:
 @pytest.mark.parametrize("zero", [0.0, 0.2, 3.1])
 def test_a_held_out_record_that_was_zeroed_elsewhere_is_told(text, zero):
     machine = Model.from_text(text, catalogue=CATALOGUE)
-    answer = diagnose(decays(machine, {"first": 0.0}), machine, decays(machine, {"held": zero}), FRICTION)
+    fitted, held = decays(machine, {"first": 0.0, "held": zero})
+    answer = diagnose(fitted, machine, held, FRICTION)
     told = [note for note in answer.diagnosis.notes if "zero of the held-out held" in note]
     assert len(told) == (zero != 0.0)
     for note in told:

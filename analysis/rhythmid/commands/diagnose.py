@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rhythmid.commands import machines
-from rhythmid.commands.options import Bags, Elements, JsonFile, Quiet, ReportFile, SignalsFile, command_line
+from rhythmid.commands.options import (
+    Bags,
+    Elements,
+    Holdout,
+    JsonFile,
+    Quiet,
+    ReportFile,
+    SignalsFile,
+    command_line,
+)
 from rhythmid.commands.terminal import Terminal
 from rhythmid.errors import InputError
 from rhythmid.output import require_new, write_json
@@ -43,10 +52,7 @@ def diagnose(
             help="signals.yaml for --sim; by default that of --signals, else rhythmid's own topics.",
         ),
     ] = None,
-    holdout: Annotated[
-        list[Path] | None,
-        typer.Option("--holdout", help="Held-out records: used to judge, never to fit. May be repeated."),
-    ] = None,
+    holdout: Holdout = None,
     elements: Elements = None,
     json: JsonFile = None,
     report: ReportFile = None,

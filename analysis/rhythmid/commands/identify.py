@@ -6,13 +6,22 @@ from typing import Annotated, cast, get_args
 import typer
 
 from rhythmid.commands import machines
-from rhythmid.commands.options import Bags, Elements, JsonFile, Quiet, ReportFile, SignalsFile, command_line
+from rhythmid.commands.options import (
+    Bags,
+    Elements,
+    Holdout,
+    JsonFile,
+    Quiet,
+    ReportFile,
+    SignalsFile,
+    command_line,
+)
 from rhythmid.commands.terminal import Terminal
 from rhythmid.output import require_new, write_json
 
 EXAMPLES = (
     "rhythmid identify bag --model model.yaml",
-    "rhythmid identify a b --signals signals.yaml --model model.yaml --report page.html",
+    "rhythmid identify a b --signals signals.yaml --model model.yaml --holdout c --report page.html",
     "rhythmid identify bag --quiet --json -",
 )
 
@@ -24,6 +33,7 @@ def identify(
         typer.Option("--model", help="Model file of the machine; the paper's hopper by default."),
     ] = None,
     signals: SignalsFile = None,
+    holdout: Holdout = None,
     elements: Elements = None,
     json: JsonFile = None,
     report: ReportFile = None,
@@ -85,7 +95,9 @@ def identify(
             report=report, save=save, forcing=forcing, clock_offset=clock_offset, clock_offset_std=clock_offset_std,
             method=method, htf=htf,
         )  # fmt: skip
-        machines.identify_files(bags, model, signals, elements or (), json, save_model, Terminal(quiet, json))
+        machines.identify_files(
+            bags, model, signals, holdout or (), elements or (), json, save_model, Terminal(quiet, json)
+        )
         return
     method, htf = method or "joint", htf or "auto"
     if method not in get_args(Method):
@@ -103,6 +115,7 @@ def identify(
     terminal = Terminal(quiet, json)
     with progress(terminal.progress) as tell:
         records = load_records(bags, signals, tell)
+        unseen = load_records(holdout or (), signals, tell)
         path = "clock_unknown" if offset is not None else cast(Forcing | None, forcing)
         found = find(
             records,
@@ -112,6 +125,7 @@ def identify(
             offset=offset,
             htf=cast(HtfMethod, htf),
             tell=tell,
+            holdout=unseen,
         )
     found.show(terminal.answer)
     if json is not None:

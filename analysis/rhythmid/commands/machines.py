@@ -47,6 +47,12 @@ def _signals(bags: Sequence[Path], signals: Path | None) -> Path:
     raise InputError("a machine of several joints needs --signals: a signals.yaml with  joints: [hip, knee]")
 
 
+def _held_out(holdout: Sequence[Path], bags: Sequence[Path], signals: Path | None) -> "list[JointRecord]":
+    from rhythmid.record.joint_record import load_joint_records
+
+    return load_joint_records(holdout, _signals(bags, signals)) if holdout else []
+
+
 def refuse(**given: object) -> None:
     """Raise InputError for options that have no meaning for several joints."""
     for name, value in given.items():
@@ -70,11 +76,10 @@ def diagnose_files(
     from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
     from rhythmid.elements.catalogue import load_catalogue
     from rhythmid.progress_bar import progress
-    from rhythmid.record.joint_record import load_joint_records
 
     catalogue = load_catalogue(elements)
     machine, records = loaded(model, catalogue, bags, signals)
-    unseen = load_joint_records(holdout, _signals(bags, signals)) if holdout else []
+    unseen = _held_out(holdout, bags, signals)
     with progress(terminal.progress, budget) as tell:
         answer = diagnose_machine(records, machine, unseen, catalogue, tell, budget)
     answer.show(terminal.answer)
@@ -121,6 +126,7 @@ def identify_files(
     bags: Sequence[Path],
     model: Path,
     signals: Path | None,
+    holdout: Sequence[Path],
     elements: Sequence[Path],
     json: Path | None,
     save_model: Path | None,
@@ -132,8 +138,9 @@ def identify_files(
     from rhythmid.progress_bar import progress
 
     machine, records = loaded(model, load_catalogue(elements), bags, signals)
+    unseen = _held_out(holdout, bags, signals)
     with progress(terminal.progress) as tell:
-        found = identify_machine(records, machine, tell=tell)
+        found = identify_machine(records, machine, unseen, tell)
     found.show(terminal.answer)
     if json is not None:
         write_json(json, found.to_dict())

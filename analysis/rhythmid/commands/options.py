@@ -19,6 +19,10 @@ JsonFile = Annotated[
 ]
 ReportFile = Annotated[Path | None, typer.Option("--report", help="Write a self-contained HTML page.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Holdout = Annotated[
+    list[Path] | None,
+    typer.Option("--holdout", help="Held-out records: used to judge, never to fit. May be repeated."),
+]
 Elements = Annotated[
     list[Path] | None, typer.Option("--elements", help="Folder with elements of your own; may be repeated.")
 ]

@@ -1,17 +1,16 @@
 """Which records a diagnosis can use: what does not say where the machine was is left out, what drives the machine has to be known, and
 records of one diagnosis have to come from one machine in one set of units."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.errors import InputError
+from rhythmid.identify.comparable import check_comparable
 from rhythmid.identify.drive import drive_of, driven
 from rhythmid.identify.moving import moving
-from rhythmid.identify.series import Series, prepare
+from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.gaps import cut_at_gaps
@@ -93,26 +92,3 @@ def check_driven(records: Sequence[Record], model: Model) -> str | None:
     if forced and all(record.input is None for record in records):
         return "no record has an input channel: if anything but the forcing drove the machine, it counts as missing physics here"
     return None
-
-
-def check_comparable(series: Sequence[Series]) -> None:
-    """Raise InputError when records cannot come from one machine in one set of units.
-
-    How much they vary tells the unit. Their levels alone do not: counters of many turns and encoders that were zeroed elsewhere
-    differ in them by any amount, which `record_zeros` estimates.
-    """
-    spread = [float(np.std(one.averaged)) for one in series]
-    level = [float(np.mean(one.averaged)) for one in series]
-    for one in series:
-        if np.ptp(one.averaged) == 0.0:
-            raise InputError(f"{one.name}: the output never changes; nothing can be learnt from it")
-    for i, one in enumerate(series):
-        for j in range(i):
-            decades = [abs(math.log10(max(abs(a), 1e-300) / max(abs(b), 1e-300))) for a, b in
-                       ((spread[i], spread[j]), (level[i], level[j]))]  # fmt: skip
-            thousand = all(2.5 < one < 3.5 for one in decades)
-            if thousand or max(spread[i], spread[j]) > 2000.0 * min(spread[i], spread[j]):
-                raise InputError(
-                    f"{series[j].name} and {one.name} do not look like one machine in one unit (outputs "
-                    f"{level[j]:.3g} ± {spread[j]:.3g} and {level[i]:.3g} ± {spread[i]:.3g}); check units and files"
-                )

@@ -40,6 +40,7 @@ from rhythmid.model import Model
 from rhythmid.parallel import cores
 from rhythmid.progress import Tell
 from rhythmid.record.record import Record
+from rhythmid.record.same_recording import check_held_out
 from rhythmid.report.quantity import in_words
 from rhythmid.result import Result, Row, axis_or_new
 
@@ -212,6 +213,7 @@ def diagnose(
         raise InputError(
             "these records are of several joints: give a model with a body:, as Model.load reads it"
         )
+    check_held_out(fitted, judged)
     records, holdout = cast(tuple[Record, ...], fitted), cast(tuple[Record, ...], judged)
     model = with_declared(model, (*records, *holdout))
     check_free(model)

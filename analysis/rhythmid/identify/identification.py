@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from rich.console import Console
 
+    from rhythmid.identify.held_out import HeldOut
+
 Array = NDArray[np.float64]
 POINTS = 600  # of an HTF that are written out at most
 
@@ -201,6 +203,8 @@ class Identification(Result):
         What the user should know, one line each.
     cautions
         What should keep a user from believing the estimates.
+    held_out
+        The identified model's free runs over the held-out records; None without such records.
 
     Examples
     --------
@@ -225,6 +229,7 @@ class Identification(Result):
     notes: tuple[str, ...] = field(default_factory=tuple)
     joint: JointFit | None = None
     cautions: tuple[Caution, ...] = ()
+    held_out: "HeldOut | None" = None
 
     @property
     def usable(self) -> bool:
@@ -238,7 +243,9 @@ class Identification(Result):
         left = percent(self.quality["nrmse"])
         if not self.usable:
             return f"Not identified: the fit leaves {left} of the motion"
-        return f"{found} of {len(self.parameters)} parameters identified; the free run leaves {left} of the motion"
+        unseen = None if self.held_out is None else self.held_out.nrmse
+        more = "" if unseen is None else f", and {percent(unseen)} of the held-out motion"
+        return f"{found} of {len(self.parameters)} parameters identified; the free run leaves {left} of the motion{more}"
 
     @property
     def estimates(self) -> dict[str, Estimate]:
@@ -259,7 +266,7 @@ class Identification(Result):
         return JointCovariance.of(fit.names, [values[name].unit for name in fit.names], fit.covariance)
 
     def tables(self) -> Mapping[str, Sequence[Row]]:
-        """`estimates`, and `harmonics`: the transfer functions, frequency by frequency."""
+        """`estimates`; `harmonics`: the transfer functions, frequency by frequency; `held_out`: the error of each held-out record."""
         functions = self.shown.functions
         return {
             "estimates": [{"name": name} | one.to_dict() for name, one in self.estimates.items()],
@@ -268,6 +275,7 @@ class Identification(Result):
                 for one in (() if functions is None else functions.functions)
                 for frequency, value, std in zip(one.frequency.tolist(), one.value.tolist(), one.std.tolist())
             ],
+            "held_out": [] if self.held_out is None else [one.to_dict() for one in self.held_out.runs],
         }  # fmt: skip
 
     def show(self, console: "Console") -> None:
@@ -363,6 +371,7 @@ class Identification(Result):
                 "paper_missing": self.shown.paper_missing,
             },
             "quality": dict(self.quality),
+            "held_out": None if self.held_out is None else self.held_out.to_dict(),
             "notes": list(self.notes),
         }
 

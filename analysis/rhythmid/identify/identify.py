@@ -16,6 +16,7 @@ from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.discretisation import with_discretisation_error
 from rhythmid.identify.harmonic_likelihood import DELAYS
+from rhythmid.identify.held_out import admitted_unseen, held_out_runs
 from rhythmid.identify.identifiability import Forcing, Offset, delays_of
 from rhythmid.identify.identification import Delays, Estimate, Identification, Shown
 from rhythmid.identify.inner_delays import dead_times
@@ -27,7 +28,7 @@ from rhythmid.identify.own_zeros import with_own_zeros
 from rhythmid.identify.paper import HARMONICS, PaperResult, paper_method
 from rhythmid.identify.paper_conditions import lacks_paper_method, lacks_transfer_functions
 from rhythmid.identify.paper_delays import combined, paper_delays
-from rhythmid.identify.paper_quality import MISFIT, notes_of, quality_of
+from rhythmid.identify.paper_quality import MISFIT, cycle_nrmse, notes_of, quality_of
 from rhythmid.identify.plausibility import SHIFTED, check_plausible, shift
 from rhythmid.identify.record_zero import without_record_zero
 from rhythmid.identify.timing import compensated, measurement_jitter
@@ -40,8 +41,7 @@ from rhythmid.progress import Tell, counted, silent
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.record import Record
-from rhythmid.simulation.signal import continuous, spline
-from rhythmid.simulation.simulate import simulate
+from rhythmid.record.same_recording import check_held_out
 
 if TYPE_CHECKING:
     from rhythmid.body.machine import Machine
@@ -98,14 +98,6 @@ def with_delays(model: Model, input_delay: float, measurement_delay: float) -> M
     return model
 
 
-def free_run_nrmse(model: Model, record: Record, start: Array) -> float:
-    """rms(simulated − measured) / std(measured) in free-run simulation from the state `start` at the first sample."""
-    command = None if record.input is None else continuous(record.input.time, record.input.value, record.hold)
-    forcing = None if record.forcing is None else spline(record.forcing.time, record.forcing.value)
-    simulated = simulate(model, record.output.time, command, forcing, start).output
-    return float(np.sqrt(np.mean((simulated - record.output.value) ** 2)) / np.std(record.output.value))
-
-
 def identify(
     records: "Record | JointRecord | Sequence[Record] | Sequence[JointRecord]",
     model: "Model | Machine | None" = None,
@@ -115,6 +107,7 @@ def identify(
     offset: Offset | None = None,
     htf: HtfMethod = "auto",
     tell: Tell = silent,
+    holdout: "Record | JointRecord | Sequence[Record] | Sequence[JointRecord]" = (),
 ) -> Identification:
     """Identify a model's free parameters and its delays from records.
 
@@ -137,6 +130,8 @@ def identify(
         paper's method brings its own, equation (5), where this is `auto`.
     tell
         Called with a sentence at the beginning of each step.
+    holdout
+        Records to judge by only: no fit sees them, and the identified model is run over them.
 
     Returns
     -------
@@ -146,7 +141,7 @@ def identify(
     Raises
     ------
     InputError
-        When most of an output is clipped, when a channel seems to be in another unit, to have its sign turned round or to be
+        When a record is fitted and held out, when most of an output is clipped, when a channel seems to be in another unit, to have its sign turned round or to be
         exchanged with another, and by the paper's method when a record has no input, is shorter than a period, or the model has no limit cycle.
 
     Examples
@@ -174,6 +169,7 @@ def identify(
     True
     """
     given = tuple(records) if isinstance(records, Sequence) else (records,)
+    judged = tuple(holdout) if isinstance(holdout, Sequence) else (holdout,)
     if not given:
         raise InputError("nothing to identify from: give at least one record")
     if model is not None and not isinstance(model, Model):
@@ -181,17 +177,24 @@ def identify(
 
         if (method, forcing, offset, htf) != ("joint", None, None, "auto"):
             raise InputError("method, forcing, offset and htf are for a machine of one axis; leave them out")
-        return cast(Identification, identify_machine(cast("Sequence[JointRecord]", given), model, tell=tell))
-    if not all(isinstance(record, Record) for record in given):
+        first, second = (cast("Sequence[JointRecord]", one) for one in (given, judged))
+        return cast(Identification, identify_machine(first, model, second, tell))
+    if not all(isinstance(record, Record) for record in (*given, *judged)):
         raise InputError(
             "these records are of several joints: give a model with a body:, as Model.load reads it"
         )
+    check_held_out(given, judged)
     clean, still = moving([cleaned(one) for one in cast(tuple[Record, ...], given)])
     cut = [note for one in clean for note in cut_at_gaps(one.record).notes]
-    found = _identified(
-        tuple(one.record for one in clean), model, harmonics, method, forcing, offset, htf, tell
-    )
-    return replace(found, notes=(*still, *(note for one in clean for note in one.notes), *cut, *found.notes))
+    fitted = tuple(one.record for one in clean)
+    unseen, said = admitted_unseen(cast(tuple[Record, ...], judged), fitted, model or paper_hopper())
+    found = _identified(fitted, model, harmonics, method, forcing, offset, htf, tell)
+    notes = (*still, *(note for one in clean for note in one.notes), *cut, *said, *found.notes)
+    if not unseen:
+        return replace(found, notes=notes)
+    tell("running the identified model over the held-out records")
+    held_out = held_out_runs(found.model, found.joint, fitted, unseen)
+    return replace(found, notes=(*notes, *held_out.notes), held_out=held_out)
 
 
 def _identified(
@@ -296,7 +299,7 @@ def _by_paper(seen: _Seen, htf: HtfMethod, method: Method) -> Identification:
         fitted = with_delays(fitted, delays.input.value, delays.measurement.value)
     else:  # what a simulation needs is the sum, wherever it stands
         fitted = with_delays(fitted, delays.sum.value or 0.0, 0.0)
-    nrmse = _nrmse(fitted, records, results)
+    nrmse = cycle_nrmse(fitted, records, results)
     cautions = seen.judged(fitted, parameters, delays, None, nrmse)
     notes = tuple(note for result, one in zip(results, records) for note in notes_of(one, result))
     return Identification(
@@ -388,13 +391,3 @@ def _harmonics(result: PaperResult, method: HtfMethod) -> HarmonicEstimates:
     if method == "regularised_least_squares":
         return smoothed(result.estimate)
     return harmonic_transfer_functions(result.spectra, result.fit.linearised.cycle.ring_down, method)
-
-
-def _nrmse(model: Model, records: Sequence[Record], results: Sequence[PaperResult]) -> float:
-    """Largest free-run NRMSE of a model that starts on its limit cycle."""
-    nrmse = 0.0
-    for record, result in zip(records, results):
-        cycle, delay = result.fit.linearised.cycle, model.value("measurement_delay.delay")
-        begin = (record.output.time[0] - delay - result.pumping.origin) % result.pumping.period
-        nrmse = max(nrmse, free_run_nrmse(own_model(model, record), record, cycle.path(begin)))
-    return nrmse

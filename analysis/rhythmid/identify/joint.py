@@ -64,12 +64,14 @@ class Search:
 @dataclass(frozen=True)
 class JointFit:
     """The answer: the time-domain `fit` to the `records`, its `pumping` (None without forcing), and how the `search` for it
-    ended."""
+    ended. `smear` [s] is the time over which the commands of the fit's series are averaged, for a drive that takes them at a slower rate;
+    0 where they act as recorded."""
 
     fit: Fit
     pumping: Pumping | None
     search: Search
     records: tuple[Record, ...]
+    smear: float = 0.0
 
     @property
     def model(self) -> Model:
@@ -261,9 +263,9 @@ def best_fit(records: Record | Sequence[Record], model: Model) -> JointFit:
     given = stretches_of(given)
     best: JointFit | None = None
     for start in starts:
-        late = sum(max(start.value(name), 0.0) for name in DELAYS if name in start.parameters)
+        late = late_by(start)
         try:
-            series = _series(given, late)
+            series = begun_series(given, late)
             trial = _judged(estimate(start, series, max_step=step_of(series)), pumping, given)
         except InputError:
             continue
@@ -274,7 +276,7 @@ def best_fit(records: Record | Sequence[Record], model: Model) -> JointFit:
             best = trial
         if trial.search.arrived:
             return trial
-    series = _series(given, 0.0 if pumping is None else 0.2)
+    series = begun_series(given, 0.0 if pumping is None else 0.2)
     trial = _judged(_search_in_time(model, series), pumping, given)
     if trial.search.arrived or best is None or trial.search.motion < best.search.motion:
         return trial
@@ -289,8 +291,7 @@ def fit_from(model: Model, records: Record | Sequence[Record], cycle: bool = Tru
     given = (records,) if isinstance(records, Record) else tuple(records)
     ready, pumping = prepared_model(with_declared(model, given), given)
     given = stretches_of(given)
-    late = sum(max(ready.value(name), 0.0) for name in DELAYS if name in ready.parameters)
-    series = _series(given, late)
+    series = begun_series(given, late_by(ready))
     if not cycle and pumping is not None:
         series = [replace(one, ignored=cycle_columns(one, pumping)) for one in series]
     return estimate(ready, series, max_step=step_of(series))
@@ -320,8 +321,14 @@ def stretches_of(records: Sequence[Record]) -> tuple[Record, ...]:
     return tuple(found)
 
 
-def _series(records: Sequence[Record], delay: float) -> list[Series]:
-    return prepare([_begun(record, delay + 0.05 if delay > 0.0 else 0.0) for record in records])
+def late_by(model: Model) -> float:
+    """How far back [s] the command of a measurement lies, by a model's delays."""
+    return sum(max(model.value(name), 0.0) for name in DELAYS if name in model.parameters)
+
+
+def begun_series(records: Sequence[Record], delay: float, block: int | None = None) -> list[Series]:
+    """Series of the records from where what acted `delay` [s] ago is known; `block` as for `prepare`."""
+    return prepare([_begun(record, delay + 0.05 if delay > 0.0 else 0.0) for record in records], block)
 
 
 def _judged(fit: Fit, pumping: Pumping | None, records: Sequence[Record]) -> JointFit:

@@ -4,12 +4,18 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rhythmid.identify.declared import own_model
 from rhythmid.identify.paper import PaperResult
 from rhythmid.identify.paper_conditions import LEAKAGE
+from rhythmid.model import Model
 from rhythmid.record.output_copy import copy_notes
 from rhythmid.record.record import Record
+from rhythmid.simulation.signal import continuous, spline
+from rhythmid.simulation.simulate import simulate
 
+Array = NDArray[np.float64]
 MISFIT = 0.1  # of the magnitudes above which the fit is called into question
 
 
@@ -52,3 +58,21 @@ def quality_of(nrmse: float, records: Sequence[Record], results: Sequence[PaperR
         "smoothing_window": first.estimate.operator.window,
         "smoothing_loss": {f"{m:+d}": float(v) for m, v in zip(first.estimate.htf.harmonics, first.loss)},
     }
+
+
+def free_run_nrmse(model: Model, record: Record, start: Array) -> float:
+    """rms(simulated − measured) / std(measured) in free-run simulation from the state `start` at the first sample."""
+    command = None if record.input is None else continuous(record.input.time, record.input.value, record.hold)
+    forcing = None if record.forcing is None else spline(record.forcing.time, record.forcing.value)
+    simulated = simulate(model, record.output.time, command, forcing, start).output
+    return float(np.sqrt(np.mean((simulated - record.output.value) ** 2)) / np.std(record.output.value))
+
+
+def cycle_nrmse(model: Model, records: Sequence[Record], results: Sequence[PaperResult]) -> float:
+    """Largest free-run NRMSE of a model that starts on its limit cycle."""
+    nrmse = 0.0
+    for record, result in zip(records, results):
+        cycle, delay = result.fit.linearised.cycle, model.value("measurement_delay.delay")
+        begin = (record.output.time[0] - delay - result.pumping.origin) % result.pumping.period
+        nrmse = max(nrmse, free_run_nrmse(own_model(model, record), record, cycle.path(begin)))
+    return nrmse

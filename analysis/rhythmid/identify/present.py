@@ -3,6 +3,7 @@
 import numpy as np
 
 from rhythmid.errors import InputError
+from rhythmid.identify.held_out import HeldOutRun
 from rhythmid.identify.identification import Identification
 from rhythmid.identify.joint import without_forcing
 from rhythmid.identify.shown_runs import free_runs
@@ -22,7 +23,10 @@ def present(found: Identification, command: str = "", name: str = "a model") -> 
     return identification_page(
         found.to_dict(),
         source=f"{name} from {names}",
-        records=[quality_of(record, "identification") for record in found.records],
+        records=[
+            *(quality_of(record, "identification") for record in found.records),
+            *(quality_of(one.record, "held out") for one in _held_out(found)),
+        ],
         command=command,
         models={"Identified model": found.model.to_yaml()},
         transfer=_transfer(found),
@@ -33,12 +37,22 @@ def present(found: Identification, command: str = "", name: str = "a model") -> 
 
 
 def _runs(found: Identification) -> list[Run]:
-    """Every record beside the identified model's free run; none by the paper's method, which simulates nothing."""
-    if found.joint is None:
-        return []
-    fit = found.joint.fit
-    pumpings = {record.name: active_pumping(record) for record in found.records}
-    return free_runs(fit, fit, pumpings, False, ("identified model", ""))
+    """Every record beside the identified model's free run, those held out last; by the paper's method, which simulates nothing else,
+    only these."""
+    labels, runs = ("identified model", ""), []
+    if found.joint is not None:
+        fit = found.joint.fit
+        pumpings = {record.name: active_pumping(record) for record in found.records}
+        runs += free_runs(fit, fit, pumpings, False, labels)
+    for one in _held_out(found):
+        if one.fit is not None:
+            pumpings = {one.record.name: active_pumping(one.record)}
+            runs += free_runs(one.fit, one.fit, pumpings, False, labels, heldout=True)
+    return runs
+
+
+def _held_out(found: Identification) -> tuple[HeldOutRun, ...]:
+    return () if found.held_out is None else found.held_out.runs
 
 
 def _transfer(found: Identification) -> list[TransferFunction]:

@@ -40,8 +40,21 @@ def show(result: Mapping[str, Any], console: Console) -> None:
     _show_transfer_functions(result, console)
     quality = result["quality"]
     console.print(f"{quality['rate']:.6g} Hz, {quality['gaps']} gaps, free-run NRMSE {quality['nrmse']:.5f}")
+    _show_held_out(result.get("held_out"), console)
     for note in result["notes"]:
         console.print(f"note: {note}", markup=False)
+
+
+def _show_held_out(held_out: Mapping[str, Any] | None, console: Console) -> None:
+    """The error on held-out records, in all and record by record, or why there is none."""
+    if held_out is None:
+        return
+    records = held_out["records"]
+    if held_out["nrmse"] is not None:
+        console.print(f"held out: free-run NRMSE {held_out['nrmse']:.5f}")
+    for one in records if len(records) > 1 or held_out["nrmse"] is None else ():
+        told = f"no free run: {one['missing']}" if one["nrmse"] is None else f"NRMSE {one['nrmse']:.5f}"
+        console.print(f"held out, {one['record']}: {told}", markup=False)
 
 
 def _show_transfer_functions(result: Mapping[str, Any], console: Console) -> None:

@@ -283,6 +283,7 @@ def command_hold(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tup
         return joint, none
     spread = 6.0 * smear[1] / rough
     best, period = _refitted(*_received(fit, rough), pool), Estimate(rough, spread, "s")
+    width = rough
     early = best.model.value(name) < -step  # what rolls off without being late was not held
     if best.chi2 > fit.chi2 - HOLD_GAIN or early:
         return joint, none
@@ -315,6 +316,6 @@ def command_hold(joint: JointFit, pool: ThreadPoolExecutor | None = None) -> tup
         except InputError:
             continue
         if trial.chi2 < best.chi2 - gain:
-            best, gain = _widened(trial, name, own), 0.0
+            best, gain, width = _widened(trial, name, own), 0.0, 0.0
             period = Estimate(ticks, ticks**2 / longest, "s")
-    return replace(joint, fit=best), period
+    return replace(joint, fit=best, smear=width), period

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.record.text_cells import MISSING, number_of
+from rhythmid.record.text_cells import is_missing, number_of
 from rhythmid.record.text_rows import Rows
 
 # brackets around anything without brackets, within a call as of array, float32 or tensor, or without one
@@ -31,13 +31,13 @@ def lists_of(cells: Sequence[str], rows: Rows, column: int) -> NDArray[np.float6
 
     Raises ValueError where another row has another number of values, or no list.
     """
-    first = next((found for cell in cells if not _is_empty(cell) and (found := list_of(cell)) != []), None)
+    first = next((found for cell in cells if not is_missing(cell) and (found := list_of(cell)) != []), None)
     if first is None:
         return None
     nothing = [np.nan] * len(first)
     made: list[list[float]] = []
     for place, cell in enumerate(cells):
-        found = [] if _is_empty(cell) else list_of(cell)
+        found = [] if is_missing(cell) else list_of(cell)
         if found is None:
             raise rows.complaint(place, f"holds no list of numbers in column {column + 1}, as others do")
         if found and len(found) != len(first):
@@ -46,7 +46,3 @@ def lists_of(cells: Sequence[str], rows: Rows, column: int) -> NDArray[np.float6
             )
         made.append(found or nothing)
     return np.array(made, dtype=np.float64)
-
-
-def _is_empty(cell: str) -> bool:
-    return not cell or cell.lower() in MISSING

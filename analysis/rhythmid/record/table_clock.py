@@ -110,6 +110,10 @@ def table_clock(
         raise InputError(
             f"{path}: holds no recording: its columns have {len(columns[0][1])} values ({names})"
         )
+    for name, value in columns:
+        if _is_plain_time(name) and _forward(value[np.isfinite(value)]):
+            row = int(np.argmin(np.isfinite(value))) + 1
+            raise InputError(f"{path}: the time is missing in row {row} ({name}); delete rows without a time")
     why = f"; of another length than their {len(columns[0][1])} rows: {others}" if others else ""
     raise InputError(
         f"{path}: no column goes forward like a time ({names}){why}; give the rows' rate with --rate HZ"

@@ -9,7 +9,7 @@ COMMENTS = ("#", "%")
 EMPTY = " \t\r\n;,\"'\0"  # what a line of empty cells is made of, and what a file ends with whose writer lost its power
 # what programs write in place of a number that is missing
 MISSING = frozenset(
-    "nan n/a na #n/a null none - -- --- -nan -nan(ind) nan(ind) 1.#qnan -1.#ind #num! #div/0!".split()
+    "nan n/a na #n/a null none undefined - -- --- -nan -nan(ind) nan(ind) 1.#qnan -1.#ind #num! #div/0!".split()
 )
 INFINITE = {"∞": np.inf, "+∞": np.inf, "-∞": -np.inf}  # beyond its range, as an oscilloscope writes it
 THOUSANDS = re.compile(
@@ -39,7 +39,7 @@ def cells_of(line: str, separator: str | None) -> list[str]:
 def number_of(cell: str, decimal: str) -> float | None:
     """A cell's value, None where it is no number; NaN where it is empty or says that it is missing, so that a complaint can name where."""
     cell = cell.strip().strip("\"'").replace("−", "-")
-    if not cell or cell.lower() in MISSING:
+    if is_missing(cell):
         return np.nan
     if decimal == ",":
         if "." in cell:
@@ -51,6 +51,12 @@ def number_of(cell: str, decimal: str) -> float | None:
         return float(cell)
     except ValueError:
         return INFINITE.get(cell)
+
+
+def is_missing(cell: str) -> bool:
+    """Whether a cell is empty, or holds what stands for a number that is missing."""
+    cell = cell.strip().strip("\"'")
+    return not cell or cell.lower() in MISSING
 
 
 def is_number(cell: str, decimal: str) -> bool:

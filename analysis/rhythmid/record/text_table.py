@@ -19,7 +19,7 @@ from rhythmid.record.clock_time import seconds
 from rhythmid.record.labelled_rows import labels_of, read_labelled
 from rhythmid.record.list_cells import list_of, lists_of
 from rhythmid.record.lvm_head import lvm_head
-from rhythmid.record.text_cells import COMMENTS, cells_of, content, is_number, number_of
+from rhythmid.record.text_cells import COMMENTS, cells_of, content, is_missing, is_number, number_of
 from rhythmid.record.text_file import opened
 from rhythmid.record.text_head import names_of
 from rhythmid.record.text_rows import Rows, numbers_of, rows_in
@@ -99,7 +99,7 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
     used = [(number, line) for number, line in enumerate(lines) if content(line)]
     if not used:
         raise InputError(f"{name}: is empty")
-    separator, decimal, rows = max(_readings([line for _, line in used]), key=lambda one: _worth(one[2]))
+    separator, decimal, rows, _ = max(_readings([line for _, line in used]), key=lambda one: one[3])
     if not any(rows):  # no numbers: names alone
         separator = max(SEPARATORS, key=lambda one: len(cells_of(used[-1][1], one)))
         head = cells_of(used[-1][1], separator)
@@ -110,8 +110,8 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
     lists = {index for row in split[place:] for index, cell in enumerate(row) if list_of(cell)}
     numeric = tuple(
         index
-        for index, cell in enumerate(cells)
-        if number_of(cell, decimal) is not None and index not in lists
+        for index in range(len(cells))
+        if number_of(_first_told(split[place:], index), decimal) is not None and index not in lists
     )
     above = _names_above(split[:place], used[place - 1][1] if place else "", len(cells))
     head = names_of(above, len(cells))
@@ -137,15 +137,23 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
     )
 
 
-def _readings(lines: list[str]) -> Iterator[tuple[str | None, str, list[int]]]:
-    """Separator, decimal mark, and of each line how many numbers it holds where it is a row, else 0."""
+def _first_told(rows: list[list[str]], place: int) -> str:
+    """The first cell of a column that is not missing; empty where all are."""
+    return next((row[place] for row in rows if len(row) > place and not is_missing(row[place])), "")
+
+
+def _readings(lines: list[str]) -> Iterator[tuple[str | None, str, list[int], tuple[int, int, int]]]:
+    """Separator, decimal mark, of each line how many numbers it holds where it is a row, else 0, and how well the reading does: numbers
+    that are told apart in rows, the number of rows, and the cells that are seen to be empty."""
     for separator in SEPARATORS:
         split = [cells_of(line, separator) for line in lines]
         for decimal in (".",) if separator == "," and not any('"' in line for line in lines) else (".", ","):
             count = [sum(_count(cell, decimal) for cell in row) for row in split]
             usual = Counter(len(row) for row, numbers in zip(split, count) if numbers).most_common(1)
             width = usual[0][0] if usual else 0
-            yield separator, decimal, [n if len(row) == width else 0 for row, n in zip(split, count)]
+            rows = [n if len(row) == width else 0 for row, n in zip(split, count)]
+            empty = sum(row.count("") for row, n in zip(split, rows) if n)
+            yield separator, decimal, rows, (sum(rows), sum(map(bool, rows)), empty)
 
 
 def _count(cell: str, decimal: str) -> int:
@@ -154,11 +162,6 @@ def _count(cell: str, decimal: str) -> int:
         return 1
     found = list_of(cell) or ()
     return len(found) if len(found) > 1 else 0
-
-
-def _worth(rows: list[int]) -> tuple[int, int]:
-    """How well a reading does: numbers that are told apart in rows, and the number of rows."""
-    return sum(rows), sum(1 for row in rows if row)
 
 
 def _names_above(above: list[list[str]], last: str, count: int) -> list[list[str]]:

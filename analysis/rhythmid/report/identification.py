@@ -133,7 +133,9 @@ def _words(result: Mapping[str, Any]) -> str:
     else:
         first = "No delay was estimated."
     error = (result.get("quality") or {}).get("nrmse")
-    return f"{first} Running on its own, the identified model misses {percent(error)} of the motion."
+    unseen = (result.get("held_out") or {}).get("nrmse")
+    more = "" if unseen is None else f", and {percent(unseen)} of that of the held-out records"
+    return f"{first} Running on its own, the identified model misses {percent(error)} of the motion{more}."
 
 
 def _tiles(result: Mapping[str, Any]) -> Tiles:
@@ -282,6 +284,10 @@ def _remarks(result: Mapping[str, Any]) -> Section:
     lines = [
         f"In free run the identified model's error is {percent(quality.get('nrmse'))} of the motion's standard deviation."
     ]
+    for one in (result.get("held_out") or {}).get("records") or ():
+        told = f"the error is {percent(one['nrmse'])} of the motion's standard deviation"
+        missing = f"the model could not be run ({one['missing']})"
+        lines.append(f"Of the held-out record {one['record']} {missing if one['nrmse'] is None else told}.")
     lines += [f"{sentence(one['text'])} {one['question']}" for one in result.get("warnings") or ()]
     lines += [sentence(str(note)) for note in result.get("notes") or ()]
     return Section("How far to trust this", (Bullets(tuple(lines)),))

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from functools import cache
 
+import numpy as np
+
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Recorded
 from rhythmid.record.output_copy import SAME, doubt_of_copy
@@ -23,18 +25,14 @@ from rhythmid.start.no_motion import no_motion
 from rhythmid.start.relation import (
     GOES_ALONG,
     HARDLY,
-    RATIO,
     Follows,
     coherent,
-    derivative,
     drives,
     follows,
+    integrals,
     predicts,
 )
 
-SURE_INTEGRAL = (
-    0.98  # correlation from which a position and a velocity belong together, where no name says so
-)
 OR_ELSE = "a base that moves is  kind: base_displacement, what a controller is asked for  kind: reference"
 NAMED = 8  # numbers that a note names
 
@@ -48,19 +46,13 @@ def output_by_data(able: list[Known], known: list[Known], place: str) -> tuple[C
         ]
     if not able:
         raise InputError(f"{place}: {no_motion(known)}")
-    for first in able:
-        for second in able:
-            if first is second:
-                continue
-            r, ratio = derivative(first.one, second.one)
-            if r > SURE_INTEGRAL and abs(ratio - 1.0) < RATIO:
-                choice = Choice(
-                    first.one, f"no name says it; it is the integral of {second.one} ({r:.2f} correlation)"
-                )
-                changed: dict[int, Quantity] = {id(first): "position", id(second): "velocity"}
-                return choice, [
-                    one.taken_for(changed[id(one)]) if id(one) in changed else one for one in known
-                ]
+    if pairs := integrals([one.one for one in able]):
+        motion, slope, r = max(pairs, key=lambda pair: float(np.nanstd(pair[0].value)))
+        choice = Choice(motion, f"no name says it; it is the integral of {slope} ({r:.2f} correlation)")
+        changed: dict[int, Quantity] = {id(motion): "position", id(slope): "velocity"}
+        return choice, [
+            one.taken_for(changed[id(one.one)]) if id(one.one) in changed else one for one in known
+        ]
     if len(able) == 1:
         return Choice(able[0].one, "the only number that is left"), [
             one.taken_for("position") if one is able[0] else one for one in known

@@ -1,23 +1,25 @@
 """Which of several joints is looked at: the one that was asked for, else the one that moves most."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Recorded
-from rhythmid.start.meaning import Meaning, Quantity, same_joint, words_of
+from rhythmid.start.meaning import Meaning, Quantity, joint_of_column, same_joint, words_of
 
 CLOSE = 0.7  # of the motion of the joint that moves most, from which another one is worth a question
 
 
 @dataclass(frozen=True)
 class Joint:
-    """The joint that is looked at, empty where there is but one, and how much every joint moved (standard deviation)."""
+    """The joint that is looked at, empty where there is but one, how much every joint moved (standard deviation), and the names of `further`
+    joints of which no motion was recorded."""
 
     name: str = ""
     motion: dict[str, float] = field(default_factory=dict)
+    further: frozenset[str] = frozenset()
 
     @property
     def others(self) -> list[str]:
@@ -33,9 +35,16 @@ class Joint:
         if meaning.joint in self.motion:
             return False
         said = {*words_of(one.topic), *words_of(meaning.joint)}  # tau_cal_3 is of joint 3, whatever cal is
-        if set(words_of(self.name)) <= said:
+        if self._telling(self.name) <= said:
             return True
-        return not any(set(words_of(other)) <= said for other in self.others)
+        return not any(self._telling(other) <= said for other in (*self.others, *self.further))
+
+    def _telling(self, name: str) -> set[str]:
+        """Words of a joint's name that are not in the names of all; the whole name where these are but numbers, which count other things, too."""
+        common = set.intersection(*(set(words_of(one)) for one in self.motion))
+        words = set(words_of(name))
+        rest = words - common
+        return words if all(word.isdigit() for word in rest) else rest
 
 
 def joint_of(
@@ -57,7 +66,7 @@ def joint_of(
     if not motion:
         motion = _motion_of_untold(known, still)
     if wanted is not None and wanted not in motion:
-        called = [name for name in motion if same_joint(name, wanted)]
+        called = [name for name in motion if same_joint(name, wanted)] or _begin_with(wanted, motion)
         wanted = called[0] if len(called) == 1 else wanted
     if wanted is not None and motion.get(wanted) == 0.0:
         raise InputError(f"{place}: joint {wanted!r} stands still")
@@ -66,13 +75,38 @@ def joint_of(
             raise InputError(
                 f"{place}: no joint is called {wanted!r}; it has {', '.join(motion) or 'no named joints'}"
             )
-        return Joint(wanted, motion)
+        return Joint(wanted, motion, _further(wanted, known, asked=True))
     ranked = sorted(motion, key=lambda name: -motion[name])
     if len(ranked) < 2:
-        return Joint(ranked[0] if ranked else "", motion)
+        name = ranked[0] if ranked else ""
+        return Joint(name, motion, _further(name, known))
     close = [name for name in ranked if motion[name] >= CLOSE * motion[ranked[0]]]
     number = ask("Which joint is looked at?", close) if len(close) > 1 else 0
-    return Joint(close[number], motion)
+    return Joint(close[number], motion, _further(close[number], known))
+
+
+def _begin_with(wanted: str, names: Iterable[str]) -> list[str]:
+    """The names that begin with the words of another one, as swing_sensor does with swing."""
+    words = words_of(wanted)
+    return [name for name in names if words and words_of(name)[: len(words)] == words]
+
+
+def _further(name: str, known: Sequence[tuple[Recorded, Meaning]], asked: bool = False) -> frozenset[str]:
+    """Joints whose columns are called as those of the joint `name` but for the first words: beside Swing Ms, Boom Ms is of the boom.
+
+    Where the joint was asked for, those too whose columns are called alike among themselves.
+    """
+    own = words_of(name)
+    heads: dict[tuple[str, ...], set[tuple[str, ...]]] = {}
+    for words in (words_of(one.said) for one, _ in known if one.column and own):
+        for place in range(1, len(words)):
+            heads.setdefault(tuple(words[place:]), set()).add(tuple(words[:place]))
+    alike = [
+        {head for head in found if all(not word.isdigit() and joint_of_column(word) for word in head)}
+        for found in heads.values()
+        if any(list(head) == own for head in found) or (asked and len(found) > 1)
+    ]
+    return frozenset("_".join(head) for found in alike for head in found if not set(own) <= set(head))
 
 
 def _motion_of_untold(

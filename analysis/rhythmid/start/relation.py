@@ -1,6 +1,7 @@
 """How two recorded numbers go together: whether one is the integral of the other, follows it, or is driven by it."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,9 @@ MAIN_PART = 0.5  # of a record: a stretch without gaps that is at least so long 
 SURE = 5.0  # times what chance makes of a prediction's gain, from which it is none: of 12 lags beyond 1 in ten millions
 GOES_ALONG = 0.5  # coherence from which two plainly have to do with each other
 HARDLY = 0.3  # coherence with the output below which a number without a name is not taken for what drives
+SURE_INTEGRAL = (
+    0.98  # correlation from which a position and a velocity belong together, where no name says so
+)
 RATIO = 0.3  # by which the slope of a position may differ from the velocity, before their units are doubted
 NEARLY = 0.8  # of the greatest correlation of any sign and lag: what an answer has, too, where its clock is a little early
 SAME_SIZE = (0.5, 2.0)  # ratio within which an answer is of its command's size
@@ -98,6 +102,21 @@ def derivative(position: Recorded, velocity: Recorded) -> tuple[float, float]:
     if power == 0.0 or not x.any():
         return 0.0, 0.0
     return float(x @ integral / math.sqrt(power * float(x @ x))), float(x @ integral / power)
+
+
+def integrals(able: Sequence[Recorded]) -> list[tuple[Recorded, Recorded, float]]:
+    """Numbers of which one is surely the integral of the other, in one unit, with their correlation; not slopes of others among them,
+    whose own slopes are accelerations."""
+    found: list[tuple[Recorded, Recorded, float]] = []
+    for first in able:
+        for second in able:
+            if first is second:
+                continue
+            r, ratio = derivative(first, second)
+            if r > SURE_INTEGRAL and abs(ratio - 1.0) < RATIO:
+                found.append((first, second, r))
+    slopes = {id(second) for _, second, _ in found}
+    return [pair for pair in found if id(pair[0]) not in slopes] or found
 
 
 def follows(command: Recorded, answer: Recorded) -> Follows:

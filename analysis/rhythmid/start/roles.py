@@ -28,6 +28,7 @@ from rhythmid.start.meaning import (
 )
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along
 from rhythmid.start.step_before import BEFORE, set_point_before, step_before
+from rhythmid.start.unnamed_joints import column_groups
 from rhythmid.start.unnamed_reference import with_reference
 from rhythmid.start.unsigned_effort import without_unsigned
 
@@ -60,9 +61,12 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     known = _without_empty_letters(known)
     if not known:
         raise InputError(f"{found.path}: holds nothing that could be a motion")
+    resting = [Known(one, meaning_of(one)) for one in found.constant]
+    if (groups := column_groups(found)) is not None:
+        known, resting = ([groups.told(one) for one in part] for part in (known, resting))
     said = [(one.one, one.meaning) for one in known]
     carried = carried_motion(said) if joint is None else None
-    still = [(one, meaning_of(one)) for one in found.constant]
+    still = [(one.one, one.meaning) for one in resting]
     chosen = joint_of(said, still, joint, ask, str(found.path)) if carried is None else Joint()
     everything = known
     known = [one for one in known if chosen.includes(one.one, one.meaning)]

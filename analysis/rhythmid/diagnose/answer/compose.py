@@ -22,11 +22,11 @@ from rhythmid.diagnose.case import EXPLAINED, Case
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.evidence import difference
 from rhythmid.diagnose.free_run import FreeRunResult
-from rhythmid.diagnose.held_out_zeros import held_out_zero_notes
 from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.selection import Contest
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.errors import InputError
+from rhythmid.identify.held_out_zeros import held_out_zero_notes
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.repeats import noise_from_repeats

@@ -32,6 +32,7 @@ from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned_joints
 from rhythmid.record.joint_record import JointRecord
+from rhythmid.record.same_recording import check_held_out
 from rhythmid.result import Result, Row
 from rhythmid.simulation.transport import INPUT_DELAY
 
@@ -93,6 +94,7 @@ def diagnose_machine(
     """
     if not records:
         raise InputError("no record is given; name at least one bag or table")
+    check_held_out(records, holdout)
     known, spent = catalogue or load_catalogue(), Budget(budget)
     records, said = cleaned_joints(records)
     holdout, of_holdout = cleaned_joints(holdout)

@@ -30,6 +30,7 @@ from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned_joints
 from rhythmid.record.joint_record import JointRecord
+from rhythmid.record.same_recording import check_held_out
 from rhythmid.result import Result, Row
 from rhythmid.statistics import NORMAL_95
 
@@ -154,6 +155,7 @@ def identify_machine(
     """
     if not records:
         raise InputError("no record is given; name at least one bag or table")
+    check_held_out(records, holdout)
     records, said = cleaned_joints(records)
     holdout, of_holdout = cleaned_joints(holdout)
     seen, unseen = (records, holdout) if holdout else _split(records)

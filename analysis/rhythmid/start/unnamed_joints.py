@@ -1,0 +1,53 @@
+"""Columns without names of several joints: groups of as many columns as there are joints, all positions, then all velocities, then what
+else was recorded of each."""
+
+from collections import defaultdict
+from dataclasses import dataclass, replace
+
+from rhythmid.record.inventory import Inventory
+from rhythmid.start.known import Known
+from rhythmid.start.meaning import Quantity
+from rhythmid.start.relation import integrals
+
+FEWEST = 2  # joints whose velocities stand in the same distance behind their positions, from which columns are groups
+
+
+@dataclass(frozen=True)
+class ColumnGroups:
+    """Groups of `count` columns, of which the first begins at column `first`; `position` and `velocity` are numbers of groups, counted
+    from 0."""
+
+    first: int
+    count: int
+    position: int
+    velocity: int
+
+    def told(self, one: Known) -> Known:
+        """The number of a column with its joint, counted from 1, and its quantity where it stands among positions or velocities."""
+        group, joint = divmod(int(one.one.column) - self.first, self.count)
+        quantities: dict[int, Quantity] = {self.position: "position", self.velocity: "velocity"}
+        meaning = replace(one.meaning, joint=str(joint + 1), quantity=quantities.get(group))
+        if meaning.quantity is None:
+            return replace(one, meaning=meaning)
+        reason = (
+            f"no name says it; columns in groups of {self.count}, of which one is the integral of another"
+        )
+        return replace(one, meaning=replace(meaning, reason=reason))
+
+
+def column_groups(found: Inventory) -> ColumnGroups | None:
+    """The groups of a table whose columns have numbers for names; None where there are no two joints' positions and velocities."""
+    every = (*found.recorded, *found.constant)
+    if not every or not all(one.column.isdigit() for one in every):
+        return None
+    first = min(int(one.column) for one in every)
+    pairs: dict[int, list[int]] = defaultdict(list)
+    for motion, slope, _ in integrals(found.recorded):
+        count = int(slope.column) - int(motion.column)
+        if count >= FEWEST:
+            pairs[count].append(int(motion.column) - first)
+    for count, places in sorted(pairs.items(), key=lambda pair: -len(pair[1])):
+        group = places[0] // count
+        if len(places) >= FEWEST and all(place // count == group for place in places):
+            return ColumnGroups(first, count, group, group + 1)
+    return None
