@@ -37,6 +37,7 @@ from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, s
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
 from rhythmid.progress import Tell, counted, silent
+from rhythmid.record.angle_wrap import told_of_wraps
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.record import Record
@@ -84,15 +85,9 @@ def forced_by(model: Model, record: Record) -> tuple[Model, Pumping]:
 
 def with_delays(model: Model, input_delay: float, measurement_delay: float) -> Model:
     """The model with these transport delays [s], whose elements are added where it lacks them."""
-    catalogue = (
-        load_catalogue()
-        if not {"input_delay", "measurement_delay"} <= {t.label for t in model.terms}
-        else None
-    )
     for label, delay in (("input_delay", input_delay), ("measurement_delay", measurement_delay)):
         if model.term(label) is None:
-            assert catalogue is not None
-            model = model.with_element(catalogue[label], {"delay": delay})
+            model = model.with_element(load_catalogue()[label], {"delay": delay})
         else:
             model = model.with_values({f"{label}.delay": delay})
     return model
@@ -187,10 +182,10 @@ def identify(
             "these records are of several joints: give a model with a body:, as Model.load reads it"
         )
     clean, still = moving([cleaned(one) for one in cast(tuple[Record, ...], given)])
-    cut = [note for one in clean for note in cut_at_gaps(one.record).notes]
-    found = _identified(
-        tuple(one.record for one in clean), model, harmonics, method, forcing, offset, htf, tell
-    )
+    seen = tuple(one.record for one in clean)
+    cut = [note for one in seen for note in cut_at_gaps(one).notes]
+    with told_of_wraps(seen):
+        found = _identified(seen, model, harmonics, method, forcing, offset, htf, tell)
     return replace(found, notes=(*still, *(note for one in clean for note in one.notes), *cut, *found.notes))
 
 
