@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
+from rhythmid.diagnose.diagnosis import diagnose
+from rhythmid.errors import InputError
+from rhythmid.identify.identify import identify
+from rhythmid.model import Model
 from rhythmid.record.angle_wrap import wrap_notes
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.record import Channel, Record
+from rhythmid.start.start import start
 
 TIME = 0.01 * np.arange(2000)
 TURNING = 3.0 * np.sin(0.4 * TIME) + 1.3 * TIME  # rad
@@ -52,3 +57,42 @@ def test_check_says_it(tmp_path):
     )
     lines = quality_report(tmp_path / "run.csv", tmp_path / "signals.yaml").lines()
     assert any("jumps by 2π rad" in line for line in lines)
+
+
+SERVO = """
+units: {force: "rad/s^2", position: rad, mass: "1"}
+inertia: {mass: {value: 1, unit: "1", fixed: true}}
+command: [{velocity_control: {gain: {value: GAIN, unit: "1/s"}}}]
+"""
+
+
+@pytest.mark.parametrize("fit", [identify, diagnose])
+@pytest.mark.parametrize("gain", ["3.0", "2.0e+5"])
+def test_a_fit_says_it_whether_it_fails_or_not(fit, gain):
+    """With the second gain the model is too stiff for any step."""
+    asked = Channel(TIME, np.gradient(TURNING, TIME), "rad/s")
+    record = Record(
+        "wheel", Channel(TIME, TURNING % (2.0 * np.pi), "rad"), input=asked, input_kind="reference"
+    )
+    model = Model.from_text(SERVO.replace("GAIN", gain))
+    try:
+        told = " ".join(fit(record, model).notes if fit is identify else fit(record, model).diagnosis.notes)
+    except InputError as error:
+        told = str(error)
+        assert "diverges" in told and "\n" not in told
+    assert "wheel: output: it jumps by 2π rad" in told
+
+
+def test_init_asks_for_a_look_and_takes_no_gain_of_a_balance_that_explains_nothing(tmp_path):
+    asked = np.degrees(np.gradient(TURNING, TIME))
+    for name, angle in (("read", TURNING % (2.0 * np.pi)), ("unwrapped", TURNING)):
+        rows = (f"{t:.2f},{r:.6f},{y:.6f}" for t, r, y in zip(TIME, asked, np.degrees(angle)))
+        path = tmp_path / f"{name}.csv"
+        path.write_text("\n".join(["time_s,commanded_deg_s,angle_deg", *rows]) + "\n")
+        begun = start([path])
+        checks = " ".join(line for line in begun.lines() if line.startswith("CHECK"))
+        assert ("CHECK output: it jumps by 2π rad" in checks) is (name == "read")
+        assert ("CHECK velocity_control: a balance with the motion explains only" in checks) is (
+            name == "read"
+        )
+        assert begun.nominal.model.value("velocity_control.gain") < 1e3 or name == "unwrapped"

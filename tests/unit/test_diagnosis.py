@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from axes import axis, axis_model
 from json_schema import conforming
@@ -15,6 +16,9 @@ from rhythmid.diagnose.diagnosis import BY_MOTION, Answer, diagnose, with_unit_w
 from rhythmid.diagnose.rejections import RULES
 from rhythmid.diagnose.replay import redecide
 from rhythmid.errors import InputError
+from rhythmid.model import Model
+from rhythmid.proof.noise import coloured
+from rhythmid.record.record import Channel, Record
 
 FRICTION = {"force": 0.02, "transition": 0.002}
 FEW = ("coulomb_friction", "stribeck_friction", "cubic_stiffness", "actuator_lag", "periodic_disturbance")
@@ -147,3 +151,26 @@ def test_a_drift_beside_a_strong_effect_does_not_pass_for_the_colour_of_the_nois
     assert {effect.element for effect in found.missing} == {"flight_damping", "sensor_drift"}
     drift = next(effect for effect in found.missing if effect.element == "sensor_drift").parameters["rate"]
     assert drift.std is not None and abs(drift.value - 1e-4) < 4.0 * drift.std < 5e-5
+
+
+@pytest.mark.parametrize(("shaken", "verdict"), [(0.0, "consistent"), (6.0, "undecided")])
+def test_what_shakes_a_machine_unrecorded_is_no_noise_where_windows_are_scored_either(shaken, verdict):
+    """A force that nobody recorded makes errors of the windows that follow from their own past, although free starts take up most."""
+    text = """
+units: {force: "m/s^2", position: m, mass: "1"}
+inertia: {mass: {value: 1, unit: "1", fixed: true}}
+force:
+  - linear_spring: {stiffness: {value: 9.0, unit: "1/s^2"}}
+  - viscous_damper: {damping: {value: 0.02, unit: "1/s"}}
+"""
+    model, rng = Model.from_text(text, catalogue=CATALOGUE), np.random.default_rng(5)
+    time, step = np.arange(0.0, 30.0, 0.02), 0.02
+    force = shaken * coloured(rng.standard_normal(len(time)), 0.9)
+    value, x, v = np.empty(len(time)), 0.5, 0.0
+    for k, pushed in enumerate(force):
+        value[k] = x
+        v += step * (pushed - 9.0 * x - 0.02 * v)
+        x += step * v
+    value += 0.003 * rng.standard_normal(len(time))
+    answer = diagnose([Record("ball", Channel(time, value, "m"))], model, catalogue=only("coulomb_friction"))
+    assert answer.diagnosis.verdict == verdict

@@ -20,6 +20,11 @@ def test_an_autoregressive_process_is_recovered(coefficients):
     assert noise.coefficients[: len(coefficients)] == pytest.approx(coefficients, abs=0.03)
 
 
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
+def test_of_first_order_noise_the_correlation_follows_from_its_own_past(correlation):
+    assert NoiseModel(np.array([correlation]), 0.3).predictable == pytest.approx(correlation, abs=1e-3)
+
+
 def test_white_noise_gets_no_colour_in_most_draws():
     orders = [estimate_noise([np.random.default_rng(seed).standard_normal(5000)]).order for seed in range(40)]
     assert sum(order == 0 for order in orders) >= 34

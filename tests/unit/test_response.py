@@ -1,10 +1,14 @@
 """What a force does to a free run: the answer is that to a force which is as small as can be."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from rhythmid.diagnose.free_functions import free_maps
 from rhythmid.diagnose.search.response import response
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
+from rhythmid.diagnose.search.tangent import Tangent
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.descent import WHITE
 from rhythmid.identify.output_error import estimate, start_only
@@ -124,3 +128,17 @@ def test_twice_the_force_does_twice_as_much_and_none_does_nothing(swinging):
     assert once is not None and twice is not None and apart(twice, 2.0 * once) < 0.05
     none = response(swinging, 0, np.zeros(len(friction(swinging))))
     assert none is not None and not none.any()
+
+
+def test_an_answer_whose_squares_would_overflow_is_none(swinging):
+    count = len(swinging.paths[0].time)
+    maps = np.zeros(
+        (count - 1, 3, 4)
+    )  # grows to 1e160: finite, as of a machine that is too stiff for the step
+    maps[:, 0, 0] = maps[:, 2, 0] = 10.0 ** (160.0 / count)
+    maps[:, 0, 2] = 1.0
+    stiff = replace(swinging)
+    stiff.__dict__["tangents"] = (Tangent(maps, 0.0),)
+    assert 1e150 < np.abs(stiff.tangents[0].response(np.ones(count))).max() < np.inf
+    assert response(stiff, 0, np.ones(count)) is None
+    assert not np.any(next(free_maps(stiff)).columns)

@@ -46,6 +46,20 @@ def test_meshes_do_not_matter_where_nothing_touches(tmp_path: Path):
     assert body.parameters["upper.mass"] == pytest.approx(1.5)  # the tool is a part of it
 
 
+@pytest.mark.parametrize(
+    ("end", "joint", "link"), [("parent", "shoulder", "base"), ("child", "grip", "finger")]
+)
+def test_a_link_that_a_joint_names_and_the_file_lacks_is_told(
+    tmp_path: Path, end: str, joint: str, link: str
+):
+    path = written(tmp_path)
+    path.write_text(path.read_text().replace(f'<link name="{link}"', f'<link name="other_{link}"'))
+    with pytest.raises(InputError) as caught:
+        MujocoBody.load(path, contacts=False)
+    assert f"joint {joint!r} has the {end} link {link!r}, which the file lacks" in str(caught.value)
+    assert "\n" not in str(caught.value) and f'<link name="{link}"/>' in str(caught.value)
+
+
 def test_a_mesh_that_contacts_need_and_nobody_can_read_is_told_with_what_to_do(tmp_path: Path):
     with pytest.raises(InputError, match=r"upper\.dae.*contacts: false") as caught:
         MujocoBody.load(written(tmp_path))

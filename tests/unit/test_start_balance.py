@@ -57,3 +57,9 @@ def test_a_step_that_never_changes_tells_inertia_and_spring_by_where_it_holds_th
     assert model.value("linear_spring.stiffness") == pytest.approx(6.0, rel=0.05)
     assert labels(found) == {"linear_spring", "viscous_damper"}
     assert "never changes: all values are by how far from its zero" in " ".join(found.lines())
+
+
+def test_a_force_that_explains_nothing_of_the_motion_is_doubted(tmp_path):
+    found = begun(tmp_path, FORCE, moved(tones(2, TIME), 0.05, 0.5, 6.0)[0])
+    (line,) = (one for one in found.lines() if one.startswith("CHECK inertia"))
+    assert "the balance of forces" in line and "put in what is known" in line

@@ -8,15 +8,19 @@ import pytest
 from machines import CATALOGUE, hopper, record, records
 from rhythmid.elements.random_delay import uniform_delay
 from rhythmid.identify.free_run import prepare_run
+from rhythmid.identify.identification import Estimate
 from rhythmid.identify.joint import JointFit, joint_likelihood
-from rhythmid.identify.output_error import Fit, minimise
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.output_error import Fit, minimise, start_only
 from rhythmid.identify.series import prepare
 from rhythmid.identify.timing import (
     _first_samples,
+    _simulated,
     command_hold,
     compensated,
     measurement_jitter,
 )
+from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
 
 U, Y = "input_delay.delay", "measurement_delay.delay"
@@ -118,6 +122,30 @@ def test_measurement_jitter_is_read_off_residuals_that_grow_with_speed():
     jitter = measurement_jitter(joint.fit)
     assert jitter.value == pytest.approx(2e-4, rel=0.05)
     assert near(joint, U, DELAYS[0], 5e-5) and near(joint, Y, DELAYS[1] + late.mean())  # its mean is a delay
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.0])
+def test_a_motion_of_one_speed_tells_no_jitter(noise):
+    text = """
+units: {force: "rad/s^2", position: rad, mass: "1"}
+inertia: {mass: {value: 1, unit: "1", fixed: true}}
+force: [{viscous_damper: {damping: {value: 0.0, unit: "1/s"}}}]
+"""
+    time = np.arange(0.0, 10.0, 0.01)
+    speed = 9.0 + noise * np.random.default_rng(0).standard_normal(len(time))
+    series = prepare([Record("spins", Channel(time, speed, "rad/s"), output_kind="velocity")])
+    even = start_only(Model.from_text(text, catalogue=CATALOGUE), series, NoiseModel(np.empty(0), 0.1), 0.01)
+    assert measurement_jitter(even) == Estimate(None, None, "s")
+
+
+def test_a_fit_that_leaves_nothing_has_no_jitter():
+    exact = fitted(record(hopper(), SPEC, delays=DELAYS, std=5e-6)).fit
+    simulated = [
+        replace(one, value=np.concatenate([_simulated(exact, i)[0], one.value[one.blocks * one.block :]]))
+        for i, one in enumerate(exact.run.series)
+    ]
+    exact = replace(exact, run=replace(exact.run, series=tuple(simulated)))
+    assert measurement_jitter(exact) == Estimate(0.0, 0.0, "s")
 
 
 def test_lost_samples_of_every_channel_do_no_harm():

@@ -92,9 +92,19 @@ def test_a_model_that_misses_much_is_not_called_consistent_though_nothing_explai
     assert ("misses" in decision.reason) is (expected == "undecided")
 
 
-@pytest.mark.parametrize(("missed", "expected"), [(0.04, "consistent"), (0.06, "undecided")])
-def test_a_mismatch_that_is_no_noise_is_not_called_consistent_though_nothing_explains_it(missed, expected):
-    made = replace(contest(supposed("", predicted((missed * SIZE) ** 2))), structured=True)
+@pytest.mark.parametrize(
+    ("missed", "share", "expected"),
+    [
+        (0.04, 1.0, "consistent"),
+        (0.06, 1.0, "undecided"),
+        (0.15, 0.83, "undecided"),
+        (0.15, 0.2, "consistent"),
+    ],
+)
+def test_a_mismatch_that_is_no_noise_is_not_called_consistent_though_nothing_explains_it(
+    missed, share, expected
+):
+    made = replace(contest(supposed("", predicted((missed * SIZE) ** 2))), structured=share)
     _, decision = decided(made)
     assert decision.verdict == expected
     assert ("no noise" in decision.reason) is (expected == "undecided")

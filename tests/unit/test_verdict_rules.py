@@ -23,7 +23,7 @@ def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
         "more_to_try": replace(left, cut_short=True),
         "unnamed_remainder": contest(NOMINAL, maps={"velocity": predicted(0.1)}),
         "missed": contest(supposed("", predicted((0.5 * SIZE) ** 2))),
-        "structured": replace(contest(NOMINAL), structured=True),
+        "structured": replace(contest(NOMINAL), structured=1.0),
         "nothing_missing": contest(NOMINAL),
         "freed_value": contest(NOMINAL, mass),
         "longer_delay": contest(NOMINAL, late),

@@ -7,6 +7,7 @@ inertias are what a body needs; its shapes matter only where something touches.
 
 import os
 import warnings
+import xml.etree.ElementTree as tree
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -67,7 +68,7 @@ def read_robot(
         try:
             spec = mj.MjSpec.from_file(str(path))
         except (ValueError, mj.FatalError) as error:
-            raise refused(path, error) from None
+            raise _without_links(path) or refused(path, error) from None
     if base == FIXED:
         floating = [one for one in spec.joints if one.type == mj.mjtJoint.mjJNT_FREE]
         for one in (*floating, *(spec.keys if floating else ())):  # key frames hold its positions, too
@@ -115,6 +116,25 @@ def quiet_data(model: Any) -> Any:
 def refused(path: Path, error: Exception) -> InputError:
     """What MuJoCo says of a file, in one line."""
     return InputError(f"{path}: MuJoCo refuses it: {' '.join(str(error).split())}")
+
+
+def _without_links(path: Path) -> InputError | None:
+    """What to do about links that joints of a URDF name and that it does not have, in one line; None where there are none."""
+    try:
+        robot = tree.parse(path).getroot()
+    except tree.ParseError:
+        return None
+    links = {one.get("name") for one in robot.iter("link")}
+    for joint in robot.iter("joint"):
+        for end in ("parent", "child"):
+            named = joint.find(end)
+            link = None if named is None else named.get("link")
+            if link is not None and link not in links:
+                return InputError(
+                    f"{path}: joint {joint.get('name')!r} has the {end} link {link!r}, which the file lacks: "
+                    f'add  <link name="{link}"/>  to it, or name one of its links there'
+                )
+    return None
 
 
 def _leave_meshes_out(spec: Any) -> None:

@@ -114,7 +114,7 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
         found = _weighed(found, found.trials, contenders)
     run = trajectories(found.fit)
     sizes = scales(seen, found.fit.model)
-    structured = scoring.kind == "free_run" and calibration.fit.noise.is_structure
+    structured = calibration.fit.noise.predictable
     chosen = select(_contest(contenders, {}, rows, found, run, sizes, structured)).chosen
     trial = _trial_of(chosen, contenders)
     if trial.added != found.best.added:
@@ -304,7 +304,7 @@ def _contest(
     found: Search,
     run: Trajectories,
     sizes: Scales,
-    structured: bool,
+    structured: float,
 ) -> Contest:
     names = {score.element.name for one in found.rounds for score in one.scores}
 

@@ -89,7 +89,7 @@ def contest_of(data: dict[str, Any]) -> Contest:
         hypotheses[competing:],
         data.get("follows") or math.inf,
         data.get("cut_short", False),
-        data.get("structured", False),
+        float(data.get("structured", 0.0)),
     )
 
 

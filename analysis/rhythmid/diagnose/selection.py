@@ -40,7 +40,8 @@ class Contest:
     follows : error on held-out data, as a share of `size`, up to which a model follows the machine; infinite for an effort, whose noise
         may be as large.
     cut_short : whether the budget ended the search before all effects that scored well were tried.
-    structured : whether what the nominal model leaves in free run follows from its own past, so that it is no noise.
+    structured : share of the error of the nominal model that follows from its own past, so that it is no noise; 0 of an effort, whose noise
+        the filter of the balance colours.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -51,7 +52,7 @@ class Contest:
     ruled_out: tuple[Hypothesis, ...] = ()
     follows: float = math.inf
     cut_short: bool = False
-    structured: bool = False
+    structured: float = 0.0
 
     @property
     def nominal(self) -> Hypothesis:

@@ -217,7 +217,7 @@ def decide(
         left.goes_with,
         math.sqrt(left.least) / max(contest.practical * contest.size, 1e-300),
         missed,
-        missed if contest.structured else 0.0,
+        contest.structured * missed,
         (chosen.heldout_nrmse or 0.0) / contest.follows,
         detectable,
         size_errors.get(labels[0], 0.0) if labels else 0.0,

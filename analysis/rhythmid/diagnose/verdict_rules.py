@@ -25,7 +25,7 @@ class Outcome:
     goes_with : the quantity that this depends on.
     remainder : rms of what it leaves and something else predicts by more than chance, at least, over the smallest of practical importance.
     missed : rms error of the chosen hypothesis, as a share of what was measured.
-    structured : the same where it follows from its own past, so that it is no noise; else 0.
+    structured : the part of it that follows from its own past, so that it is no noise.
     astray : its error on held-out data, over that up to which a model follows the machine.
     detectable : smallest effect that the records would show, the same.
     vague : standard deviation of the size of its effect with the largest share, relative to the size.
@@ -72,6 +72,7 @@ class VerdictRule:
             goes_with=found.goes_with,
             left=100.0 * found.left,
             missed=100.0 * found.missed,
+            structured=100.0 * found.structured,
             detectable=100.0 * found.detectable,
         )
 
@@ -118,11 +119,11 @@ VERDICT_RULES: tuple[VerdictRule, ...] = (
     ),
     VerdictRule(
         "structured",
-        "no effect is accepted: error of the refitted nominal model in free run, as a share of what was measured, where it follows from its own past",
+        "no effect is accepted: the part of the error of the refitted nominal model that follows from its own past, as a share of what was measured",
         LEFT,
         "undecided",
-        "the refitted nominal model misses {missed:.0f} % of what was measured, in a way that follows from its own past and so is no noise, and nothing "
-        "that was tried explains it",
+        "the refitted nominal model misses {missed:.0f} % of what was measured, {structured:.0f} % in a way that follows from its own past and so is no "
+        "noise, and nothing that was tried explains it",
         _alone(lambda found: found.structured),
     ),
     VerdictRule(
@@ -258,7 +259,7 @@ def table() -> str:
 
 def _words(reason: str) -> str:
     """A reason as it is told, with an ellipsis for each figure."""
-    figures = {"goes_with": "…", "left": "…", "missed": "…", "detectable": "…"}
+    figures = {"goes_with": "…", "left": "…", "missed": "…", "structured": "…", "detectable": "…"}
     return reason.replace(":.0f", "").format(**figures)
 
 

@@ -38,6 +38,7 @@ from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, s
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
 from rhythmid.progress import Tell, counted, silent
+from rhythmid.record.angle_wrap import told_of_wraps
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.record import Record
@@ -84,15 +85,9 @@ def forced_by(model: Model, record: Record) -> tuple[Model, Pumping]:
 
 def with_delays(model: Model, input_delay: float, measurement_delay: float) -> Model:
     """The model with these transport delays [s], whose elements are added where it lacks them."""
-    catalogue = (
-        load_catalogue()
-        if not {"input_delay", "measurement_delay"} <= {t.label for t in model.terms}
-        else None
-    )
     for label, delay in (("input_delay", input_delay), ("measurement_delay", measurement_delay)):
         if model.term(label) is None:
-            assert catalogue is not None
-            model = model.with_element(catalogue[label], {"delay": delay})
+            model = model.with_element(load_catalogue()[label], {"delay": delay})
         else:
             model = model.with_values({f"{label}.delay": delay})
     return model
@@ -188,7 +183,8 @@ def identify(
     cut = [note for one in clean for note in cut_at_gaps(one.record).notes]
     fitted = tuple(one.record for one in clean)
     unseen, said = admitted_unseen(cast(tuple[Record, ...], judged), fitted, model or paper_hopper())
-    found = _identified(fitted, model, harmonics, method, forcing, offset, htf, tell)
+    with told_of_wraps(fitted):
+        found = _identified(fitted, model, harmonics, method, forcing, offset, htf, tell)
     notes = (*still, *(note for one in clean for note in one.notes), *cut, *said, *found.notes)
     if not unseen:
         return replace(found, notes=notes)

@@ -42,6 +42,11 @@ class NoiseModel:
         return self.variance > PREDICTED * self.std**2
 
     @property
+    def predictable(self) -> float:
+        """Share of its rms that follows from its own past; 0 of white noise."""
+        return float(np.sqrt(max(1.0 - self.std**2 / self.variance, 0.0)))
+
+    @property
     def long_run_variance(self) -> float:
         """Spectral density at zero frequency: what slow averages of the noise scatter with."""
         return float(self.std**2 / (1.0 - self.coefficients.sum()) ** 2)

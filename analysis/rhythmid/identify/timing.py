@@ -39,6 +39,7 @@ LEAST_VARIANCE = (
     0.05  # of the mean square of the residuals, at least expected of each: no single sample decides
 )
 TINY = 1e-300  # in the place of a mean square of zero
+EVEN_SPEED = 1e-12  # variance of squares of speed of mean one, which is rounding: those of a motion differ by one and more
 UNEXPLAINED = 1.5  # times the noise floor, beyond which a hold is looked for
 HOLD_GAIN = 25.0  # in chi2 that a hold must bring
 SLOWER = 3.0  # sample periods from which a hold can be told from the commands' own
@@ -152,7 +153,7 @@ def measurement_jitter(fit: Fit) -> Estimate:
     """Standard deviation σ [s] of the age of single measurements, from residuals that grow with speed.
 
     Residual variance is σ_n² + σ² v²: a weighted straight line in v² (T. M. Souders et al., IEEE TIM 39(1), 1990). The
-    mean of the jitter is part of the measurement delay.
+    mean of the jitter is part of the measurement delay. A signal whose speed is always the same determines no such line.
     """
     square, speed = [], []
     for index, one in enumerate(fit.run.series):
@@ -168,6 +169,8 @@ def measurement_jitter(fit: Fit) -> Estimate:
     per_speed, size = max(float(x.mean()), TINY), max(float(y.mean()), TINY)
     x /= per_speed
     y /= size
+    if float(x.var()) < EVEN_SPEED:
+        return Estimate(None, None, "s")
     solution, weight = np.zeros(2), np.ones(len(x))
     inverse = np.eye(2)
     for again in range(4):
@@ -182,7 +185,7 @@ def measurement_jitter(fit: Fit) -> Estimate:
     variance = float(solution[1]) * size / per_speed
     spread = math.sqrt(covariance[1, 1]) * size / per_speed
     std = math.sqrt(max(variance, 0.0))
-    return Estimate(std, spread / (2.0 * max(std, math.sqrt(spread))), "s")
+    return Estimate(std, spread / (2.0 * max(std, math.sqrt(spread), TINY)), "s")
 
 
 def _refitted(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None) -> Fit:

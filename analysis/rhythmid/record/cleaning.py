@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
+from rhythmid.record.angle_wrap import wrap_notes
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.outlier import outlying_samples, repeated_samples
 from rhythmid.record.quality import clipped_samples
@@ -64,15 +65,21 @@ class LeftOut:
 
 @dataclass(frozen=True, eq=False)
 class Cleaned:
-    """A record as it is analysed, and what was left out of it."""
+    """A record as it is analysed, what was left out of it, and what else is to be told of its output."""
 
     record: Record
     left_out: tuple[LeftOut, ...]
+    told: tuple[str, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out, one line each."""
-        return tuple(f"{self.record.name}: {one.words}" for one in self.left_out)
+        """What was left out and what else is to be told, one line each."""
+        return tuple(f"{self.record.name}: {words}" for words in self.words)
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The notes without the record's name."""
+        return (*(one.words for one in self.left_out), *self.told)
 
 
 def cleaned(record: Record) -> Cleaned:
@@ -81,7 +88,7 @@ def cleaned(record: Record) -> Cleaned:
     An acceleration keeps its outliers: impacts do make such peaks there. With clipped samples go their neighbours, which are often
     half clipped by the sensor's own averaging. Raises InputError when most of the record is clipped.
     """
-    total, found = len(record.output), []
+    total, found, wraps = len(record.output), [], wrap_notes(record)
     for reason, find in FINDERS:
         channel = record.output
         bad = find(channel.value)
@@ -98,7 +105,7 @@ def cleaned(record: Record) -> Cleaned:
             bad = bad | np.append(bad[1:], False) | np.insert(bad[:-1], 0, False)
         found.append(LeftOut(reason, int(bad.sum()), total, float(channel.time[bad][0]), limits))
         record = replace(record, output=replace(channel, time=channel.time[~bad], value=channel.value[~bad]))
-    return Cleaned(record, tuple(found))
+    return Cleaned(record, tuple(found), wraps)
 
 
 def peak_note(record: Record) -> str | None:
@@ -118,15 +125,15 @@ def peak_note(record: Record) -> str | None:
 
 
 def cleaned_joints(records: Sequence[JointRecord]) -> tuple[list[JointRecord], tuple[str, ...]]:
-    """The recordings of a machine, each joint's record cleaned, and what was left out, one line each."""
+    """The recordings of a machine, each joint's record cleaned, and what was left out or is to be told, one line each."""
     made, notes = [], []
     for whole in records:
         joints = {joint: cleaned(record) for joint, record in whole.joints.items()}
         base = None if whole.base is None else cleaned(whole.base)
         notes += [
-            f"{whole.name}, {'base' if joint is None else joint}: {one.words}"
+            f"{whole.name}, {'base' if joint is None else joint}: {words}"
             for joint, found in (*joints.items(), *([] if base is None else [(None, base)]))
-            for one in found.left_out
+            for words in found.words
         ]
         made.append(
             replace(

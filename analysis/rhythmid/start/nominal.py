@@ -233,21 +233,30 @@ def _servo(records: Sequence[Record], roles: Roles, units: Units, catalogue: Cat
     if law.delay > 0.0:
         model = model.with_element(catalogue["input_delay"], {"delay": _short(law.delay)})
         reasons["input_delay"] = "the balance is better when the reference acts so much later"
-    told = f"the reference drives; gains by least squares of the acceleration, of which they explain {max(0.0, 1.0 - law.left):.0%}"
+    told, doubts = "the reference drives; gains by ", dict[str, str]()
+    if law.left > UNEXPLAINED:
+        told += "the frequency of the motion only"
+        doubt = (
+            f"a balance with the motion explains only {max(0.0, 1.0 - law.left):.0%} of the reference: see that both are what they are taken "
+            "for, and put in what is known"
+        )
+        doubts = {f"{roles.reference_of}_control": doubt}
+    else:
+        told += f"a balance with the motion, which explains {1.0 - law.left:.0%} of the reference"
     gain = _short(law.coefficients["gain"])
     if roles.reference_of == "velocity":
         model = model.with_element(catalogue["velocity_control"], {"gain": gain})
-        return Nominal(model, reasons | {"velocity_control": told}, ())
+        return Nominal(model, reasons | {"velocity_control": told}, (), doubts)
     derivative = _short(law.coefficients["velocity"])
     model = model.with_element(
         catalogue["position_control"], {"proportional": gain, "derivative": derivative}
     )
     remark = "No viscous damper: without a recorded effort it does what the derivative gain does."
-    return Nominal(model, reasons | {"position_control": told}, (remark,))
+    return Nominal(model, reasons | {"position_control": told}, (remark,), doubts)
 
 
 def _servo_law(records: Sequence[Record], of: str) -> Law:
-    """Gains of  acceleration = k_p (reference − position) − k_d velocity, by size alone where that comes out negative.
+    """Gains of  acceleration = k_p (reference − position) − k_d velocity, by size alone where that comes out negative or explains next to nothing.
 
     The balance is solved for the reference: r = x + (a + k_d v) / k_p.
     """
@@ -269,8 +278,8 @@ def _servo_law(records: Sequence[Record], of: str) -> Law:
     lag = law.coefficients["velocity"]
     # an inertia that follows within an interval of the filtered motion is not seen, and would only make the model stiff
     inertial = max(law.coefficients["acceleration"], lag * max(rows.period))
-    if inertial <= 0.0:
-        return fallback
+    if inertial <= 0.0 or law.left > UNEXPLAINED:
+        return replace(fallback, left=law.left)
     return Law({"gain": 1.0 / inertial, "velocity": lag / inertial}, law.left, law.delay)
 
 
@@ -306,10 +315,10 @@ def _by_size(
     damping = 0.1 * mass * 2.0 * math.pi * found.frequency
     model = model.with_element(catalogue["viscous_damper"], {"damping": _short(damping)})
     reasons = {
-        INERTIA: f"by the sizes of force and motion at {found.frequency:.3g} Hz only: {why}",
+        INERTIA: f"by the sizes of force and motion at {found.frequency:.3g} Hz only",
         "viscous_damper": "every machine loses energy; a damping ratio of a twentieth is a guess",
     }
-    return Nominal(model, reasons, ())
+    return Nominal(model, reasons, (), {INERTIA: f"{why}; put in what is known"})
 
 
 def _short(value: float) -> float:

@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model
+from rhythmid.record.angle_wrap import wraps_of
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.inventory import Inventory, inventory
 from rhythmid.record.read import load_records, read_record
@@ -82,10 +83,10 @@ def guess(
         clock, reason = Clock("receive"), f"the stamps do not serve: {error}"
         text = signals_yaml(found, roles, units, clock, reason)
         record = read_record(source, Signals.from_text(text, GUESSED))
-    still = standstill(cleaned(record).record)
-    if still is not None:
+    doubts = [one for one in (standstill(cleaned(record).record), wraps_of(record)) if one is not None]
+    if doubts:
         output = roles.choices["output"]
-        output = replace(output, doubts=(*output.doubts, still))
+        output = replace(output, doubts=(*output.doubts, *doubts))
         roles = replace(roles, choices={**roles.choices, "output": output})
         text = signals_yaml(found, roles, units, clock, reason)
     return Guess(found, roles, text)

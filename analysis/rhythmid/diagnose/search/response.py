@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rhythmid.identify.free_run import DIVERGED
 from rhythmid.simulation.signal import first_order_hold
 
 if TYPE_CHECKING:
@@ -18,10 +19,9 @@ SMALL = 1e-3  # of the force that shakes the machine: the part of a force that i
 def response(known: "Trajectories", index: int, force: Array) -> Array | None:
     """Change (n,) of what series `index` measures at its block centres that a force (n,) along its path makes; None where the model diverges."""
     tangent = known.tangents[index]
-    if tangent is None:
-        return _by_difference(known, index, force)
-    change = tangent.response(force)
-    return change if np.isfinite(change).all() else None
+    change = _by_difference(known, index, force) if tangent is None else tangent.response(force)
+    bounded = change is not None and float(np.abs(change).max()) < DIVERGED  # NaN is not
+    return change if bounded else None
 
 
 def _by_difference(known: "Trajectories", index: int, force: Array) -> Array | None:
