@@ -40,7 +40,7 @@ def random_motion(body: MujocoBody) -> Motion:
     return rng.normal(size=(6, count[0])), rng.normal(size=(6, count[1])), rng.normal(size=(6, count[2]))
 
 
-def swung(plant: Machine, seconds: float = 8.0) -> JointRecord:
+def swung(plant: Machine, seconds: float = 5.0) -> JointRecord:
     time, rng = np.arange(0.0, seconds, 0.002), np.random.default_rng(3)
     asked = references({"hip": (0.6, 0.3), "knee": (-1.2, 0.3)}, time, rng, (0.5, 5.0))
     return recorded(plant, asked, time, rng)
@@ -93,7 +93,9 @@ def test_the_inertia_about_the_hinge_is_that_about_the_centre_and_that_of_its_ma
 @pytest.mark.parametrize("suffix", [".yaml", ".xml", ".urdf"])
 def test_an_inertia_is_in_the_files_that_are_written(tmp_path: Path, suffix: str):
     (tmp_path / "two.urdf").write_text(TWO_LINKS)
-    (tmp_path / "two.yaml").write_text("body: {urdf: two.urdf, contacts: false}\njoints: {one: {}, two: {}}\n")
+    (tmp_path / "two.yaml").write_text(
+        "body: {urdf: two.urdf, contacts: false}\njoints: {one: {}, two: {}}\n"
+    )
     machine = Machine.load(tmp_path / "two.yaml").with_inertial(
         {"lower.mass": 1.5, "lower.inertia": 0.02, "upper.inertia": 0.01}
     )

@@ -221,7 +221,9 @@ def _machine(document: Node, folder: Path, catalogue: Catalogue) -> Machine:
     free = keys[BODY].mapping().get("free")
     inertial = {} if free is None else _free(free, body)
     # an inertia that is mentioned is one of its own, which a mass leaves as it is
-    changed = {n: v.value for n, v in inertial.items() if v.value != body.parameters[n] or split(n)[1] == TURNING}
+    changed = {
+        n: v.value for n, v in inertial.items() if v.value != body.parameters[n] or split(n)[1] == TURNING
+    }
     body = body.with_parameters(changed) if changed else body
     order = sorted(given, key=lambda name: body.joints[name].velocity)
     paths = {name: _path(given[name], name, body, catalogue) for name in order}

@@ -23,7 +23,8 @@ from rhythmid.simulation.transport import INPUT_DELAY
 # what is named has to gain more than twice as much
 PROMISING = 3.0
 STIFFNESS = 0.1  # of the effort for the motion's size, that a spring is tried at
-OF_LINKS = {MASS: "link_mass", TURNING: "link_inertia", PAYLOAD: "payload"}  # how an answer names what is wrong with a link
+# how an answer names what is wrong with a link
+OF_LINKS = {MASS: "link_mass", TURNING: "link_inertia", PAYLOAD: "payload"}
 GAINS = (0.9, 1.1)  # at which it is tried whether an actuator gives less or more than is asked of it
 
 

@@ -39,7 +39,8 @@ from rhythmid.simulation.transport import INPUT_DELAY
 if TYPE_CHECKING:
     from rich.console import Console
 
-MOST_LINKS = 2  # masses, inertias and payloads of links that are put right, at most, or as many as there are links
+# masses, inertias and payloads of links that are put right, at most, or as many as there are links
+MOST_LINKS = 2
 # of the mass that the file gives a link, below which another effect has swallowed it. A file's inertia may be that about the joint, of which
 # the one about the centre of mass is any share
 LIGHTEST = 0.1

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from rhythmid.diagnose.answer.result import Diagnosis
+from rhythmid.diagnose.answer.result import Diagnosis, FitQuality
 from rhythmid.diagnose.constants import BLIND, HOPELESS
 
 
@@ -10,7 +10,7 @@ def misfits(answers: Mapping[str, Diagnosis]) -> Iterator[str]:
     """What to check, in one sentence for each joint at which the refitted nominal model predicts the effort hardly better than nothing does,
     and the named effects leave more of it than an identified model does."""
     for joint, answer in answers.items():
-        nominal, named = (_error(answer, which) for which in ("refitted_nominal", "augmented"))
+        nominal, named = _error(answer.fit["refitted_nominal"]), _error(answer.fit["augmented"])
         if nominal < HOPELESS or named < BLIND:
             continue
         yield (
@@ -20,7 +20,6 @@ def misfits(answers: Mapping[str, Diagnosis]) -> Iterator[str]:
         )
 
 
-def _error(answer: Diagnosis, which: str) -> float:
+def _error(quality: FitQuality) -> float:
     """Error of the effort as a share of it, on held-out data where there are any."""
-    quality = answer.fit[which]
     return quality.train_nrmse if quality.heldout_nrmse is None else quality.heldout_nrmse

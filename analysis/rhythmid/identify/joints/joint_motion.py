@@ -267,7 +267,9 @@ def _rotors(
     rotor = np.concatenate([one.acceleration[:, own] for one in bodies])
     beyond = made - np.outer(rotor, rotor @ made / max(float(rotor @ rotor), 1e-300))
     alike = np.sqrt(np.mean(beyond**2, axis=0)) <= FAINT * whole
-    return tuple(n for n, one in zip(names, alike, strict=True) if one and n in links and split(n)[1] == TURNING)
+    return tuple(
+        n for n, one in zip(names, alike, strict=True) if one and n in links and split(n)[1] == TURNING
+    )
 
 
 def _felt(
