@@ -44,6 +44,19 @@ def test_coulomb_friction_of_an_axis_is_named_alone(friction):
     assert model.value("inertia.mass") == pytest.approx(1.0, abs=0.01)
 
 
+def test_a_hysteresis_that_hardly_yields_within_the_travel_is_not_named_in_the_place_of_a_spring():
+    only = CATALOGUE.without(*(name for name in CATALOGUE if name != "elastoplastic_hysteresis"))
+    found = search_effort([axis(friction=0.0, gravity=20.0, amplitude=0.5)], axis_model(), only)
+    assert "elastoplastic_hysteresis" not in found.chosen.elements
+    (out,) = [one for one in found.ruled_out if one.elements == ("elastoplastic_hysteresis",)]
+    assert out.shape["within_bounds"] < SHAPES["within_bounds"]
+    both = CATALOGUE.without(
+        *(name for name in CATALOGUE if name not in ("elastoplastic_hysteresis", "linear_spring"))
+    )
+    spring = search_effort([axis(friction=0.0, gravity=20.0, amplitude=0.5)], axis_model(), both)
+    assert spring.chosen.elements == ("linear_spring",)
+
+
 def test_a_name_predicts_no_worse_than_unknown_physics(friction):
     chosen, nominal, unknown = errors_of(friction, friction.chosen, friction.nominal)
     assert chosen < 1.1 * unknown and nominal > 10.0 * unknown

@@ -44,11 +44,12 @@ class Body(ABC):
     @property
     @abstractmethod
     def parameters(self) -> dict[str, float]:
-        """Inertial parameters by "link.mass" [kg], "link.payload" [kg] of links at ends, and "joint.armature" [kg or kg*m^2]."""
+        """Inertial parameters by "link.mass" [kg], "link.inertia" [kg*m^2] of links that turn, "link.payload" [kg] of links at ends, and "joint.armature" [kg or kg*m^2]."""
 
     @abstractmethod
     def with_parameters(self, values: Mapping[str, float]) -> "Body":
-        """A copy with some of the parameters replaced; a link whose mass is scaled keeps its shape."""
+        """A copy with some of the parameters replaced; a link whose mass is scaled keeps its shape, and one that is given an
+        inertia keeps this with any mass."""
 
     @abstractmethod
     def inverse(self, position: Array, velocity: Array, acceleration: Array) -> Array:

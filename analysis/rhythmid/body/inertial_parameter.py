@@ -1,10 +1,11 @@
-"""The inertial parameters of a body: the mass of a link, a payload at the end of one, and the inertia of a rotor."""
+"""The inertial parameters of a body: mass and rotational inertia of a link, a payload at the end of one, and the inertia of a rotor."""
 
 from rhythmid.elements.element import Parameter
 
-MASS, PAYLOAD, ARMATURE = "mass", "payload", "armature"
+MASS, TURNING, PAYLOAD, ARMATURE = "mass", "inertia", "payload", "armature"
 MEANING = {
     MASS: "mass of the link, shape kept",
+    TURNING: "inertia of the link about the axis through its centre of mass along that of its joint, shape kept",
     PAYLOAD: "point mass at the end of the link, beside its own mass",
     ARMATURE: "inertia of the rotor, seen at the joint",
 }
@@ -19,4 +20,5 @@ def split(name: str) -> tuple[str, str]:
 def described(name: str) -> Parameter:
     """What a parameter "owner.kind" is, in translational units."""
     _, kind = split(name)
-    return Parameter(kind, "kg", MEANING[kind], bounds=(0.0, float("inf")))
+    unit = "kg*m^2" if kind == TURNING else "kg"
+    return Parameter(kind, unit, MEANING[kind], bounds=(0.0, float("inf")))

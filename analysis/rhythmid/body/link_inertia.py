@@ -4,7 +4,8 @@ Ten numbers: the mass, the mass times the centre's place (3), and the inertia ab
 bodies that are fixed to each other are the sum of both.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -52,10 +53,52 @@ class Principal:
         about = axes @ np.diag(self.moments) @ axes.T + _of_point(self.mass, self.centre)
         return _joined(self.mass, self.centre, about)
 
+    def about(self, axis: Array) -> float:
+        """Moment of inertia about an axis (3,), of unit length, through the centre."""
+        along = Rotation.from_quat(np.roll(self.turn, -1)).as_matrix().T @ axis
+        return float(self.moments @ along**2)
+
+    def turned(self, axis: Array, inertia: float) -> "Principal":
+        """One with this moment about an axis (3,) through the centre. All moments change by the same factor, so that they are still those of a
+        body; where there are none, they are those of a ball."""
+        known = self.about(axis)
+        moments = self.moments * (inertia / known) if known > 0.0 else np.full(3, inertia)
+        return replace(self, moments=moments)
+
     def put_into(self, model: Any, link: int) -> None:
         """Give a link of a compiled model this inertia."""
         model.body_mass[link], model.body_inertia[link] = self.mass, self.moments
         model.body_ipos[link], model.body_iquat[link] = self.centre, self.turn
+
+
+@dataclass(frozen=True, eq=False)
+class Hinge:
+    """A hinge in the frame of a link that it turns: its place (3,) and its axis (3,), of unit length."""
+
+    place: Array
+    axis: Array
+
+    def distance(self, point: Array) -> float:
+        """Distance [m] of a point (3,) from the axis."""
+        return float(np.linalg.norm(np.cross(self.axis, point - self.place)))
+
+
+def hinges(model: Any, links: Mapping[str, int]) -> dict[str, Hinge]:
+    """Of those links that turn, the nearest hinge that turns each."""
+    mj = mujoco()
+    data = quiet_data(model)
+    mj.mj_kinematics(model, data)
+    found: dict[str, Hinge] = {}
+    for name, link in links.items():
+        axes, number = data.xmat[link].reshape(3, 3), link
+        while number and name not in found:
+            first, count = int(model.body_jntadr[number]), int(model.body_jntnum[number])
+            for joint in range(first, first + count):
+                if model.jnt_type[joint] == mj.mjtJoint.mjJNT_HINGE:
+                    place = axes.T @ (data.xanchor[joint] - data.xpos[link])
+                    found[name] = Hinge(place, axes.T @ data.xaxis[joint])
+            number = int(model.body_parentid[number])
+    return found
 
 
 def point_mass(place: Array) -> Array:

@@ -27,7 +27,7 @@ from pydantic import ConfigDict, StrictBool, TypeAdapter
 from pydantic import Field as Limits
 
 from rhythmid.body.body import BODY, Array
-from rhythmid.body.inertial_parameter import PAYLOAD, described, split
+from rhythmid.body.inertial_parameter import ARMATURE, PAYLOAD, TURNING, described, split
 from rhythmid.body.mujoco_body import MujocoBody
 from rhythmid.body.robot_file import FIXED, FREE
 from rhythmid.document import Node, parse, read
@@ -55,7 +55,7 @@ class Machine:
     ----------
     body : with the parameters that `inertial` says.
     paths : by joint, in the order of the file; the inertia of each is borrowed from the body and fixed.
-    inertial : inertial parameters that the file mentions, by "link.mass", "link.payload" or "joint.armature".
+    inertial : inertial parameters that the file mentions, by "link.mass", "link.inertia", "link.payload" or "joint.armature".
     kind : "mjcf" or "urdf", what the body's file is.
     """
 
@@ -86,8 +86,8 @@ class Machine:
 
     @cached_property
     def parameters(self) -> dict[str, Value]:
-        """All parameters: "joint.element.parameter", and "body.link.mass", "body.link.payload" and "body.joint.armature" of those that the file
-        mentions."""
+        """All parameters: "joint.element.parameter", and "body.link.mass", "body.link.inertia", "body.link.payload" and "body.joint.armature" of those
+        that the file mentions."""
         found = {f"{BODY}.{name}": value for name, value in self.inertial.items()}
         for joint, model in self.paths.items():
             found |= {f"{joint}.{n}": v for n, v in model.parameters.items() if n != INERTIA}
@@ -138,7 +138,7 @@ class Machine:
         return self.with_path(joint, self.paths[joint].with_element(element, values, fixed))
 
     def with_inertial(self, values: Mapping[str, float]) -> "Machine":
-        """A copy with inertial parameters "link.mass", "link.payload" or "joint.armature", which the file need not mention, of these values."""
+        """A copy with inertial parameters "link.mass", "link.inertia", "link.payload" or "joint.armature", which the file need not mention, of these values."""
         known = {name: self._inertial(name, value) for name, value in values.items()}
         mentioned = replace(self, inertial={**self.inertial, **known})
         return mentioned.with_values({f"{BODY}.{name}": value for name, value in values.items()})
@@ -151,7 +151,7 @@ class Machine:
 
     def _inertial(self, name: str, value: float) -> Value:
         parameter = described(name)
-        units = _units(self.body, split(name)[0])
+        units = _units(self.body, name)
         fixed = self.inertial[name].fixed if name in self.inertial else True
         return Value(value, units.of(parameter.unit), fixed, parameter.bounds)
 
@@ -197,9 +197,10 @@ def _with_inertia(model: Model, inertia: float) -> Model:
     return replace(model, mass=replace(model.mass, value=inertia))
 
 
-def _units(body: MujocoBody, owner: str) -> Units:
-    """Units of what belongs to a joint, or to a link."""
-    return ROTATIONAL if owner in body.joints and body.joints[owner].rotational else TRANSLATIONAL
+def _units(body: MujocoBody, name: str) -> Units:
+    """Units of a parameter "owner.kind", which belongs to a joint or to a link."""
+    owner, kind = split(name)
+    return ROTATIONAL if kind == ARMATURE and body.joints[owner].rotational else TRANSLATIONAL
 
 
 def _machine(document: Node, folder: Path, catalogue: Catalogue) -> Machine:
@@ -219,7 +220,10 @@ def _machine(document: Node, folder: Path, catalogue: Catalogue) -> Machine:
     body = body.with_losses(name for name in body.joints if name not in given)
     free = keys[BODY].mapping().get("free")
     inertial = {} if free is None else _free(free, body)
-    changed = {n: v.value for n, v in inertial.items() if v.value != body.parameters[n]}
+    # an inertia that is mentioned is one of its own, which a mass leaves as it is
+    changed = {
+        n: v.value for n, v in inertial.items() if v.value != body.parameters[n] or split(n)[1] == TURNING
+    }
     body = body.with_parameters(changed) if changed else body
     order = sorted(given, key=lambda name: body.joints[name].velocity)
     paths = {name: _path(given[name], name, body, catalogue) for name in order}
@@ -265,7 +269,7 @@ def _free(node: Node, body: MujocoBody) -> dict[str, Value]:
             entry.fail(f"{body.path.name} has no such parameter; it has {', '.join(known)}")
         said = {} if entry.value is None else entry.mapping()
         value = {"value": Node(known[name], entry.place, entry.path), **said}
-        made = value_of(replace(entry, value=value), described(name), _units(body, split(name)[0]))
+        made = value_of(replace(entry, value=value), described(name), _units(body, name))
         found[name] = made
     return found
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.body.body import Array, Body, Joint, Passive
-from rhythmid.body.inertial_parameter import ARMATURE, MASS, PAYLOAD, split
-from rhythmid.body.link_inertia import Principal, end_links, point_mass
+from rhythmid.body.inertial_parameter import ARMATURE, MASS, PAYLOAD, TURNING, split
+from rhythmid.body.link_inertia import Hinge, Principal, end_links, hinges, point_mass
 from rhythmid.body.robot_file import (
     FIXED,
     FREE,
@@ -141,15 +141,26 @@ class MujocoBody(Body):
             number = int(self.model.body_parentid[number])
         raise InputError(f"{self.path}: the link {link!r} does not move")
 
+    @cached_property
+    def hinges(self) -> dict[str, Hinge]:
+        """Of the links that turn, the nearest hinge that turns each."""
+        return hinges(self.model, self.links)
+
+    def about_hinge(self, link: str) -> float:
+        """Moment of inertia [kg*m^2] of a link, without its payload, about the hinge that turns it."""
+        own, hinge = self.own(link), self.hinges[link]
+        return own.about(hinge.axis) + own.mass * hinge.distance(own.centre) ** 2
+
     @property
     def parameters(self) -> dict[str, float]:
-        masses = {f"{name}.{MASS}": self._own(name).mass for name in self.links}
+        masses = {f"{name}.{MASS}": self.own(name).mass for name in self.links}
+        turning = {f"{name}.{TURNING}": self.own(name).about(one.axis) for name, one in self.hinges.items()}
         payloads = {f"{name}.{PAYLOAD}": self._payload(name) for name in self.ends}
         armatures = {
             f"{name}.{ARMATURE}": float(self.model.dof_armature[one.velocity])
             for name, one in self.joints.items()
         }
-        return masses | payloads | armatures
+        return masses | turning | payloads | armatures
 
     def with_parameters(self, values: Mapping[str, float]) -> "MujocoBody":
         mj, model = mujoco(), copy.copy(self.model)
@@ -164,13 +175,15 @@ class MujocoBody(Body):
             elif kind == MASS and not 0.0 < value < HEAVIEST:
                 raise InputError(f"the mass of link {owner!r} must be greater than 0, not {value:g}")
             elif not 0.0 <= value < HEAVIEST:
-                raise InputError(f"the payload of link {owner!r} must be 0 or greater, not {value:g}")
+                raise InputError(f"the {kind} of link {owner!r} must be 0 or greater, not {value:g}")
             else:
-                changed[owner] = self._own(owner), self._payload(owner)
+                changed[owner] = self.own(owner), self._payload(owner)
         given = {**self.given, **values}
         for link, (own, payload) in changed.items():
             share = values.get(f"{link}.{MASS}", own.mass) / own.mass
             own = replace(own, mass=own.mass * share, moments=own.moments * share)
+            if (inertia := given.get(f"{link}.{TURNING}")) is not None:
+                own = own.turned(self.hinges[link].axis, inertia)
             payload = values.get(f"{link}.{PAYLOAD}", payload)
             if payload:
                 own = Principal.from_ten(own.ten + payload * point_mass(self.ends[link]))
@@ -192,7 +205,7 @@ class MujocoBody(Body):
     def _payload(self, link: str) -> float:
         return self.given.get(f"{link}.{PAYLOAD}", 0.0)
 
-    def _own(self, link: str) -> Principal:
+    def own(self, link: str) -> Principal:
         """The inertia of a link without its payload."""
         whole = Principal.of(self.model, self.links[link])
         if payload := self._payload(link):
@@ -214,8 +227,13 @@ class MujocoBody(Body):
             elif kind == PAYLOAD:
                 unit = Principal(1.0, np.zeros(3), self.ends[owner], AS_THE_LINK)
                 made[:, :, place] = self._of_one(self.links[owner], unit, motion)
+            elif kind == TURNING:
+                ball = replace(self.own(owner), mass=0.0).turned(self.hinges[owner].axis, 1.0)
+                made[:, :, place] = self._of_one(self.links[owner], ball, motion)
             else:
-                own = self._own(owner)
+                own = self.own(owner)
+                if f"{owner}.{TURNING}" in self.given:  # which the mass leaves as it is
+                    own = replace(own, moments=np.zeros(3))
                 made[:, :, place] = self._of_one(self.links[owner], own, motion) / own.mass
         return made
 

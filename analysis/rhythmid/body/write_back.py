@@ -1,14 +1,19 @@
 """A machine back into the body's own format: MJCF or URDF with the identified values in place.
 
 MJCF has masses, rotors' inertias, viscous damping, dry friction (a soft constraint there; here a smooth law, or that constraint), and an
-actuator for each path with the controller's gains, a lag and a delay; URDF has masses and the two losses. What a file cannot express is
+actuator for each path with the controller's gains, a lag and a delay; URDF has masses, inertias and the two losses. What a file cannot express is
 told by name. The MJCF holds the paths themselves, too: `rhythmid.mujoco.apply` makes them act in a loop of the user's own.
 """
 
 import os
 import xml.etree.ElementTree as tree
 from collections.abc import Collection, Mapping, Sequence
+from itertools import combinations_with_replacement
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from rhythmid.body.embedded import NAME, text_of
 from rhythmid.body.inertial_parameter import MASS, PAYLOAD
@@ -22,7 +27,9 @@ from rhythmid.export.from_model import joint_of
 from rhythmid.export.joint import Joint
 from rhythmid.output import write_text
 
+Array = NDArray[np.float64]
 MJCF, URDF = ".xml", ".urdf"
+ROUNDING = 1e-12  # of a link's inertia, that comes of its numbers
 SMALL = 1e-3  # [m] radius of gyration of a payload in a URDF, which has no inertia of zero
 LOSSES = ("viscous_damper", "coulomb_friction", "soft_constraint_friction")
 KEPT = (
@@ -199,6 +206,20 @@ def _scale(link: tree.Element, share: float) -> None:
             inertia.set(key, repr(share * float(value)))
 
 
+def _add_inertia(link: tree.Element, ten: Array) -> None:
+    """Add the moments of inertia among ten numbers (10,) to a link of a URDF, which has the inertia of what is fixed to it as well."""
+    inertial = _section(link, "inertial")
+    inertia, origin = _section(inertial, "inertia"), inertial.find("origin")
+    _section(inertial, "mass").attrib.setdefault("value", "0")
+    turn = [0.0] * 3 if origin is None else [float(one) for one in origin.get("rpy", "0 0 0").split()]
+    axes = Rotation.from_euler("xyz", turn).as_matrix()
+    xx, yy, zz, xy, xz, yz = ten[4:]
+    more = axes.T @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ axes
+    for (row, first), (column, second) in combinations_with_replacement(enumerate("xyz"), 2):
+        key = f"i{first}{second}"
+        inertia.set(key, repr(float(inertia.get(key, "0")) + float(more[row, column])))
+
+
 def _attach(root: tree.Element, link: str, mass: float, place: Sequence[float]) -> None:
     """Fix a ball of this mass to a link of a URDF, at a place of its frame."""
     own = f"{link}_{PAYLOAD}"
@@ -213,6 +234,12 @@ def _attach(root: tree.Element, link: str, mass: float, place: Sequence[float]) 
     tree.SubElement(joint, "origin", xyz=" ".join(repr(float(one)) for one in place))
 
 
+def _beyond_mass(body: MujocoBody, given: MujocoBody, link: str) -> Array:
+    """By how much the ten numbers (10,) of a link are others than those of the file for another mass of the same shape."""
+    now, before = body.own(link), given.own(link)
+    return now.ten - before.ten * (now.mass / before.mass)
+
+
 def urdf_of(machine: Machine) -> str:
     """The body's URDF with the machine's values. Raises InputError where the body's file is no URDF."""
     if machine.kind != "urdf":
@@ -222,12 +249,16 @@ def urdf_of(machine: Machine) -> str:
     document = tree.parse(machine.body.path)
     body = machine.body
     known = body.parameters
-    given = MujocoBody.load(body.path, contacts=False, hold=body.hold).parameters
+    given = MujocoBody.load(body.path, contacts=False, hold=body.hold)
     fixed = _fixed_to(document.getroot(), body.hold)
     for link in document.iter("link"):
         name = f"{_carrier(str(link.get('name')), fixed, machine.body.links)}.{MASS}"
         if name in known:
-            _scale(link, known[name] / given[name])
+            _scale(link, known[name] / given.parameters[name])
+    for link in (one for one in document.iter("link") if one.get("name") in body.links):
+        more = _beyond_mass(body, given, str(link.get("name")))
+        if np.abs(more).max() > ROUNDING * np.abs(given.inertial(str(link.get("name")))).max():
+            _add_inertia(link, more)
     for link, place in body.ends.items():
         if payload := known[f"{link}.{PAYLOAD}"]:
             _attach(document.getroot(), link, payload, place.tolist())

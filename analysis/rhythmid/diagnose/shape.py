@@ -34,7 +34,7 @@ def shape_of(model: Model, added: Sequence[str], known: Trajectories, sizes: Sca
         if term is None:
             continue
         each = {
-            "within_bounds": _within_bounds(term, sizes),
+            "within_bounds": within_bounds(term, sizes),
             "acts_within_records": _acts_within(known, model, term),
             "own_frequency": _own_frequency(term, sizes),
         }
@@ -60,7 +60,7 @@ def _acts_within(known: Trajectories, model: Model, term: Term) -> float:
     return 0.0
 
 
-def _within_bounds(term: Term, sizes: Scales) -> float:
+def within_bounds(term: Term, sizes: Scales) -> float:
     """Least distance of a free parameter from a bound that the element's `ranges` set, as a share of that bound."""
     least = math.inf
     for name in term.element.ranges(sizes) if term.element.ranges is not None else ():

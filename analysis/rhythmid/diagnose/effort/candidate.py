@@ -131,11 +131,16 @@ def _alone(model: Model, constraint: Element) -> Model:
 
 
 def screen(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> list[Screened]:
-    """The best first guess of every addition to a fitted model, best addition first: a score test in the effort's own terms."""
+    """The best first guess of every addition to a fitted model, best addition first: a score test in the effort's own terms.
+
+    What ends at a bound takes no part: it stays there beside a small addition, though its column may be that of the addition.
+    """
     weight = weights_of(parent.residual, parent.scale) / parent.scale**2
     root = np.sqrt(weight)
     # priors are rows of their own
-    basis = orthonormal(np.vstack([parent.jacobian * root[:, None], np.diag(np.sqrt(parent.precision))]))
+    inside = ~parent.at_limit
+    rows = np.vstack([parent.jacobian * root[:, None], np.diag(np.sqrt(parent.precision))])
+    basis = orthonormal(rows[:, inside])
     target = np.concatenate([parent.residual * root, np.sqrt(parent.precision) * parent.departure])
     left = target - basis @ (basis.T @ target)
     base = balance.predicted(parent.model, parent.alignment)

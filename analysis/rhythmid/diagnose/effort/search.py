@@ -35,6 +35,7 @@ from rhythmid.diagnose.effort.scales import scales_at, scales_of
 from rhythmid.diagnose.evidence import Blocks, Linearised, predict
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, special_case
 from rhythmid.diagnose.rejections import Claim, keeps_shape, rejections_of, replaces
+from rhythmid.diagnose.shape import within_bounds
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Element
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -326,13 +327,15 @@ class _Search:
 
     def _shape(self, made: Fitted, base: Fitted, label: str, element: Element) -> dict[str, float]:
         """Statistics of an effect, by the rule that looks at them; `base` is the hypothesis without it."""
-        own = beyond_motion(self.balance, made.fit.model, label, self.nominal.linearised, self.reference)
+        model, sizes = made.fit.model, scales_of(self.balance, base.fit.model)
+        own = beyond_motion(self.balance, model, label, self.nominal.linearised, self.reference)
         shape = {"more_than_motion": own}
+        if (term := model.term(label)) is not None:
+            shape["within_bounds"] = within_bounds(term, sizes)
         if element.slot != "actuator":
             return shape
         shape["moves_the_machine"] = self._left(made, base, label)
         if self.recorded is not None:
-            model, sizes = made.fit.model, scales_of(self.balance, base.fit.model)
             required = np.concatenate(self.balance.required(model))
             shape["more_than_gain"] = beyond_gain(model, label, sizes, self.recorded, required)
         return shape

@@ -12,7 +12,7 @@ from rhythmid.diagnose.hypothesis import Verdict
 
 @dataclass(frozen=True)
 class JointEffect:
-    """An effect that the nominal model lacks at a joint; of a link's mass or payload, `link` says which, and the joint is the one that moves it.
+    """An effect that the nominal model lacks at a joint; of a link's mass, inertia or payload, `link` says which, and the joint is the one that moves it.
 
     `share` is that of the joint's mismatch. `heldout_gain` is by how much the error at the joint falls on data that no fit has seen,
     as a share of the effort.
@@ -31,7 +31,7 @@ class JointEffect:
     @property
     def of_link(self) -> str:
         """What is wrong with a link, in words; nothing where the effect acts at the joint."""
-        kind = "mass" if self.element == "link_mass" else self.element
+        kind = self.element.removeprefix("link_")
         return f"{kind} of {self.link}" if self.link else ""
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from threadpoolctl import threadpool_limits
 
 from rhythmid.body.body import BODY
-from rhythmid.body.inertial_parameter import MASS, PAYLOAD, split
+from rhythmid.body.inertial_parameter import MASS, PAYLOAD, TURNING, split
 from rhythmid.diagnose.case import Budget, Case
 from rhythmid.diagnose.effort.run import EffortResult, effort_run
 from rhythmid.diagnose.effort.search import MOST_EFFECTS
@@ -24,7 +24,8 @@ from rhythmid.simulation.transport import INPUT_DELAY
 # what is named has to gain more than twice as much
 PROMISING = 3.0
 STIFFNESS = 0.1  # of the effort for the motion's size, that a spring is tried at
-OF_LINKS = {MASS: "link_mass", PAYLOAD: "payload"}  # how an answer names what is wrong with a link
+# how an answer names what is wrong with a link
+OF_LINKS = {MASS: "link_mass", TURNING: "link_inertia", PAYLOAD: "payload"}
 GAINS = (0.9, 1.1)  # at which it is tried whether an actuator gives less or more than is asked of it
 
 
@@ -89,8 +90,8 @@ def _applicable(balance: Balance, model: Model) -> Applicability:
 
 
 def name_of(joint: str, label: str) -> tuple[str, str]:
-    """What was found wrong at a joint, and where, of a label that is no element's: a link's mass, its payload, the rotor's inertia, a
-    delay."""
+    """What was found wrong at a joint, and where, of a label that is no element's: a link's mass, its inertia, its payload, the rotor's
+    inertia, a delay."""
     if label == INERTIA:
         return "armature", joint
     if label.startswith(f"{BODY}."):

@@ -18,6 +18,7 @@ from rhythmid.simulation.transport import INPUT_DELAY
 EQUATIONS = {  # of what is no element: its slot and what it says
     "armature": ("body", "M_jj → M_jj + ΔI"),
     "link_mass": ("body", "m → m′, shape kept"),
+    "link_inertia": ("body", "J → J′ about the centre of mass, along the joint's axis"),
     "payload": ("body", "point mass m at the end of the link"),
     "actuator_delay": ("actuator", "f(t) → f(t − τ)"),
 }
@@ -36,7 +37,7 @@ def compose_machine(
     refused: Mapping[str, str],
     notes: Sequence[str] = (),
 ) -> MachineDiagnosis:
-    """The diagnosis; `links` are those whose masses or payloads were put right, `stated` the labels by which the answer at each joint stands."""
+    """The diagnosis; `links` are those whose masses, inertias or payloads were put right, `stated` the labels by which the answer at each joint stands."""
     missing = [
         _effect(found[joint], answers[joint], label)
         for joint, labels in stated.items()
@@ -109,9 +110,13 @@ def _effect(one: JointResult, answer: Diagnosis, label: str) -> JointEffect:
 
 def _own(element: str) -> str:
     """Name of the one parameter of what is no element."""
-    return {"armature": "inertia_error", "link_mass": "mass", "payload": "mass", "actuator_delay": "delay"}[
-        element
-    ]
+    return {
+        "armature": "inertia_error",
+        "link_mass": "mass",
+        "link_inertia": "inertia",
+        "payload": "mass",
+        "actuator_delay": "delay",
+    }[element]
 
 
 def _value(one: JointResult, answer: Diagnosis, label: str) -> Estimate:
@@ -134,7 +139,7 @@ def _gain(one: JointResult) -> float:
 
 
 def _link(machine: Machine, wrong: WrongLink) -> JointEffect:
-    """A link's mass or payload, with the evidence of the joint that showed it best."""
+    """A link's mass, inertia or payload, with the evidence of the joint that showed it best."""
     one, label = wrong.shown, f"{BODY}.{wrong.parameter}"
     decision = one.result.decision
     element, name = name_of(one.joint, label)

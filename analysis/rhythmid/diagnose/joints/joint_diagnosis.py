@@ -1,7 +1,7 @@
 """Diagnose a machine of several joints: at joint J, in slot S, element E.
 
 Every joint is searched as the one of a machine of one axis, beside what the rest of the body asks of it, and chance has the candidates of
-all joints. A link whose mass is wrong, or that carries a payload, shows at every joint that carries it: where one is found, it is put right, and the joints that feel
+all joints. A link whose mass or inertia is wrong, or that carries a payload, shows at every joint that carries it: where one is found, it is put right, and the joints that feel
 it are searched again.
 """
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rhythmid.body.body import BODY
-from rhythmid.body.inertial_parameter import MASS, PAYLOAD, split
+from rhythmid.body.inertial_parameter import MASS, PAYLOAD, TURNING, split
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
@@ -20,6 +20,7 @@ from rhythmid.diagnose.constants import STATED
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
+from rhythmid.diagnose.joints.misfit import misfits
 from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
@@ -39,8 +40,11 @@ from rhythmid.simulation.transport import INPUT_DELAY
 if TYPE_CHECKING:
     from rich.console import Console
 
-MOST_LINKS = 2  # masses and payloads of links that are put right, at most
-LIGHTEST = 0.1  # of the mass that the file gives a link, below which another effect has swallowed it
+# masses, inertias and payloads of links that are put right, at most, or as many as there are links
+MOST_LINKS = 2
+# of the mass that the file gives a link, below which another effect has swallowed it. A file's inertia may be that about the joint, of which
+# the one about the centre of mass is any share
+LIGHTEST = 0.1
 MATTERS = 0.02  # of a mass or an inertia, below which it is as right as a balance tells
 
 
@@ -111,14 +115,15 @@ def diagnose_machine(
         raise InputError(f"no joint can be judged: {next(iter(best.refused.values()))}")
     answers = {joint: _answer(one) for joint, one in best.found.items()}
     told = () if records[0].sampled else tuple(told_of(best.leads))
-    notes = (*machine.body.notes, *said, *of_holdout, *told)
+    put_right = (one.beside(machine) for one in best.links.values())
+    notes = (*machine.body.notes, *said, *of_holdout, *told, *put_right, *misfits(answers))
     diagnosis = compose_machine(machine, best.found, answers, best.stated, best.links, best.refused, notes)
     return MachineAnswer(diagnosis, _augmented(best), best.found)
 
 
 @dataclass(frozen=True, eq=False)
 class _Explained:
-    """What was found at the joints: the machine with the links' masses that are put right, and the `leads` [s] that were allowed for."""
+    """What was found at the joints: the machine with the links' parameters that are put right, and the `leads` [s] that were allowed for."""
 
     machine: Machine
     found: Mapping[str, JointResult]
@@ -147,11 +152,11 @@ def _explained(
     machine: Machine, balances: JointBalances, records: Sequence[JointRecord], holdout: Sequence[JointRecord],
     catalogue: Catalogue, tell: Tell, budget: Budget,
 ) -> _Explained:  # fmt: skip
-    """Search every joint, put a link's mass right where one is found, and search again what feels it."""
+    """Search every joint, put a link's mass or inertia right where one is found, and search again what feels it."""
     links: dict[str, WrongLink] = {}
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
     found, refused = _searched(balances, unseen, machine.joints, catalogue, tell, budget)
-    for _ in range(MOST_LINKS):
+    for _ in range(max(MOST_LINKS, len(machine.body.links))):
         best = _heaviest(found, set(links))
         if best is None or budget.spent:
             break
@@ -228,16 +233,16 @@ def _differs(one: JointResult, label: str) -> bool:
     if label == INPUT_DELAY or label not in one.case.nominal.parameters:
         return True
     before, after = one.case.nominal.value(label), one.result.chosen.model.value(label)
-    if after < LIGHTEST * before:
-        return False  # what takes a link's mass away is something else
     owner, kind = split(label)
+    if after <= 0.0 if kind == TURNING else after < LIGHTEST * before:
+        return False  # what takes a link's mass or its whole inertia away is something else
     known = one.case.nominal.parameters
     whole = known[f"{owner}.{MASS}"].value if kind == PAYLOAD and f"{owner}.{MASS}" in known else before
     return abs(after - before) > MATTERS * abs(whole)
 
 
 def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, JointResult] | None:
-    """The link whose mass is wrong by the strongest evidence, and the joint that says so."""
+    """The link's parameter that is wrong by the strongest evidence, and the joint that says so."""
     best: tuple[float, str, JointResult] | None = None
     for one in found.values():
         for label in stated_at(one):

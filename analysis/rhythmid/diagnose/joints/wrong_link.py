@@ -1,4 +1,4 @@
-"""A link whose mass is wrong or that carries a payload, and the machine with that put right."""
+"""A link whose mass or inertia is wrong or that carries a payload, and the machine with that put right."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,20 +6,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from rhythmid.body.body import BODY
-from rhythmid.body.inertial_parameter import PAYLOAD, split
+from rhythmid.body.inertial_parameter import MASS, PAYLOAD, TURNING, split
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Estimate
 from rhythmid.diagnose.joints.joint_case import JointResult
 from rhythmid.diagnose.joints.payload_place import placed_payload
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.record.joint_record import JointRecord
+from rhythmid.report.quantity import rounded
 
 AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True, eq=False)
 class WrongLink:
-    """What is wrong with a link: the body's `parameter`, as "link.mass" or "link.payload", its `values` ("mass" [kg]; of a payload its place
+    """What is wrong with a link: the body's `parameter`, as "link.mass", "link.inertia" or "link.payload", its `values` ("mass" [kg], or "inertia" [kg*m^2]
+    about the centre of mass along the axis of the link's joint; of a payload its place
     "x", "y", "z" [m] in the link's frame as well), and the joint that has `shown` it best."""
 
     parameter: str
@@ -29,10 +31,17 @@ class WrongLink:
     def put_right(self, machine: Machine) -> Machine:
         """The machine with these values."""
         link, kind = split(self.parameter)
-        mass = self.values["mass"].value
         if kind == PAYLOAD:
-            return machine.with_payload(link, mass, np.array([self.values[axis].value for axis in AXES]))
-        return machine.with_inertial({self.parameter: mass})
+            place = np.array([self.values[axis].value for axis in AXES])
+            return machine.with_payload(link, self.values[MASS].value, place)
+        return machine.with_inertial({self.parameter: self.values[kind].value})
+
+    def beside(self, machine: Machine) -> str:
+        """The value that a machine has, and this one, in one sentence."""
+        _, kind = split(self.parameter)
+        new = self.values[MASS if kind == PAYLOAD else kind]
+        said = f"{self.parameter}: {machine.body.parameters[self.parameter]:.4g} {new.unit} in the nominal model, "
+        return f"{said}{rounded(new.value, new.std)} ± {new.std:.2g} {new.unit} in the records"
 
 
 def wrong_link(
@@ -42,7 +51,7 @@ def wrong_link(
     parameter: str,
     shown: JointResult,
 ) -> WrongLink:
-    """The values of a link's mass or payload, which the search at a joint has found to be wrong."""
+    """The values of a link's mass, inertia or payload, which the search at a joint has found to be wrong."""
     link, kind = split(parameter)
     if kind == PAYLOAD:
         payload = placed_payload(balances, records, found, link, shown.joint)
@@ -50,10 +59,10 @@ def wrong_link(
         for axis, place, std in zip(AXES, payload.place, payload.place_std, strict=True):
             values[axis] = Estimate(float(place), float(std), "m")
         return WrongLink(parameter, values, shown)
-    label = f"{BODY}.{parameter}"
-    value = shown.result.chosen.model.parameters[label]
-    return WrongLink(
-        parameter,
-        {"mass": Estimate(value.value, shown.result.chosen.std().get(label, 0.0), value.unit)},
-        shown,
-    )
+    label, chosen = f"{BODY}.{parameter}", shown.result.chosen
+    value = chosen.model.parameters[label]
+    size, mass = value.value, f"{BODY}.{link}.{MASS}"
+    if kind == TURNING and mass in chosen.elements:  # where the mass took its shape's inertia with it
+        known = shown.case.nominal
+        size += known.value(label) * (chosen.model.value(mass) / known.value(mass) - 1.0)
+    return WrongLink(parameter, {kind: Estimate(size, chosen.std().get(label, 0.0), value.unit)}, shown)

@@ -36,7 +36,7 @@ ELEMENT = Element(
         {"stiffness": 0.02 * s.stiffness / w, "yield_displacement": w * s.position, "shape": 0.5}
         for w in (0.1, 0.4, 1.5)
     ],
-    # what does not yield within the travel is a spring
+    # beyond a spring it does 1.5 % of its mean square in cycles of a travel of one yield displacement: longer ones make it a spring
     ranges=lambda s: {"yield_displacement": (0.0, s.high - s.low)},
     against="base",
     also_known_as=("smooth hysteresis", "Dahl friction", "presliding friction"),

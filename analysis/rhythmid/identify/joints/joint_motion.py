@@ -5,6 +5,7 @@ inverse dynamics of the whole body (M. Gautier, W. Khalil, Int. J. Robot. Res. 1
 parameters). So each joint is balanced as the one of a machine of one axis, with the same elements.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rhythmid.body.body import BODY
-from rhythmid.body.inertial_parameter import MASS, PAYLOAD, described, split
+from rhythmid.body.inertial_parameter import MASS, PAYLOAD, TURNING, described, split
 from rhythmid.body.machine import Machine
 from rhythmid.elements.element import Element
 from rhythmid.identify.inverse_dynamics.balance import Balance
@@ -102,15 +103,16 @@ class JointBalances:
         stretches = joint_stretches(machine, records)
         cut, dominant = (alike.cut, alike.dominant) if alike else _cut(machine, stretches)
         bodies = [_body_motion(machine, one, cut) for one in stretches]
-        names = [f"{link}.{MASS}" for link in machine.body.links] + [
-            f"{link}.{PAYLOAD}" for link in machine.body.ends
-        ]
+        names = [f"{link}.{MASS}" for link in machine.body.links]
+        names += [f"{link}.{PAYLOAD}" for link in machine.body.ends]
+        names += [f"{link}.{TURNING}" for link in machine.body.hinges]
         columns = [machine.body.columns(names, one.pose, one.rate, one.acceleration) for one in bodies]
         models: dict[str, Model] = {}
         motions: dict[str, list[Motion]] = {}
         for joint in machine.joints:
             seen = alike.links(joint) if alike else _links(machine, joint, names, columns, bodies)
-            models[joint] = joint_model(machine, joint, records[0].taken, seen)
+            rotors = alike.rotors(joint) if alike else _rotors(machine, joint, seen, names, columns, bodies)
+            models[joint] = joint_model(machine, joint, records[0].taken, seen, rotors)
             made = []
             for body, column in zip(bodies, columns, strict=True):
                 own = {link: column[:, :, names.index(link)] for link in seen}
@@ -146,8 +148,14 @@ class JointBalances:
         return replace(self, motions=motions, leads={**self.leads, **leads})
 
     def links(self, joint: str) -> tuple[str, ...]:
-        """The links whose masses a joint feels, as "link.mass", and those whose payloads it would feel, as "link.payload"."""
+        """The links whose masses and inertias a joint feels, as "link.mass" and "link.inertia", and those whose payloads it would feel, as
+        "link.payload"."""
         return tuple(name.removeprefix(f"{BODY}.") for name in self.motions[joint][0].links)
+
+    def rotors(self, joint: str) -> tuple[str, ...]:
+        """The inertias of links among them that a joint feels as it does its rotor's, which are bounded above."""
+        values = self.models[joint].parameters
+        return tuple(one for one in self.links(joint) if math.isfinite(values[f"{BODY}.{one}"].bounds[1]))
 
     @property
     def cut(self) -> float:
@@ -189,25 +197,29 @@ def controller_effort(model: Model, joint: str, motion: Motion, body: BodyMotion
     return total
 
 
-def joint_model(machine: Machine, joint: str, taken: Taken, links: Sequence[str]) -> Model:
-    """The path of a joint as a model of one axis, with masses and payloads of links as parameters of a term `body`; without its actuator
-    where the effort was recorded behind that."""
+def joint_model(
+    machine: Machine, joint: str, taken: Taken, links: Sequence[str], rotors: Sequence[str]
+) -> Model:
+    """The path of a joint as a model of one axis, with masses, inertias and payloads of links as parameters of a term `body`; without its
+    actuator where the effort was recorded behind that. An inertia that does what the rotor's does, one of `rotors`, may be less than given by
+    more than the whole rotor: any other change is the rotor's, of which files of robots know little."""
     path = machine.paths[joint]
     terms = [t for t in path.terms if not (taken == "after_actuator" and t.element.slot == "actuator")]
     known, values = machine.body.parameters, {}
     for link in links:
         said = machine.inertial.get(link)
-        values[link] = said or Value(known[link], "kg", True, (0.0, np.inf))
+        most = max(known[link] - known[f"{joint}.armature"], 0.0) if link in rotors else np.inf
+        values[link] = said or Value(known[link], described(link).unit, True, (0.0, most))
     parameters = tuple(replace(described(link), name=link) for link in links)
     element = Element(
         name=BODY, slot="force", title="Body", equation="coupling", parameters=parameters, reference="", kernel=nothing,
         acts="drive", candidate=False,
     )  # fmt: skip
     armature = machine.inertial.get(f"{joint}.armature")
-    mass = path.mass
-    if armature is not None and not armature.fixed:
-        least = max(mass.value - armature.value, 0.0)  # no rotor has a negative inertia
-        mass = replace(mass, fixed=False, bounds=(least, np.inf))
+    # no rotor has a negative inertia
+    least = max(path.mass.value - known[f"{joint}.armature"], 0.0)
+    free = armature is not None and not armature.fixed
+    mass = replace(path.mass, fixed=not free, bounds=(least, np.inf))
     return replace(path, mass=mass, terms=(*terms, Term(element, BODY, values)))
 
 
@@ -239,15 +251,42 @@ def _body_motion(machine: Machine, stretch: JointStretch, cut: float) -> BodyMot
 def _links(
     machine: Machine, joint: str, names: Sequence[str], columns: Sequence[Array], bodies: Sequence[BodyMotion]
 ) -> tuple[str, ...]:
-    """The masses of links that a joint feels, and the payloads that it would feel if they were as heavy as their links."""
-    own = machine.body.joints[joint].velocity
-    known = machine.body.parameters
-    whole = np.concatenate([one.force[:, own] for one in bodies])
-    made = np.concatenate([one[:, own] for one in columns]) * [
-        known[f"{split(name)[0]}.{MASS}"] for name in names
-    ]
-    felt = np.sqrt(np.mean(made**2, axis=0)) > FAINT * np.sqrt(np.mean(whole**2))
+    """The masses and inertias of links that a joint feels, and the payloads that it would feel if they were as heavy as their links."""
+    whole, made = _felt(machine, joint, names, columns, bodies)
+    felt = np.sqrt(np.mean(made**2, axis=0)) > FAINT * whole
     return tuple(name for name, one in zip(names, felt, strict=True) if one)
+
+
+def _rotors(
+    machine: Machine, joint: str, links: Sequence[str], names: Sequence[str], columns: Sequence[Array],
+    bodies: Sequence[BodyMotion],
+) -> tuple[str, ...]:  # fmt: skip
+    """The inertias among these links' parameters that a joint feels as it does its rotor's."""
+    own = machine.body.joints[joint].velocity
+    whole, made = _felt(machine, joint, names, columns, bodies)
+    rotor = np.concatenate([one.acceleration[:, own] for one in bodies])
+    beyond = made - np.outer(rotor, rotor @ made / max(float(rotor @ rotor), 1e-300))
+    alike = np.sqrt(np.mean(beyond**2, axis=0)) <= FAINT * whole
+    return tuple(
+        n for n, one in zip(names, alike, strict=True) if one and n in links and split(n)[1] == TURNING
+    )
+
+
+def _felt(
+    machine: Machine, joint: str, names: Sequence[str], columns: Sequence[Array], bodies: Sequence[BodyMotion]
+) -> tuple[float, Array]:
+    """Size (rms) of the force that the body asks of a joint, and what links do to that (n, p): a mass and a payload as heavy as their link, an
+    inertia as large as that about the hinge."""
+    own, body = machine.body.joints[joint].velocity, machine.body
+    known = body.parameters
+
+    def size(name: str) -> float:
+        link, kind = split(name)
+        return body.about_hinge(link) if kind == TURNING else known[f"{link}.{MASS}"]
+
+    whole = np.concatenate([one.force[:, own] for one in bodies])
+    made = np.concatenate([one[:, own] for one in columns]) * [size(name) for name in names]
+    return float(np.sqrt(np.mean(whole**2))), made
 
 
 def _motion(
