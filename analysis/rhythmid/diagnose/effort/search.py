@@ -369,9 +369,8 @@ class _Search:
             Fitted.of(elements, _kind_of(elements, model), fit, priors),
             scales_of(self.balance, model),
         )
-        terms = [
-            term for label in elements if (term := fit.model.term(label)) is not None
-        ]  # which all have moved
+        # all of them have moved
+        terms = [term for label in elements if (term := fit.model.term(label)) is not None]
         ends = [within_bounds(term, sizes) for term in terms]
         return replace(made, shape={"within_bounds": min(ends, default=math.inf)})
 
