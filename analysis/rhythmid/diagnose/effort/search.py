@@ -220,7 +220,7 @@ class _Search:
             if model is not None and not time_is_up():
                 aligned = self._aligned(plain.elements)
                 fit = self._fit(plain.elements, model, plain.priors, aligned, best.fit.alignment)
-                made = replace(fit, shape=plain.shape)
+                made = replace(fit, shape=_worst(plain.shape, fit.shape))
                 *_, again = predict(
                     [one.linearised for one in (*new, made)], self.blocks, self.balance.record
                 )
@@ -268,7 +268,7 @@ class _Search:
             if name != label and not name.startswith(f"{label}.")
         }
         made = self._fit(rest, model, priors, self._aligned(rest), fitted.fit.alignment)
-        shape: dict[str, float] = {}
+        shape = dict(made.shape)
         for one in rest:  # beside fewer effects it may do what it did not before
             term = made.fit.model.term(one)
             if term is not None:
@@ -321,17 +321,14 @@ class _Search:
         if any(not math.isfinite(prior.std) or prior.std <= 0.0 for prior in priors.values()):
             return None
         made = self._fit((*base.elements, label), model, priors, aligned, alignment)
-        if start.element is None:
-            return replace(made, shape=base.shape)
-        return replace(made, shape=_worst(base.shape, self._shape(made, base, label, start.element)))
+        own = self._shape(made, base, label, start.element) if start.element else {}
+        return replace(made, shape=_worst(base.shape, made.shape, own))
 
     def _shape(self, made: Fitted, base: Fitted, label: str, element: Element) -> dict[str, float]:
         """Statistics of an effect, by the rule that looks at them; `base` is the hypothesis without it."""
         model, sizes = made.fit.model, scales_of(self.balance, base.fit.model)
         own = beyond_motion(self.balance, model, label, self.nominal.linearised, self.reference)
         shape = {"more_than_motion": own}
-        if (term := model.term(label)) is not None:
-            shape["within_bounds"] = within_bounds(term, sizes)
         if element.slot != "actuator":
             return shape
         shape["moves_the_machine"] = self._left(made, base, label)
@@ -368,7 +365,14 @@ class _Search:
         self, elements: tuple[str, ...], model: Model, priors: dict[str, Prior], aligned: Alignment, at: float
     ) -> Fitted:
         fit = fit_effort(self.balance, model, [n for n in model.free if n in priors], priors, aligned, at)
-        return Fitted.of(elements, _kind_of(elements, model), fit, priors)
+        made, sizes = (
+            Fitted.of(elements, _kind_of(elements, model), fit, priors),
+            scales_of(self.balance, model),
+        )
+        # all of them have moved
+        terms = [term for label in elements if (term := fit.model.term(label)) is not None]
+        ends = [within_bounds(term, sizes) for term in terms]
+        return replace(made, shape={"within_bounds": min(ends, default=math.inf)})
 
     def _aligned(self, elements: Sequence[str]) -> Alignment:
         usual = Alignment.of(self.balance)

@@ -34,10 +34,11 @@ ELEMENT = Element(
     size="stiffness",
     starts=lambda s: [
         {"stiffness": 0.02 * s.stiffness / w, "yield_displacement": w * s.position, "shape": 0.5}
-        for w in (0.1, 0.4, 1.5)
+        for w in (0.1, 0.4, 1.2)
     ],
-    # beyond a spring it does 1.5 % of its mean square in cycles of a travel of one yield displacement: longer ones make it a spring
-    ranges=lambda s: {"yield_displacement": (0.0, s.high - s.low)},
+    # from sliding one way to sliding the other it takes two yield displacements: in cycles of a shorter travel it nears a spring (beyond that
+    # it does 7 % of its mean square at the end of this range, 1.5 % at twice that)
+    ranges=lambda s: {"yield_displacement": (0.0, 0.5 * (s.high - s.low))},
     against="base",
     also_known_as=("smooth hysteresis", "Dahl friction", "presliding friction"),
     family="friction",
