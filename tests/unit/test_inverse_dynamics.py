@@ -8,7 +8,7 @@ from axes import CATALOGUE, axis, axis_model, frame, frame_model
 
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.applicability import applicable
-from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.balance import Balance, stuck
 from rhythmid.identify.inverse_dynamics.estimate import FARTHEST, fit_effort, size_of
 from rhythmid.record.record import Channel
 from rhythmid.simulation.effect import effect_along
@@ -56,6 +56,15 @@ def test_rows_are_the_same_for_all_models_and_leave_out_what_sticks():
     assert np.array_equal(Balance.of([axis()], with_friction()).measured, balance.measured)
     assert np.abs(balance.mechanical[:, 1]).min() > balance.stick_speed
     assert 0.0 < balance.stuck < 0.2
+
+
+def test_a_long_rest_is_left_out_with_what_the_filter_carries_of_it():
+    slow = np.zeros(100, bool)
+    slow[40:60] = True
+    slow[80:82] = True
+    out = stuck(slow, 10.0)
+    assert out[35:65].all() and not out[34] and not out[65]
+    assert out[80:82].all() and not out[79] and not out[82]
 
 
 def test_an_effort_that_is_late_is_aligned_by_two_samples_at_most():

@@ -86,5 +86,5 @@ def test_friction_under_load_is_under_the_effort_that_makes_up_for_it(name, coef
         f"  - {name}: {{coefficient: {{value: {coefficient}, unit: '1'}}, transition: {{value: {turn}, unit: rad/s}}{more}}}\n"
     )
     balance = Balance.of([Record("run", Channel(TIME, WAVE, "rad"), Channel(TIME, effort, "N*m"))], model)
-    error = balance.predicted(model) - balance.determined
+    error = balance.predicted(model) - balance.measured
     assert np.std(error) < 0.005 * np.std(balance.measured)

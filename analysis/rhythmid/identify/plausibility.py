@@ -197,7 +197,7 @@ def _with_more(record: Record, model: Model, pool: ThreadPoolExecutor | None) ->
     except InputError:
         return None
     position, speed = balance.mechanical[:, 0], balance.mechanical[:, 1]
-    missing = balance.determined - balance.predicted(own)
+    missing = balance.measured - balance.predicted(own)
     columns = np.column_stack([np.sign(speed), np.ones(len(speed)), position])
     friction, offset, stiffness = np.linalg.lstsq(columns, missing)[0]
     tried = {

@@ -126,8 +126,12 @@ def effort_runs(
 
 def _along(balance: Balance, fitted: Fitted) -> list[Array]:
     """The effort (n,) that a fit predicts at every sample of each stretch."""
-    model = fitted.fit.model
-    return balance.along(balance.required(model), balance.shift(model) + fitted.fit.alignment)
+    model, late = fitted.fit.model, balance.shift(fitted.fit.model) + fitted.fit.alignment
+    made = []
+    for motion, required in zip(balance.motions, balance.required(model), strict=True):
+        signal = balance.filtered(required, motion.period)
+        made.append(np.interp(motion.time + late, motion.time, signal))
+    return made
 
 
 def _named(balance: Balance, index: int) -> str:

@@ -199,7 +199,7 @@ def late_start(balance: Balance, parent: EffortFit) -> tuple[Alignment, float]:
     basis = orthonormal(parent.jacobian[:, 1:] * root[:, None]) if parent.names else np.zeros((len(root), 0))
     best, place = math.inf, parent.alignment
     for late in np.linspace(0.0, most, 1 + min(60, math.ceil(2.0 * most / balance.period))):
-        error = root * (balance.rows(required, shift + float(late)) - balance.determined)
+        error = root * (balance.rows(required, shift + float(late)) - balance.measured)
         error = error - basis @ (basis.T @ error)
         if float(error @ error) < best:
             best, place = float(error @ error), float(late)

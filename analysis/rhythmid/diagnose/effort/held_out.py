@@ -29,7 +29,7 @@ class HeldOut:
     def residual(self, fitted: Fitted) -> Array:
         """Predicted less recorded effort (n,)."""
         fit = fitted.fit
-        return self.balance.predicted(fit.model, fit.alignment) - self.balance.determined
+        return self.balance.predicted(fit.model, fit.alignment) - self.balance.measured
 
     def error(self, fitted: Fitted) -> float:
         """Error (rms) of the predicted effort, as a share of the variation of the recorded one."""

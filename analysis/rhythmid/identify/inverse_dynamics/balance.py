@@ -2,9 +2,7 @@
 
 u = m a − ΣF, with every element's force F computed along the motion that was measured, states included. The recorded effort is
 what is predicted and never stands among what predicts it: forces under load and the actuator see the effort that the model
-itself requires. One zero-phase filter acts on the recorded effort and on all that is compared with it. Where the machine rests
-any effort up to the breakaway force is balanced: both are taken for zero there before the filter, which then carries nothing of
-the rest to the samples beside it.
+itself requires. One zero-phase filter acts on the recorded effort and on all that is compared with it.
 """
 
 import math
@@ -26,7 +24,7 @@ from rhythmid.identify.inverse_dynamics.motion import (
     motion_of,
     stretches,
 )
-from rhythmid.identify.inverse_dynamics.rests import resting, stick_speed
+from rhythmid.identify.noise import runs
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.record.record import Record
 from rhythmid.simulation.effect import MAX_STEP, Path, effect_along, load_along
@@ -34,6 +32,8 @@ from rhythmid.simulation.transport import MEASUREMENT, delays
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+STICK = 0.03  # of the fast speed, below which dry friction is set-valued: any force up to the friction (six arm joints, an axis, a frame)
+FAST = 0.95  # quantile of the speed that is called fast
 DECIMATED = 2.5  # rows a period of the cut-off: the Nyquist rate and a quarter for the filter's slope (Gautier et al.)
 MEMORY = 2e8  # bytes of forces that are kept, so that a refit computes again only what changed
 MANY_ROWS = 200  # of a short record that are kept at least: their correlation is allowed for
@@ -56,10 +56,8 @@ class Balance:
     places : of each motion, the samples that are its rows.
     record : (n,) the record of each row, numbered in order.
     measured : (n,) the recorded effort at the rows, filtered.
-    determined : (n,) what of that the filter takes from samples in motion, which is all that a model has to explain.
-    rests : of each motion, the samples (m,) at which the machine rests.
-    stick_speed : below it [speed] it does.
-    stuck : share of the rows that were left out for that.
+    stick_speed : below it [speed], samples are left out.
+    stuck : share of the rows that were.
     period : sample period [s] of the records: the unit of the alignment.
     """
 
@@ -68,8 +66,6 @@ class Balance:
     places: tuple[NDArray[np.int64], ...]
     record: NDArray[np.int64]
     measured: Array
-    determined: Array
-    rests: tuple[Mask, ...]
     stick_speed: float
     stuck: float
     period: float
@@ -92,10 +88,10 @@ class Balance:
     ) -> "Balance":
         """The balance of these motions, whose records were sampled every `period` [s]. With `clear`, so many periods of the cut-off are
         left out at both ends of each motion, however little remains. Raises InputError where too few rows are left."""
-        slow = stick_speed(np.concatenate([one.leg_velocity for one in motions]))
+        speed = float(np.quantile(np.abs(np.concatenate([one.leg_velocity for one in motions])), FAST))
         length = sum(len(one.time) * one.period for one in motions)
         often = max(DECIMATED * chosen.effort, MANY_ROWS / length)
-        places, rests, all_rows = [], [], 0
+        places, all_rows = [], 0
         for motion in motions:
             step = max(1, int(1.0 / (often * motion.period)))
             margin = min(math.ceil(1.0 / (chosen.effort * motion.period)), len(motion.time) // 4)
@@ -103,8 +99,10 @@ class Balance:
                 margin = math.ceil(clear / (chosen.effort * motion.period))
             rows = motion.recorded(np.arange(margin, len(motion.time) - margin, step))
             all_rows += len(rows)
-            rests.append(resting(np.abs(motion.leg_velocity) <= slow, 1.0 / (chosen.motion * motion.period)))
-            places.append(rows[~rests[-1][rows]])
+            sticks = stuck(
+                np.abs(motion.leg_velocity) <= STICK * speed, 1.0 / (chosen.effort * motion.period)
+            )
+            places.append(rows[~sticks[rows]])
         count = sum(map(len, places))
         if count < LEAST_ROWS:
             raise InputError(
@@ -113,32 +111,20 @@ class Balance:
         numbers = np.concatenate([np.full(len(p), m.record) for p, m in zip(places, motions, strict=True)])
         made = cls(
             tuple(motions), chosen, tuple(places), np.unique(numbers, return_inverse=True)[1].astype(np.int64),
-            np.zeros(count), np.zeros(count), tuple(rests), slow, 1.0 - count / max(all_rows, 1), period,
+            np.zeros(count), STICK * speed, 1.0 - count / max(all_rows, 1), period,
         )  # fmt: skip
-        efforts = [one.effort for one in motions]
-        made.measured[:] = np.concatenate(
-            [made.filtered(one, m.period)[p] for one, m, p in zip(efforts, motions, places, strict=True)]
-        )
-        made.determined[:] = made.rows(efforts)
+        measured = made.rows([one.effort for one in motions])
+        made.measured[:] = measured
         return made
 
     def rows(self, signals: Sequence[Array], shift: float = 0.0) -> Array:
-        """Signals, one (n,) or (n, p) for each motion, `shift` [s] later, without what they are at rest, filtered, at the rows; (rows,) or
-        (rows, p)."""
-        found = []
-        for signal, motion, places, rest in zip(signals, self.motions, self.places, self.rests, strict=True):
-            later = _later(signal, shift / motion.period)
-            later[rest] = 0.0
-            found.append(self.filtered(later, motion.period)[places])
-        return np.concatenate(found)
-
-    def along(self, signals: Sequence[Array], shift: float = 0.0) -> list[Array]:
-        """Efforts (n,) along each motion, `shift` [s] later, filtered; at rest they are what was recorded."""
-        found = []
-        for signal, motion, rest in zip(signals, self.motions, self.rests, strict=True):
-            later = np.where(rest, motion.effort, _later(signal, shift / motion.period))
-            found.append(self.filtered(later, motion.period))
-        return found
+        """Signals, one (n,) or (n, p) for each motion, filtered, at the rows, `shift` [s] later; (rows,) or (rows, p)."""
+        return np.concatenate(
+            [
+                _sampled(self.filtered(one, motion.period), places, shift / motion.period)
+                for one, motion, places in zip(signals, self.motions, self.places, strict=True)
+            ]
+        )
 
     def filtered(self, signal: Array, period: float) -> Array:
         """A signal (n,) or (n, p) through the filter that the effort and all that is compared with it go through."""
@@ -202,7 +188,7 @@ class Balance:
         return required, changes
 
     def predicted(self, model: Model, alignment: float = 0.0) -> Array:
-        """What the model predicts of the `determined` effort (rows,), `alignment` [s] beyond the model's own delays."""
+        """The effort (rows,) that the model predicts, `alignment` [s] beyond the model's own delays."""
         return self.rows(self.required(model), self.shift(model) + alignment)
 
     def estimated(self, model: Model) -> list[str]:
@@ -359,9 +345,20 @@ def _bridged(records: Sequence[Record], model: Model) -> tuple[list[Stretch], Ba
     return stretches(records, model, QUARTER / chosen.effort), chosen
 
 
-def _later(signal: Array, shift: float) -> Array:
-    """A signal (n,) or (n, p), its values `shift` samples later; a copy."""
-    whole, places = math.floor(shift), np.arange(len(signal))
+def stuck(slow: Mask, memory: float) -> Mask:
+    """Samples (n,) to leave out: all `slow` ones, and within half the filter's `memory` [samples] of a rest as long as that, for
+    what the friction did meanwhile has come there through the filter."""
+    out, half = slow.copy(), math.ceil(0.5 * memory)
+    for part in runs(slow):
+        first, end = part.start, part.stop
+        if end - first >= memory:
+            out[max(first - half, 0) : end + half] = True
+    return out
+
+
+def _sampled(signal: Array, places: NDArray[np.int64], shift: float) -> Array:
+    """Values of (n,) or (n, p) at places moved by `shift` samples."""
+    whole = math.floor(shift)
     if shift == whole:
         return signal[np.clip(places + whole, 0, len(signal) - 1)]
     between = shift - whole
@@ -371,7 +368,7 @@ def _later(signal: Array, shift: float) -> Array:
         )
         for node in NEIGHBOURS.tolist()
     ]  # fmt: skip
-    total = np.zeros_like(signal)
+    total = np.zeros((len(places), *signal.shape[1:]))
     for node, weight in zip(NEIGHBOURS.tolist(), weights, strict=True):
         total += weight * signal[np.clip(places + whole + node, 0, len(signal) - 1)]
     return total

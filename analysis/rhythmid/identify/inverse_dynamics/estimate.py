@@ -125,7 +125,7 @@ def linearise(balance: Balance, model: Model, names: Sequence[str], alignment: f
     late = 0.25 * balance.period
     first = [signal[:, 0] for signal in signals]
     slope = (balance.rows(first, shift + late) - balance.rows(first, shift - late)) / (2.0 * late)
-    return rows[:, 0] - balance.determined, np.column_stack([slope, rows[:, 1:]])
+    return rows[:, 0] - balance.measured, np.column_stack([slope, rows[:, 1:]])
 
 
 def fit_effort(
@@ -172,7 +172,7 @@ def fit_effort(
         for _ in range(HALVINGS):
             trial = np.clip(value + share * step, low, high)
             moved = model.with_values(dict(zip(names, trial[1:].tolist(), strict=True)))
-            error = balance.predicted(moved, float(trial[0])) - balance.determined
+            error = balance.predicted(moved, float(trial[0])) - balance.measured
             if np.isfinite(error).all() and cost(error, trial, scale) < before:
                 improved = True
                 break

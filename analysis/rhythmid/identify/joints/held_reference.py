@@ -113,7 +113,7 @@ def _errors(balances: JointBalances, joint: str, half: float, tried: np.ndarray)
     balance, model = balances.balance(joint), balances.models[joint]
     residual, columns = linearise(balance, model, balance.estimated(model), 0.0)
     moved = balances.with_leads({joint: half}).balance(joint)
-    slope = (moved.determined - balance.determined) / half
+    slope = (moved.measured - balance.measured) / half
     sizes = np.linalg.norm(columns, axis=0)
     columns = columns[:, sizes > 0.0] / sizes[sizes > 0.0]
     left = np.column_stack([residual, slope])
