@@ -55,7 +55,7 @@ def test_estimates_scatter_about_the_true_values_as_was_predicted_and_forces_kee
     scores = []
     rng = np.random.default_rng(1)
     for _ in range(4):
-        made = identify_machine([noisy(record, rng)], machine, [record], free=False)
+        made = identify_machine([noisy(record, rng)], machine, free=False)
         for name in names:
             error = made.parameters[name].value - machine.value(name)
             scores.append(error / found.parameters[name].std)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rhythmid.errors import InputError
 from rhythmid.model import INERTIA, Model
 
 if TYPE_CHECKING:
@@ -11,7 +12,8 @@ if TYPE_CHECKING:
 
 
 def model_lines(path: Path, records: Sequence["Record"], elements: Sequence[Path] = ()) -> list[str]:
-    """What a model is, in one line, and a note on each unit of the records that is not the model's.
+    """What a model is, in one line, and notes: on each unit of the records that is not the model's, and on the share of them in which
+    the machine rests, where their effort would be scored.
 
     Raises InputError as a diagnosis would, where the model is wrong or the records do not fit it.
     """
@@ -27,15 +29,26 @@ def model_lines(path: Path, records: Sequence["Record"], elements: Sequence[Path
         paths = "; ".join(f"{joint}: {_elements(model)}" for joint, model in machine.paths.items())
         return [f"{path}: {len(machine.joints)} joints; {paths}; {_free(machine.free)}"]
     model = Model.load(path, catalogue)
-    if records:
-        admitted(records, [], model)
+    rests = _rests(admitted(records, [], model).whole_records, model) if records else None
     units = model.units
     mass = model.parameters[INERTIA]
     told = f"inertia {mass.value:g} {mass.unit}{' (fixed)' if mass.fixed else ''}; {_elements(model)}; {_free(model.free)}"
     return [
         f"{path}: {told}; units {units.force}, {units.position}, {units.mass}",
         *(f"  note: {note}" for one in records for note in _foreign_units(one, model)),
+        *(f"  note: were the effort scored: {note}" for note in (rests,) if note is not None),
     ]
+
+
+def _rests(records: Sequence["Record"], model: Model) -> str | None:
+    """That the machine rests during a share of these records, where they hold an effort and this is of practical size."""
+    from rhythmid.identify.inverse_dynamics.balance import Balance
+    from rhythmid.identify.inverse_dynamics.rests import told
+
+    try:
+        return told(Balance.of(records, model).stuck)
+    except InputError:  # no effort, or too little motion for one
+        return None
 
 
 def _elements(model: Model) -> str:

@@ -14,6 +14,7 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.rests import told
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
@@ -82,6 +83,7 @@ def diagnose_joint(
 def _applicable(balance: Balance, model: Model) -> Applicability:
     chosen = balance.bandwidth
     reason = f"the effort of each joint is predicted, below {chosen.effort:.3g} Hz at this one"
+    reason = "; ".join(filter(None, (reason, told(balance.stuck))))
     return Applicability(
         True, reason, chosen.effort, math.nan, chosen.explained, math.nan, True, False, balance=balance
     )

@@ -11,6 +11,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import condition_of, fit_effort
+from rhythmid.identify.inverse_dynamics.rests import told
 from rhythmid.model import INERTIA, Model
 from rhythmid.record.record import Record
 from rhythmid.simulation.effect import Path, effect_along
@@ -69,6 +70,7 @@ def applicable(records: Sequence[Record], model: Model) -> Applicability:
     driven = balance.motions[0].driven_by_base
     share = 1.0 if driven else float(np.std(balance.measured)) / max(_inertial(balance, model), 1e-300)
     reason = f"the effort is predicted below {chosen.effort:.3g} Hz, where a free map explains {chosen.explained:.0%} of it"
+    reason = "; ".join(filter(None, (reason, told(balance.stuck))))
     applies = True
     if chosen.explained < EXPLAINED_BY_MOTION:
         applies, reason = (
