@@ -237,8 +237,8 @@ def asked(
 ) -> list[str]:
     """What is scored, in order, where nothing is named.
 
-    `means` says whether a free run means something, `follows` whether the model then follows the machine, `verdict` to what it comes by its
-    motion; `share` is the effort's of the inertial force, `error` what is left of it.
+    `means` says whether a free run means something, `follows` whether the model then follows the machine, `share` is the effort's of the
+    inertial force, `error` what is left of it.
     """
     order: list[str] = []
 
@@ -263,7 +263,7 @@ def asked(
         else [SimpleNamespace(kind="windows")] if given[-1] else [],
     )  # fmt: skip
     monkeypatch.setattr(module, "free_run", free_run)
-    monkeypatch.setattr(module, "compose", lambda *_: diagnosed(verdict, kind=order[-1]))
+    monkeypatch.setattr(module, "compose", lambda *_: diagnosed("undecided", kind=order[-1]))
     found = diagnose(records(hopper(), SHORT[2:]), hopper(), catalogue=CATALOGUE).diagnosis
     assert found.scoring.kind == order[0]
     return order
@@ -283,12 +283,8 @@ def test_an_effort_that_moves_the_machine_comes_before_windows_and_one_beside_wh
     assert asked(monkeypatch, True, share) == expected
 
 
-@pytest.mark.parametrize(
-    ("verdict", "expected"), [("undecided", ["free_run", "effort"]), ("consistent", ["free_run"])]
-)
-def test_what_a_free_run_leaves_without_a_name_is_looked_for_in_the_effort(monkeypatch, verdict, expected):
-    assert asked(monkeypatch, True, 0.5, follows=True, verdict=verdict) == expected
-
-
-def test_the_effort_of_a_quasi_static_machine_comes_before_a_free_run_that_follows_it(monkeypatch):
-    assert asked(monkeypatch, True, 20.0, follows=True) == ["effort", "windows"]
+@pytest.mark.parametrize(("share", "first"), [(20.0, "effort"), (0.5, "free_run")])
+def test_the_effort_of_a_quasi_static_machine_comes_before_a_free_run_that_follows_it(
+    monkeypatch, share, first
+):
+    assert asked(monkeypatch, True, share, follows=True)[0] == first

@@ -316,13 +316,11 @@ def _answers(
     if not effort.applies or quasi_static or not effort.free_run_means_something:
         yield from by_motion(windows=True)
         return
-    verdict = None
+    told = 0
     for answer in by_motion(windows=False):
-        verdict = answer.diagnosis.verdict
+        told += 1
         yield answer
-    if verdict is not None:
-        if verdict != "consistent" and not late(BY_EFFORT):
-            yield _by_effort(whole, effort, effort_notes)
+    if told:
         return
     if driven:
         yield _by_effort(whole, effort, effort_notes)
