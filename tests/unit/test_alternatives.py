@@ -65,6 +65,14 @@ def proposed(monkeypatch: pytest.MonkeyPatch, *given, **options) -> list[Proposa
     return kept
 
 
+def lagging(fit: Fit, *names: str) -> Fit:
+    """A fit whose model has these lags, too, with a start that has their states."""
+    model = fit.model
+    for name in names:
+        model = model.with_element(CATALOGUE[name], LAG)
+    return replace(fit, model=model, starts=tuple(np.append(one, np.zeros(len(names))) for one in fit.starts))
+
+
 @pytest.fixture(scope="module")
 def plain() -> Fit:
     return fitted(hopper(), hopper())
@@ -135,16 +143,14 @@ def test_kin_of_the_chosen_effect_are_fitted_in_its_place(plain):
 
 
 def test_kin_begin_where_the_family_has_ended(monkeypatch, plain):
-    chosen = replace(plain, model=plain.model.with_element(CATALOGUE["actuator_lag"], LAG))
+    chosen = lagging(plain, "actuator_lag")
     kept = proposed(monkeypatch, plain, chosen, CATALOGUE, "actuator_lag", rounds=rounds_of(plain))
     kin = next(one for one in kept if one.added == ("sensor_lag",))
     assert any(guess.get("sensor_lag.time_constant") == LAG["time_constant"] for guess in kin.guesses)
 
 
 def test_no_two_alternatives_have_the_same_effects(monkeypatch, plain):
-    model = plain.model.with_element(CATALOGUE["actuator_lag"], LAG)
-    model = model.with_element(CATALOGUE["sensor_lag"], LAG)
-    chosen = replace(plain, model=model)
+    chosen = lagging(plain, "actuator_lag", "sensor_lag")
     kept = proposed(
         monkeypatch, plain, chosen, CATALOGUE, "actuator_lag", "sensor_lag", rounds=rounds_of(plain)
     )
@@ -153,7 +159,7 @@ def test_no_two_alternatives_have_the_same_effects(monkeypatch, plain):
 
 
 def test_places_for_which_the_catalogue_has_something_have_been_searched(monkeypatch, plain):
-    chosen = replace(plain, model=plain.model.with_element(CATALOGUE["actuator_lag"], LAG))
+    chosen = lagging(plain, "actuator_lag")
     kept = proposed(monkeypatch, plain, chosen, CATALOGUE, "actuator_lag")
     assert not any("_of_the_" in label for one in kept for label in one.added)
 

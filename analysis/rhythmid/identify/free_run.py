@@ -60,8 +60,10 @@ class FreeRun:
         """Rows (blocks, states + 2) of the compiled loop at the block centres of series `index`.
 
         The start is the state at the first centre; what the record declares of the model's parameters replaces the model's own.
-        None when the simulation diverges.
+        None when the simulation diverges. Raises ValueError for a start of another length than the state vector.
         """
+        if start.shape != (self.states,):  # the compiled loop would read beyond it
+            raise ValueError(f"a start of shape {start.shape} for {self.states} states")
         given = self.prepared(model, index)
         out = np.empty((len(given.times), self.states + 2))
         force = NO_SIGNAL if disturbance is None else pieces(disturbance)
