@@ -293,7 +293,8 @@ def _answers(
         return case.budget.spent
 
     quasi_static = effort.effort_share >= QUASI_STATIC
-    if effort.applies and (quasi_static or not effort.free_run_means_something):
+    first = effort.applies and (quasi_static or not effort.free_run_means_something)
+    if first:
         answer = _by_effort(whole, effort, effort_notes)
         yield answer
         if answer.diagnosis.augmented.train_nrmse < LEFT or late(BY_MOTION):
@@ -313,7 +314,7 @@ def _answers(
             model = without_record_zero(without_free_maps(result.search.fit.model))
             yield Answer(diagnosis, causal(model), result)
 
-    if not effort.applies or quasi_static or not effort.free_run_means_something:
+    if first or not effort.applies:
         yield from by_motion(windows=True)
         return
     told = 0

@@ -365,11 +365,8 @@ class _Search:
         self, elements: tuple[str, ...], model: Model, priors: dict[str, Prior], aligned: Alignment, at: float
     ) -> Fitted:
         fit = fit_effort(self.balance, model, [n for n in model.free if n in priors], priors, aligned, at)
-        made, sizes = (
-            Fitted.of(elements, _kind_of(elements, model), fit, priors),
-            scales_of(self.balance, model),
-        )
-        # all of them have moved
+        made = Fitted.of(elements, _kind_of(elements, model), fit, priors)
+        sizes = scales_of(self.balance, model)
         terms = [term for label in elements if (term := fit.model.term(label)) is not None]
         ends = [within_bounds(term, sizes) for term in terms]
         return replace(made, shape={"within_bounds": min(ends, default=math.inf)})
