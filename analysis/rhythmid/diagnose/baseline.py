@@ -22,7 +22,7 @@ from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.timing import nominal_period
-from rhythmid.simulation.signal import OVERSAMPLING, band_limited, first_order_hold
+from rhythmid.simulation.signal import OVERSAMPLING, band_limited, first_order_hold, is_held
 from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 from rhythmid.value import Prior
 
@@ -181,7 +181,7 @@ def reconstructed(series: Series) -> Series:
     """The series with a held input reconstructed from its samples: band-limited where they are evenly spaced, else by
     straight lines. One that is not held stays as it is."""
     command = series.command
-    if command is None or command.c.shape[0] > 1 or len(command.x) < 10:
+    if command is None or not is_held(command) or len(command.x) < 10:
         return series
     time, value = command.x[:-1], command.c[-1]
     even = np.ptp(np.diff(time)) < EVEN * float(np.median(np.diff(time)))
@@ -200,7 +200,7 @@ def _hold(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None, t
     command, so that one of many samples has another cause.
     """
     kept = Calibration(fit, tuple(series), (), None)
-    held = [one for one in series if one.command is not None and one.command.c.shape[0] == 1]
+    held = [one for one in series if one.command is not None and is_held(one.command)]
     if INPUT_DELAY not in fit.names or not held or fit.nrmse() > FOLLOWS:
         return kept
     period = nominal_period(np.diff(held[0].inputs.stamps))

@@ -21,7 +21,7 @@ from rhythmid.diagnose.evidence import (
     prediction,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, family_of, names_of, richer_of
-from rhythmid.diagnose.search.refit import fine_enough, whole_fit
+from rhythmid.diagnose.search.refit import whole_fit
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.errors import InputError
 from rhythmid.identify.noise import NoiseModel, runs
@@ -157,8 +157,7 @@ def _of_unseen(fit: Fit, rows: Rows) -> Array:
     """What a fit leaves of separate held-out records, only their initial states estimated; of a model that diverges there, which
     predicts nothing, the motion itself."""
     try:
-        step = fine_enough(fit.model, fit.run.max_step)
-        return start_only(fit.model, rows.unseen, rows.noise, step).linearisation.residual
+        return start_only(fit.model, rows.unseen, rows.noise, fit.run.max_step).linearisation.residual
     except InputError:
         return np.concatenate(
             [

@@ -241,7 +241,7 @@ def diagnose(
             if answer is None:
                 break
             made.append(answer)
-        chosen = next((one for one in made if one.stands), made[0])
+        chosen = _chosen(made)
         unscored = effort.applies and all(one.diagnosis.scoring.kind != "effort" for one in made)
         if unscored and chosen.stands:
             if case.budget.spent:
@@ -250,6 +250,14 @@ def diagnose(
                 made.append(_by_effort(whole, effort, (), len(chosen.diagnosis.missing)))
         answer = _with_untried(_compared(chosen, made), untried)
         return with_unit_warning(answer, case.nominal, warned)
+
+
+def _chosen(made: Sequence[Answer]) -> Answer:
+    """The first answer that stands by names. Without one, the first that is not `consistent`: what one way to score does not see of a
+    mismatch, such as an effort beside rests, another one may."""
+    stands = (one for one in made if one.stands)
+    misses = (one for one in made if one.diagnosis.verdict != "consistent")
+    return next(stands, None) or next(misses, made[0])
 
 
 def _warning(case: Case, untried: list[Untried]) -> str | None:

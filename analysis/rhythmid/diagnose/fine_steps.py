@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.errors import InputError
-from rhythmid.identify.free_run import accurate
+from rhythmid.identify.free_run import halved, sufficient
 from rhythmid.identify.output_error import INTEGRATION, minimise
 
 HALVINGS = 2  # of the step: the error of smooth forces falls to a 256th
@@ -22,7 +22,7 @@ def finely_stepped(found: Search, pool: ThreadPoolExecutor | None = None) -> Sea
         return found
     fit = found.fit
     tolerance = INTEGRATION * fit.noise.variance**0.5
-    run = accurate(fit.run, fit.model, fit.starts, tolerance, HALVINGS)
+    run = halved(sufficient(fit.run, fit.model, fit.starts, tolerance, HALVINGS - 1))
     try:
         fine = minimise(
             fit.model, run, fit.names, fit.noise, fit.starts, pool=pool, differences=fit.differences

@@ -30,7 +30,7 @@ from rhythmid.diagnose.model_uncertainty import covariance_between
 from rhythmid.diagnose.refitted_map import refitted_map
 from rhythmid.diagnose.scoring import Scoring
 from rhythmid.diagnose.search.forward import Search, search
-from rhythmid.diagnose.search.refit import fine_enough, reach_of, whole_fit
+from rhythmid.diagnose.search.refit import reach_of, whole_fit
 from rhythmid.diagnose.search.round import distinct
 from rhythmid.diagnose.search.score_tests import (
     Trajectories,
@@ -105,7 +105,7 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     known = case.catalogue.within(scales(seen, calibration.fit.model))
     found = search(seen, calibration.fit, case.nominal, known, case.pool, case.tell, case.budget)
     case.tell("weighing the hypotheses on data that no fit has seen")
-    step = _step(found)
+    step = found.nominal.run.max_step
     rows = rows_of(seen, unseen, found.noise)
     kinds: list[tuple[Trial, Kind]] = [(t, "effects" if t.added else "nominal") for t in found.trials]
     reach = reach_of(found.fit.chi2, found.fit.samples)
@@ -231,14 +231,6 @@ def _unconverged(nominal: Fit, found: Search) -> list[tuple[tuple[str, ...], str
     return [
         ((f"convergence of the {name} model",), SPENT) for name, fit in named.items() if fit.message == SPENT
     ]
-
-
-def _step(found: Search) -> float:
-    """Integration step [s] for any model: that of the nominal one, unless the chosen effects were found to need a shorter one than
-    their elements ask for."""
-    step = found.nominal.run.max_step
-    own = found.fit.run.max_step
-    return step if own >= fine_enough(found.fit.model, step) else own
 
 
 def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.float64]:

@@ -19,6 +19,7 @@ from rhythmid.identify.free_run import FreeRun, with_series
 from rhythmid.identify.noise import NoiseModel, burg, runs
 from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.identify.series import Series
+from rhythmid.simulation.signal import is_held
 
 Array = NDArray[np.float64]
 RUNS = 16  # with simulated jitter, of all series together at least
@@ -109,7 +110,7 @@ def _held(one: Series) -> bool:
     if not one.commanded or one.kind != "force" or one.ignored is not None or one.spread is not None:
         return False
     assert one.command is not None
-    return one.command.c.shape[0] == 1 and len(one.command.x) > LEAST and one.blocks > LEAST
+    return is_held(one.command) and len(one.command.x) > LEAST and one.blocks > LEAST
 
 
 def _simulated(fit: Fit, std: float) -> list[Array]:

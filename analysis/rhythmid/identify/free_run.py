@@ -17,7 +17,7 @@ from rhythmid.model import Model
 from rhythmid.record.timing import nominal_period
 from rhythmid.simulation.compiled import Compiled, compile_model
 from rhythmid.simulation.generated_source import InputKind, OutputKind, Variant
-from rhythmid.simulation.signal import pieces
+from rhythmid.simulation.signal import is_held, pieces
 from rhythmid.simulation.simulate import start_states
 from rhythmid.simulation.transport import command_delay, physical_times
 
@@ -140,15 +140,23 @@ def prepare_run(
             f"records that measure different things ({', '.join(sorted(sensors))}) cannot be fitted together"
         )
     measured: OutputKind = sensors.pop() if sensors else "position"
-    smooth = not _sees_steps(model) and all(one.command is None or one.smooth is not None for one in series)
+    commands = [one.command for one in series if one.command is not None]
+    smooth = all(one.command is None or one.smooth is not None for one in series) and not (
+        _sees_steps(model) and any(map(is_held, commands))
+    )
     variant = Variant(excited, measured, smooth, disturbed)
     return FreeRun(
         compile_model(model, variant),
         lambda: compile_model(model, replace(variant, smooth=False)),
         tuple(series),
         smooth,
-        max_step or min([*(one.period * one.block for one in series), *([] if smooth else _ticks(series))]),
+        max_step or _longest_step(series, smooth),
     )
+
+
+def _longest_step(series: Sequence[Series], smooth: bool) -> float:
+    """One Runge-Kutta step [s] a block, or a value of a command at whose knots steps end."""
+    return min([*(one.period * one.block for one in series), *([] if smooth else _ticks(series))])
 
 
 def start_of(model: Model, run: FreeRun, index: int, position: float, velocity: float) -> Array:
@@ -173,20 +181,29 @@ def with_series(run: FreeRun, index: int, series: Series) -> FreeRun:
     return replace(run, compiled=run.stopping(), series=every, smooth=False)
 
 
-def accurate(
-    run: FreeRun, model: Model, starts: Sequence[Array], tolerance: float, finest: int = 8
+def sufficient(
+    run: FreeRun, model: Model, starts: Sequence[Array], tolerance: float, halvings: int = 8
 ) -> FreeRun:
-    """The run with its step halved until that changes the outputs by less than `tolerance` (rms); the finer of the two.
-
-    The remaining error is a fraction of the tolerance: a sixteenth where the forces are smooth. At most `finest` halvings.
-    """
+    """The run with its step halved until a further halving changes the outputs by less than `tolerance` (rms); at most so many `halvings`."""
     coarse = run.outputs(model, starts)
-    for _ in range(finest):
-        finer = replace(run, max_step=run.max_step / 2)
+    for _ in range(halvings):
+        finer = halved(run)
         fine = finer.outputs(model, starts)
         if coarse is not None and fine is not None:
             change = max(float(np.sqrt(np.mean((a - b) ** 2))) for a, b in zip(coarse, fine))
             if change < tolerance:
-                return finer
+                break
         run, coarse = finer, fine
     return run
+
+
+def coarser(run: FreeRun, factor: float) -> FreeRun:
+    """The run in steps that are longer by a factor, where blocks and knots of the command do not end them anyway."""
+    return replace(
+        run, max_step=max(run.max_step, min(factor * run.max_step, _longest_step(run.series, run.smooth)))
+    )
+
+
+def halved(run: FreeRun) -> FreeRun:
+    """The run in steps of half the size: where the forces are smooth the error of integration falls to a sixteenth."""
+    return replace(run, max_step=run.max_step / 2)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
 from rhythmid.record.timing import BURSTS, nominal_period
-from rhythmid.simulation.signal import FAR, impulse_preserving, pieces
+from rhythmid.simulation.signal import FAR, impulse_preserving, is_held, pieces
 
 Array = NDArray[np.float64]
 Pieces = tuple[Array, Array]
@@ -54,7 +54,7 @@ class Inputs:
     def even_tick(self) -> float:
         """Usual time [s] between the knots of a held command; infinite where there is none, or where its times are uneven."""
         command = self.commanded
-        if command is None or command.c.shape[0] > 1 or len(command.x) <= SMOOTHED_FROM:
+        if command is None or not is_held(command) or len(command.x) <= SMOOTHED_FROM:
             return np.inf
         step = np.diff(command.x[:-1])
         usual = nominal_period(step)

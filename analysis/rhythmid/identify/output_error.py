@@ -12,7 +12,7 @@ from rhythmid.deadline import without_deadline
 from rhythmid.errors import InputError
 from rhythmid.identify.covariance import covariance_of, on_the_edge
 from rhythmid.identify.descent import WHITE, Descent, descend, first_guess
-from rhythmid.identify.free_run import FreeRun, accurate, prepare_run
+from rhythmid.identify.free_run import FreeRun, halved, prepare_run, sufficient
 from rhythmid.identify.ill_conditioned import ill_conditioned, with_ill_conditioned_directions
 from rhythmid.identify.noise import NoiseModel, estimate_noise, runs
 from rhythmid.identify.sensitivity import Linearisation, Problem
@@ -223,10 +223,10 @@ def estimate(
         return estimate(lost.model, series, chosen, lost.starts, None, pool, max_step, iterations, progress)
     while max_step is None:
         rms = math.sqrt(end.chi2 / max(end.samples, 1)) * scaled.std
-        finer = accurate(run, end.model, end.starts, max(INTEGRATION * rms, 1e-7 * spread))
-        if finer.max_step > 0.4 * run.max_step:
-            break  # fine enough before any halving
-        run = finer  # whose smaller residual may ask for finer steps still
+        coarsest = sufficient(run, end.model, end.starts, max(INTEGRATION * rms, 1e-7 * spread))
+        if coarsest is run:
+            break
+        run = halved(coarsest)  # the smaller residual may ask for finer steps still
         end = descend(
             end.model, run, chosen, scaled, end.starts, iterations, pool, differences=end.differences
         )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.identify.free_run import FreeRun, start_of
+from rhythmid.identify.free_run import FreeRun, coarser, start_of
 from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.record_zero import zero_place
 from rhythmid.identify.series import record_of
@@ -19,6 +19,11 @@ Array = NDArray[np.float64]
 # ten-thousandth, and an angle at rest that the start of a pendulum makes up for leaves up to 1.2e-3 of its effect
 DEAD = 3e-3
 SEEN = 1e-15  # of the motion, below which a difference is rounding; such a step grows to the size of what it is a step of, and not for ever
+
+
+# times the step of a run, in which its sensitivities are integrated. A run's own error is a few hundredths of the noise at most, and that of a
+# sensitivity as small a share of an effect that stands out of the noise
+COARSER = 4.0
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,7 @@ class Problem:
         self, run: FreeRun, names: Sequence[str], noise: NoiseModel, pool: ThreadPoolExecutor | None
     ) -> None:
         self.run, self.names, self.noise, self.pool = run, tuple(names), noise, pool
+        self.coarse = coarser(run, COARSER)
         self.hidden: list[tuple[Array, Array]] = []  # mean and scatter of each series' element states
         self.spread = max(float(np.std(one.averaged)) for one in run.series) or 1.0
         # zeros differ by no more than the outputs do
@@ -139,7 +145,14 @@ class Problem:
                 shift = np.zeros(self.run.states)
                 shift[c - len(self.names)] = state_steps[c - len(self.names)]
                 cases.append((model, [start + shift for start in starts]))
-        return self.run.many(cases, self.pool)
+        return self.coarse.many(cases, self.pool)
+
+    def _base(self, model: Model, starts: Sequence[Array], residuals: Sequence[Array]) -> list[Array]:
+        """Outputs from which those of `_perturbed` differ; those of the run itself where a coarser one diverges."""
+        outputs = None if self.coarse.max_step == self.run.max_step else self.coarse.outputs(model, starts)
+        if outputs is not None:
+            return outputs
+        return [residual + one.averaged for residual, one in zip(residuals, self.run.series)]
 
     def settle_steps(
         self,
@@ -155,7 +168,7 @@ class Problem:
         Their natural sizes span many powers of ten (a stiffness, a delay, a hidden state of an actuator). Those that are `known`
         (p + q) stay as they are.
         """
-        base = [residual + one.averaged for residual, one in zip(residuals, self.run.series)]
+        base = self._base(model, starts, residuals)
         joint = np.concatenate([steps, state_steps])
         p = len(self.names)
         todo = [column for column, settled in enumerate(known) if not settled]
@@ -206,7 +219,7 @@ class Problem:
         outputs = self._perturbed(
             model, starts, signed, state_steps, range(len(self.names) + self.run.states)
         )
-        base = [residual + one.averaged for residual, one in zip(residuals, self.run.series)]
+        base = self._base(model, starts, residuals)
         p, q = len(self.names), self.run.states
         rows, columns, bases, states, places = [], [], [], [], []
         place = 0

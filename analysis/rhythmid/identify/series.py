@@ -22,11 +22,12 @@ from rhythmid.record.record import Record
 from rhythmid.record.rounding import resolution
 from rhythmid.record.timing import nominal_period
 from rhythmid.simulation.generated_source import InputKind, OutputKind
-from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, spline
+from rhythmid.simulation.signal import FOR_EVER, continuous, fast_length, is_held, is_smooth, spline
 
 ERASED = 0.02  # share of a motion's power that a Hann window leaves (of a steady one 3/8), below which the motion is gone
 LEAST_PART = 16  # samples in which a frequency can still be seen
 TORN = 0.1  # of the blocks with a gap, beyond which stamps are too uneven to average samples; rare gaps cost fewer
+OFTEN = 0.5  # of a block, in which a held command changes: the machine averages what it does not follow
 REACH = 2  # blocks on either side from which `of_block` takes differences
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -105,8 +106,7 @@ class Series:
         if signal is None:
             return np.zeros(len(self.time))
         told = signal(np.clip(self.time, signal.x[0], min(signal.x[-1], FOR_EVER)))
-        held = signal.c.shape[0] == 1
-        return np.where(held & (self.time < signal.x[0] - self.period), 0.0, told)
+        return np.where(is_held(signal) & (self.time < signal.x[0] - self.period), 0.0, told)
 
     def average(self, samples: Array) -> Array:
         """Block averages of samples (n,) or (n, q), shape (n // block, …)."""
@@ -154,10 +154,12 @@ class Series:
 
     @property
     def smooth(self) -> Pieces | None:
-        """Smooth surrogate for a held command that changes about as often as the measurement is sampled, or more often, and at even
-        times, where samples are averaged; None where there is none."""
-        often = self.inputs.even_tick <= 2.0 * self.period * (1.0 + 1e-6)
-        return self.inputs.smooth if often and self.block > 1 else None
+        """A smooth command, or the smooth surrogate for one that is held and changes, at even times, several times in a block, or about
+        as often as the measurement is sampled where samples are averaged; None where there is none."""
+        if self.command is None or not is_held(self.command):
+            return None if self.command is None or not is_smooth(self.command) else self.inputs.command
+        often = max(2.0 * self.period if self.block > 1 else 0.0, OFTEN * self.block * self.period)
+        return self.inputs.smooth if self.inputs.even_tick <= often * (1.0 + 1e-6) else None
 
     @cached_property
     def averaged(self) -> Array:

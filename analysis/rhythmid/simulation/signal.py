@@ -125,6 +125,16 @@ def fast_length(least: int) -> int:
     return next_fast_len(least, True) or least
 
 
+def is_held(signal: PPoly) -> bool:
+    """Whether a signal keeps each value until the next one."""
+    return signal.c.shape[0] == 1
+
+
+def is_smooth(signal: PPoly) -> bool:
+    """Whether a signal has no corners at its knots, but for where samples are missing."""
+    return signal.c.shape[0] == 4
+
+
 def pieces(signal: PPoly | None) -> tuple[Array, Array]:
     """Knots (K+1,) and coefficients, lowest power first, extended over all time: (1, K) of a held signal, else (4, K).
 
@@ -133,7 +143,7 @@ def pieces(signal: PPoly | None) -> tuple[Array, Array]:
     """
     if signal is None:
         return np.array([-FAR, FAR]), np.zeros((1, 1))
-    held, ends = signal.c.shape[0] == 1, signal.x[-1] <= FOR_EVER
+    held, ends = is_held(signal), signal.x[-1] <= FOR_EVER
     count = signal.c.shape[1]
     coefficients = np.zeros((1 if held else 4, 1 + count + ends))
     coefficients[: len(signal.c), 1 : 1 + count] = signal.c[::-1]

@@ -80,14 +80,14 @@ class _Experiment:
     released: float | None = None
 
 
-def _predicted(trial: Trial, experiment: _Experiment, step: float) -> Array | None:
+def _predicted(trial: Trial, experiment: _Experiment, variance: float, step: float) -> Array | None:
     model = trial.model
-    run = prepare_run(model, [experiment.series], fine_enough(model, step))
+    run = prepare_run(model, [experiment.series], step)
     if experiment.released is None:
         starts = first_guess(model, run)
     else:
         starts = [start_of(model, run, 0, experiment.released, 0.0)]
-    outputs = run.outputs(model, starts)
+    outputs = fine_enough(run, model, starts, variance**0.5).outputs(model, starts)
     return None if outputs is None else outputs[0]
 
 
@@ -172,7 +172,7 @@ def separation(a: Trial, b: Trial, series: Sequence[Series], variance: float, st
     )
     found: list[Proposal] = []
     for one in menu:
-        first, second = _predicted(a, one, step), _predicted(b, one, step)
+        first, second = _predicted(a, one, variance, step), _predicted(b, one, variance, step)
         if first is None or second is None:
             continue
         # what an unknown start leaves in both has died out by then; a release is known

@@ -33,9 +33,8 @@ from rhythmid.diagnose.search.score_tests import (
 )
 from rhythmid.diagnose.search.trial import Origin, Trial
 from rhythmid.elements.catalogue import Catalogue
-from rhythmid.identify.free_run import accurate
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.output_error import Fit, noise_of
+from rhythmid.identify.output_error import Fit, minimise, noise_of
 from rhythmid.identify.sample_clock.clock import has_clock
 from rhythmid.identify.sample_clock.tick_likelihood import ticks_sought
 from rhythmid.identify.series import Series
@@ -62,8 +61,6 @@ UNDERSTATED = 0.1  # share of what a refit gains that a score shows at least, wh
 EFFECTS_AT_ONCE = 3  # effects at once
 RIVALS_COMPARED = 4  # models of each number of effects that are compared at the end
 OVERTAKEN = 4  # rankings at the end, each under the noise that the leader of the one before leaves
-# of the noise that a model leaves: integration error beyond which all steps are made finer
-POOR_FIT = 0.1
 
 
 @dataclass(frozen=True)
@@ -88,7 +85,7 @@ class Search:
 
 @dataclass(frozen=True)
 class _Task:
-    """What all rounds of a search need; `floor` is the least standard deviation of a noise."""
+    """What all rounds of a search need; `floor` is the least standard deviation of a noise, `step` [s] the nominal model's."""
 
     series: Sequence[Series]
     nominal: Fit
@@ -98,9 +95,14 @@ class _Task:
     tell: Tell
     floor: float
 
-    def noise_left(self, trial: Trial, noise: NoiseModel, step: float) -> NoiseModel:
+    @property
+    def step(self) -> float:
+        """Largest integration step [s] of any model."""
+        return self.nominal.run.max_step
+
+    def noise_left(self, trial: Trial, noise: NoiseModel) -> NoiseModel:
         """The noise that a model leaves which is fitted under another one."""
-        fit = whole_fit(trial, self.series, noise, step, pool=self.pool)
+        fit = whole_fit(trial, self.series, noise, self.step, pool=self.pool)
         return noise_of(fit.residuals, self.series, self.floor)
 
 
@@ -116,7 +118,6 @@ class _State:
     here: Trial
     current: Fit
     noise: NoiseModel
-    step: float
     trials: Mapping[tuple[str, ...], Trial]
     rounds: tuple[Round, ...]
     excluded: tuple[tuple[tuple[str, ...], str], ...]
@@ -190,7 +191,7 @@ def _searched(
         state = _reduced(task, state)
         state = state.without([(("part of the backward elimination",), SPENT)] if time_is_up() else [])
     best, noise, ranked = _ranked(task, state)
-    fit = whole_fit(best, series, noise, state.step, pool=pool)
+    fit = whole_fit(best, series, noise, task.step, pool=pool)
     return Search(
         under(nominal, noise, pool), best, fit, noise, tuple(ranked), state.rounds, state.excluded, cut_short
     )
@@ -205,7 +206,7 @@ def _begun(task: _Task, first: Round) -> _State:
         start_cost(felt),
     )  # fmt: skip
     lost = not_tried(fit, task.catalogue, first)
-    return _State(base, base, fit, fit.noise, fit.run.max_step, {(): base}, (first,), tuple(lost))
+    return _State(base, base, fit, fit.noise, {(): base}, (first,), tuple(lost))
 
 
 def _cut_off(state: _State) -> list[tuple[tuple[str, ...], str]]:
@@ -221,7 +222,7 @@ def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
     """Refits of the models that the last round proposes, those that do better than the best so far, best first."""
     here, now = state.here, replace(state.rounds[-1], added=state.here.added)
     count = REFITTED if not state.best.added else REFITTED - 1
-    begun = task.series, Origin.of(here), here.noise, state.step
+    begun = task.series, Origin.of(here), here.noise, task.step
     found, failed = [], []
     # where nothing is found yet and none of the best does better, they were kin that the scores, which are linear, promise too much of
     for first in range(0, count * (1 if state.best.added else GROUPS), count):
@@ -248,8 +249,8 @@ def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State
     near = [one for one in found if one.bic() - found[0].bic() < within]
     hopeful = [[one] for one in found[len(near) :] if here.bic() - one.bic() > PLAIN][:SECOND]
     for group in (near, *hopeful):
-        top = _most_likely(group, task.series, here.noise, state.step, task.floor)
-        fit, step = _finely_fitted(task, top, here.noise, state.step)
+        top = _most_likely(group, task.series, here.noise, task.step, task.floor)
+        fit = _finely_fitted(task, top, here.noise)
         sought = top
         # a clock is sought once more beside what came after it
         if any(has_clock(top.model, label) for label in top.added[-2:]):
@@ -258,8 +259,8 @@ def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State
         others = [trial for trial in group if trial.added != top.added]
         settled = noise_of(fit.residuals, task.series, task.floor)
         reach = reach_of(fit.chi2, fit.samples)
-        compared = under_noise([sought, *others, best], task.series, settled, step, reach=reach)
-        state = replace(state, step=step).with_trials(compared)
+        compared = under_noise([sought, *others, best], task.series, settled, task.step, reach=reach)
+        state = state.with_trials(compared)
         winner = compared[0]
         before = next((one for one in compared if one.added == best.added), best)
         gain = before.bic() - winner.bic()
@@ -269,31 +270,30 @@ def _granted(task: _Task, state: _State, found: Sequence[Trial]) -> tuple[_State
     return state, None
 
 
-def _finely_fitted(task: _Task, trial: Trial, noise: NoiseModel, step: float) -> tuple[Fit, float]:
-    """The whole fit of a trial, with the step [s] that it needs: what was an error of integration beside a mismatch may be all that is
-    left once that is explained."""
-    fit = whole_fit(trial, task.series, noise, step, pool=task.pool)
+def _finely_fitted(task: _Task, trial: Trial, noise: NoiseModel) -> Fit:
+    """The whole fit of a trial, in steps that are fine enough for what it leaves: what was an error of integration beside a mismatch may
+    be all that is left once that is explained."""
+    fit = whole_fit(trial, task.series, noise, task.step, pool=task.pool)
     if time_is_up():
-        return fit, step
+        return fit
     left = noise_of(fit.residuals, task.series, task.floor)
-    finer = accurate(fit.run, fit.model, fit.starts, POOR_FIT * left.variance**0.5, 2)
-    if finer.max_step >= 0.45 * fine_enough(trial.model, step):
-        return fit, step
-    step = finer.max_step
-    return whole_fit(replace(trial, converged=False), task.series, noise, step, pool=task.pool), step
+    run = fine_enough(fit.run, fit.model, fit.starts, left.variance**0.5)
+    if run is fit.run:
+        return fit
+    return minimise(fit.model, run, fit.names, noise, fit.starts, pool=task.pool, differences=fit.differences)
 
 
 def _with_effect(task: _Task, state: _State, grant: _Grant, last: bool) -> _State:
     """The state with one effect more, the next round scored where it is not the last one."""
-    best = in_best_order(grant.winner, task.series, grant.noise, state.step)
+    best = in_best_order(grant.winner, task.series, grant.noise, task.step)
     gained = state.gained + grant.gain + grant.winner.chi2 - best.chi2
     task.tell(f"{best.added[-1]} explains it better by {grant.gain:.0f}; looking for more")
-    current = whole_fit(best, task.series, grant.noise, state.step, pool=task.pool)
+    current = whole_fit(best, task.series, grant.noise, task.step, pool=task.pool)
     state = replace(state.with_trials([best]), best=best, current=current, noise=grant.noise, gained=gained)
     if last or time_is_up():
         return state
     now, current = one_round(current, best.added, task.catalogue, task.pool)
-    here = under_noise([best], task.series, current.noise, state.step, 0)[0]
+    here = under_noise([best], task.series, current.noise, task.step, 0)[0]
     return replace(state, here=here, current=current, rounds=(*state.rounds, now))
 
 
@@ -301,18 +301,18 @@ def _reduced(task: _Task, state: _State) -> _State:
     """The state after backward elimination."""
     best, noise = state.best, state.noise
     reduced, more = eliminate(
-        best, task.series, task.catalogue, state.trials, noise, state.step, state.rounds, state.margin, task.tell
+        best, task.series, task.catalogue, state.trials, noise, task.step, state.rounds, state.margin, task.tell
     )  # fmt: skip
     state = state.with_trials(list(more.values()))
     if reduced is best:
         return state
-    best = in_best_order(reduced, task.series, noise, state.step)
-    return replace(state.with_trials([best]), best=best, noise=task.noise_left(best, noise, state.step))
+    best = in_best_order(reduced, task.series, noise, task.step)
+    return replace(state.with_trials([best]), best=best, noise=task.noise_left(best, noise))
 
 
 def _ranked(task: _Task, state: _State) -> tuple[Trial, NoiseModel, list[Trial]]:
     """The best model once all are compared under the noise that it leaves, that noise, and the models, best first."""
-    best, noise, step = state.best, state.noise, state.step
+    best, noise, step = state.best, state.noise, task.step
     ranked = _contenders(state.trials, best)
     for _ in range(OVERTAKEN):
         ranked = near_under_noise(ranked, task.series, noise, step, NEAR)
@@ -321,7 +321,7 @@ def _ranked(task: _Task, state: _State) -> tuple[Trial, NoiseModel, list[Trial]]
         if ranked[0].bic() >= best.bic() - ahead or not ranked[0].added:
             return best, noise, ranked
         best = ranked[0]  # a model set aside under an earlier noise model has overtaken the chosen one
-        noise = task.noise_left(best, noise, step)
+        noise = task.noise_left(best, noise)
     ranked = near_under_noise(ranked, task.series, noise, step, NEAR)
     return next(one for one in ranked if set(one.added) == set(best.added)), noise, ranked
 

@@ -22,12 +22,11 @@ from rhythmid.diagnose.search.trial import (
     steps_by_name,
     trial_of,
 )
-from rhythmid.elements.element import ELAPSED, STEP
 from rhythmid.errors import InputError
 from rhythmid.identify.descent import Descent, descend, out_of_reach
-from rhythmid.identify.free_run import FreeRun, prepare_run, start_of
+from rhythmid.identify.free_run import FreeRun, prepare_run, start_of, sufficient
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.output_error import Fit, minimise
+from rhythmid.identify.output_error import INTEGRATION, Fit, minimise
 from rhythmid.identify.record_scales import scales
 from rhythmid.identify.sample_clock.clock import has_clock
 from rhythmid.identify.sample_clock.tick_scan import scanned
@@ -48,14 +47,20 @@ HOP_DISTANCES = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minim
 # log likelihood of a twentieth per sample, where a few per record decide
 EXCESS = 0.1
 LEAST_EXCESS = 60.0  # the same for few samples
+HALVINGS = 6  # of the nominal model's step at most: of samples 20 ms apart to 0.3 ms
 TOLERANCE = 0.05  # of chi2, at which a trial has converged: far below what an element has to earn
 
 
-def fine_enough(model: Model, step: float) -> float:
-    """Integration step [s] for a model: shorter where an element asks for the step because it may be stiff, or for the time
-    since it began because its force then bends within it."""
-    asked = {source for term in model.terms for source, _ in term.element.borrows.values()}
-    return min(step, 5e-4 if ELAPSED in asked else 1e-3 if STEP in asked else step)
+def fine_enough(run: FreeRun, model: Model, starts: Sequence[Array], noise: float) -> FreeRun:
+    """The run in steps whose error of integration is far below the `noise` (rms): an element may be stiff, or bend its force within a step."""
+    return sufficient(run, model, starts, INTEGRATION * noise, HALVINGS)
+
+
+def _run_of(trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float) -> FreeRun:
+    """Run of a trial, in steps of `max_step` [s] at most, fine enough for this noise."""
+    return fine_enough(
+        prepare_run(trial.model, series, max_step), trial.model, trial.starts, noise.variance**0.5
+    )
 
 
 def reach_of(chi2: float, samples: int) -> float:
@@ -78,33 +83,36 @@ def _fit_proposal(
     """
     if time_is_up():
         raise InputError(SPENT)
-    run = prepare_run(proposal.model, series, fine_enough(proposal.model, max_step))
+    whole = prepare_run(proposal.model, series, max_step)
     names = tuple(proposal.model.free)
     best: Descent | None = None
+    run = whole
     failure: InputError | None = None
     ticks: list[dict[str, float]] = []
     steps = dict(origin.steps)
     if proposal.added and has_clock(proposal.model, proposal.added[-1]):
-        begin = _extended(proposal.model, run, origin)
+        begin = _extended(proposal.model, whole, origin)
         ticks = scanned(proposal.model, series, begin, noise)
     for guess in (*ticks, *proposal.guesses, *proposal.faint):
         if guess in proposal.faint and best is not None and best.chi2 < proposal.ceiling:
             break
         model = proposal.model.with_values(guess)
         try:
-            begin = _extended(model, run, origin)
-            end = descend(model, run, names, noise, begin, SKETCH, tolerance=TOLERANCE, similar=steps)
+            begin = _extended(model, whole, origin)
+            fine = fine_enough(whole, model, begin, noise.variance**0.5)
+            end = descend(model, fine, names, noise, begin, SKETCH, tolerance=TOLERANCE, similar=steps)
         except InputError as error:
             failure = error
             continue
-        steps = _steps(end, run, [name for name in guess if name not in origin.steps])
+        steps = _steps(end, fine, [name for name in guess if name not in origin.steps])
         if best is None or end.chi2 < best.chi2:
-            best = end
+            best, run = end, fine
         if best.chi2 < enough or time_is_up():
             break
     if best is None:
         assert failure is not None
         raise failure
+    run = fine_enough(run, best.model, best.starts, noise.variance**0.5)
     best = _carried_on(best, run, names, noise, reach)
     of_effect = f"{proposal.added[-1]}." if proposal.added else ""
     guessed = [name for name in (proposal.guesses or ({},))[0] if name.startswith(of_effect)]
@@ -144,7 +152,7 @@ def _hops(trial: Trial, series: Sequence[Series]) -> dict[str, float]:
 
 def _in_deepest(trial: Trial, series: Sequence[Series], max_step: float) -> Outcome:
     """Where a trial ends in the deepest of the minima that its newest effect has, as far as hops from one to the next lead there."""
-    run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
+    run = _run_of(trial, series, trial.noise, max_step)
     names = tuple(trial.model.free)
     best = descend(trial.model, run, names, trial.noise, trial.starts, 1, None, TOLERANCE, trial.differences)
     for name, distance in _hops(trial, series).items():
@@ -203,7 +211,7 @@ def _unstuck(trial: Trial, series: Sequence[Series], max_step: float) -> Trial:
             continue
         guesses = element.starts(scales(series, trial.model))
         known = {tuple(guess[name.rpartition(".")[2]] for name in flat) for guess in guesses}
-        run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
+        run = _run_of(trial, series, trial.noise, max_step)
         free = tuple(trial.model.free)
         steps = steps_by_name(trial.model, run.compiled.layout.states, trial.differences, flat)
         found: list[Descent] = []
@@ -317,7 +325,7 @@ def whole_fit(
     `reach` is not carried to convergence."""
     if _settled(trial, noise):
         iterations = 1
-    run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
+    run = _run_of(trial, series, noise, max_step)
     names = tuple(trial.model.free)
     return minimise(
         trial.model,
@@ -336,7 +344,7 @@ def _again(
     trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int, reach: float
 ) -> Outcome:
     """Where a trial's descent under a noise model ends; without `iterations`, the trial as it is."""
-    run = prepare_run(trial.model, series, fine_enough(trial.model, max_step))
+    run = _run_of(trial, series, noise, max_step)
     names = tuple(trial.model.free)
     end = descend(
         trial.model, run, names, noise, trial.starts, iterations, None, TOLERANCE, trial.differences, reach

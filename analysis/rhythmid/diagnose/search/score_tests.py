@@ -35,7 +35,7 @@ from rhythmid.model import Model
 from rhythmid.parallel import each
 from rhythmid.simulation.effect import Path, effect_along
 from rhythmid.simulation.generated_source import DRIVES
-from rhythmid.simulation.signal import first_order_hold
+from rhythmid.simulation.signal import first_order_hold, is_held
 from rhythmid.simulation.transport import delayed_command, delays, physical_times
 
 Array = NDArray[np.float64]
@@ -167,7 +167,7 @@ def trajectories(fit: Fit) -> Trajectories:
 
 def _evaluate(signal, time: Array) -> Array:
     value = np.asarray(signal(np.maximum(time, signal.x[0])))
-    return np.where(time < signal.x[0], 0.0 if signal.c.shape[0] == 1 else value, value)
+    return np.where(time < signal.x[0], 0.0 if is_held(signal) else value, value)
 
 
 def _body_force(model: Model, time: Array, x: Array, v: Array, f: Array) -> Array:
