@@ -140,3 +140,10 @@ def test_a_comparison_for_which_there_is_no_time_is_told(monkeypatch):
     found, asked = answered(monkeypatch, FRICTION, by_effort=FRICTION, budget=0.0)
     assert asked == [] and found.notes == ()
     assert found.excluded == (Untried("a comparison with the recorded effort", SPENT),)
+
+
+def test_a_mismatch_that_another_way_finds_outranks_an_effort_that_shows_none(monkeypatch):
+    found, _ = answered(monkeypatch, diagnosed("consistent", kind="effort"), diagnosed("unknown_physics"))
+    assert found.verdict == "unknown_physics"
+    (note,) = found.notes
+    assert note.startswith("Scored by effort the same records come to another verdict.")

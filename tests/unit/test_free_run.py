@@ -1,11 +1,13 @@
 """Free runs over records: delays of the command path in order, surrogates for held commands, where elements start."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.interpolate import PPoly
 
 from machines import CATALOGUE, hopper
-from rhythmid.identify.free_run import prepare_run, start_of
+from rhythmid.identify.free_run import prepare_run, start_of, sufficient
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
 from rhythmid.simulation.signal import spline, zero_order_hold
@@ -102,3 +104,50 @@ def test_lags_play_and_rate_limits_start_at_the_signal_that_acts_there(name, val
     assert start[place] == pytest.approx(command + forced * forcing)
     before = start_of(model, run, 1, 0.15, 0.0)  # 4.9 ms after the first command was sent, none has arrived
     assert before[place] == pytest.approx(forced * FORCING(0.009 - DELAYED["measurement_delay.delay"]))
+
+
+def test_steps_are_halved_until_a_further_halving_changes_less_than_the_tolerance():
+    model, one = machine(), series(block=50)
+    run = prepare_run(model, [one])
+    start = start_of(model, run, 0, 0.15, 0.1)
+    found = sufficient(run, model, [start], 1e-6)
+    outputs = [
+        replace(found, max_step=found.max_step * share).outputs(model, [start]) for share in (2.0, 1.0, 0.5)
+    ]
+    twice, once, half = (one[0] for one in outputs if one is not None)
+    assert found.max_step < run.max_step
+    assert np.sqrt(np.mean((once - half) ** 2)) < 1e-6 <= np.sqrt(np.mean((twice - once) ** 2))
+    assert sufficient(found, model, [start], 1e-6) is found
+
+
+def test_no_step_ends_at_the_knots_of_a_smooth_command():
+    smooth = spline(TIME, np.sin(1.0 + 2 * np.pi * 3.1 * TIME**2))
+    model, one = machine(), series(block=5, command=smooth)
+    run = prepare_run(model, [one])
+    assert run.smooth and run.max_step == pytest.approx(5 * PERIOD)
+    start = start_of(model, run, 0, 0.15, 0.1)
+    outputs = run.outputs(model, [start])
+    assert outputs is not None
+    expected = simulate(model, one.centres, smooth, FORCING, start, 1e-4).output
+    np.testing.assert_allclose(outputs[0], one.of_block(expected), atol=2e-5)
+
+
+def test_what_remembers_extremes_is_driven_by_a_smooth_command_as_it_is():
+    smooth = spline(TIME, np.sin(1.0 + 2 * np.pi * 3.1 * TIME**2))
+    assert prepare_run(machine(backlash={"width": 0.1}), [series(block=5, command=smooth)]).smooth
+
+
+@pytest.mark.parametrize(("ticks", "smooth"), [(1, False), (2, True), (10, True)])
+def test_a_held_command_that_changes_often_between_samples_has_a_smooth_surrogate(ticks, smooth):
+    time = np.arange(0.0, 1.5, PERIOD * ticks)
+    one = Series(
+        "made", time, np.zeros(len(time)), COMMAND, FORCING, 1, np.ones(len(time), bool), PERIOD * ticks
+    )
+    model = machine()
+    run = prepare_run(model, [one], PERIOD)
+    assert run.smooth == smooth
+    start = start_of(model, run, 0, 0.15, 0.1)
+    outputs = run.outputs(model, [start])
+    assert outputs is not None
+    expected = simulate(model, one.centres, COMMAND, FORCING, start, 1e-4).output
+    np.testing.assert_allclose(outputs[0], expected, atol=2e-5)

@@ -5,12 +5,13 @@ import warnings
 import numpy as np
 import pytest
 
+from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.descent import WHITE, first_guess
 from rhythmid.identify.free_run import prepare_run
 from rhythmid.identify.multiple_shooting import windows
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import minimise
-from rhythmid.identify.sensitivity import Problem
+from rhythmid.identify.sensitivity import COARSER, Problem
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
@@ -92,3 +93,28 @@ def test_all_windows_of_a_record_have_the_widest_usual_range_of_its_states():
     scatters = np.array([scatter for _, scatter in problem.hidden])
     assert len(scatters) > 3 and np.ptp(scatters, axis=0) == pytest.approx(0.0)
     assert scatters[0][0] > 0.5
+
+
+def test_sensitivities_in_coarser_steps_are_those_of_the_run(monkeypatch):
+    time = np.arange(0.0, 4.0, 0.01)
+    series = prepare([Record("decay", Channel(time, np.exp(-0.2 * time) * np.cos(10.0 * time), "m"))])
+    model = Model.from_text(CREEPING.format(creep=10.0)).with_element(
+        load_catalogue()["coulomb_friction"], {"force": 0.3, "transition": 0.0}
+    )
+    found = []
+    for coarser in (1.0, COARSER):
+        monkeypatch.setattr("rhythmid.identify.sensitivity.COARSER", coarser)
+        run = prepare_run(model, series, 2.5e-4)
+        problem, starts = Problem(run, model.free, WHITE, None), first_guess(model, run)
+        problem.learn_hidden(model, starts)
+        residuals = problem.residuals(model, starts)
+        assert residuals is not None
+        steps, states = np.full(len(model.free), 1e-4), np.full(run.states, 1e-4)
+        found.append(problem.linearise(model, starts, residuals, steps, states)[0].jacobian)
+    fine, coarse = found
+    assert not np.array_equal(fine, coarse)
+    felt = [
+        model.free.index(name) for name in model.free if name != "coulomb_friction.transition"
+    ]  # far below a step
+    error = np.linalg.norm(coarse - fine, axis=0)[felt] / np.linalg.norm(fine, axis=0)[felt]
+    assert error.max() < 0.1  # of dry friction, whose error falls with the step and not with its fourth power
