@@ -41,3 +41,11 @@ def test_a_steady_motion_is_taken_as_it_is():
     assert len(moving_part(value)) == len(value)
     assert bandwidth(value, 1 / RATE) < 2.0
     assert len(moving_part(np.zeros(100))) == 100 and len(moving_part(np.ones(3))) == 3
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_is_no_power_of_the_motion(seed):
+    time = np.arange(0.0, 20.0, 1e-3)
+    noise = np.random.default_rng(seed).normal(size=len(time))
+    value = np.sin(2 * np.pi * 1.7 * time) + 0.1 * noise
+    assert bandwidth(value, 1e-3) < 2.5

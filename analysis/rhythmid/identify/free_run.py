@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
-from rhythmid.elements.element import STEP
 from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model
 from rhythmid.identify.inputs import Pieces
@@ -107,12 +106,8 @@ class FreeRun:
 
 
 def _sees_steps(model: Model) -> bool:
-    """Whether an element of the command's path takes a held command otherwise than its smooth surrogate: one with memory
-    of extremes, or with a limit of rate."""
-    path = [term.element for term in model.terms if term.element.slot in ("command", "actuator")]
-    return any(
-        element.memories or any(source == STEP for source, _ in element.borrows.values()) for element in path
-    )
+    """Whether an element of the command's path takes a held command otherwise than its smooth surrogate: one with memory of extremes."""
+    return any(term.element.memories for term in model.terms if term.element.slot in ("command", "actuator"))
 
 
 def _ticks(series: Sequence[Series]) -> list[float]:

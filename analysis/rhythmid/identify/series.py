@@ -4,6 +4,7 @@ Samples are compared in block averages: far above the machine's dynamics there i
 simulation in the same way keeps the comparison unbiased.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -228,7 +229,8 @@ def bandwidth(value: Array, period: float, share: float = 0.9999) -> float:
     length = fast_length(n)
     power = np.abs(np.fft.rfft(detrended * np.hanning(n), length)) ** 2
     floor = np.median(power[len(power) // 2 :])  # measurement noise, as the upper half of the band shows it
-    power = np.maximum(power - 4.0 * floor, 0.0)
+    # the power of noise at a frequency is distributed exponentially: the largest of n values is about log2(n) times their median
+    power = np.maximum(power - math.log2(len(power)) * floor, 0.0)
     total = np.cumsum(power)
     if total[-1] <= 0.0:
         return 0.5 / period
