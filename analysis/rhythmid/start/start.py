@@ -13,6 +13,7 @@ from rhythmid.record.angle_wrap import wraps_of
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.inventory import Inventory, inventory
 from rhythmid.record.read import load_records, read_record
+from rhythmid.record.rest_at_ends import rests_of, use_line
 from rhythmid.record.signals import Clock, Signals
 from rhythmid.record.standstill import standstill
 from rhythmid.start.force_unit import MODELLED
@@ -83,12 +84,13 @@ def guess(
         clock, reason = Clock("receive"), f"the stamps do not serve: {error}"
         text = signals_yaml(found, roles, units, clock, reason)
         record = read_record(source, Signals.from_text(text, GUESSED))
-    doubts = [one for one in (standstill(cleaned(record).record), wraps_of(record)) if one is not None]
+    clean = cleaned(record).record
+    doubts = [one for one in (standstill(clean), wraps_of(record), *rests_of(clean)) if one is not None]
     if doubts:
         output = roles.choices["output"]
         output = replace(output, doubts=(*output.doubts, *doubts))
         roles = replace(roles, choices={**roles.choices, "output": output})
-        text = signals_yaml(found, roles, units, clock, reason)
+        text = signals_yaml(found, roles, units, clock, reason, use_line(clean))
     return Guess(found, roles, text)
 
 

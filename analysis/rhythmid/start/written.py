@@ -30,8 +30,10 @@ MEANS = {
 }  # fmt: skip
 
 
-def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clock_reason: str) -> str:
-    """The text of signals.yaml."""
+def signals_yaml(
+    found: Inventory, roles: Roles, units: Units, clock: Clock, clock_reason: str, use: str | None = None
+) -> str:
+    """The text of signals.yaml; `use` is its line for the part of the record that is worth using, where that is known."""
     lines = [
         *comment(f"Which channel of {found.path.name} is what. Guessed by `rhythmid init`: look through it and correct what is wrong."),
         "",
@@ -78,7 +80,7 @@ def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clo
     left = [why for why in found.left_out if not any(why.startswith(f"{one}: ") for one in taken)]
     if left:
         lines += ["", *comment(f"Left out: {_listed(left, LISTED)}.")]
-    lines += ["", *comment("Only a part of the record:"), "# use: [0, 60]                            # s"]
+    lines += ["", *comment("Only a part of the record:"), f"# {use or 'use: [0, 60]':<40}# s"]
     return "\n".join(lines) + "\n"
 
 
