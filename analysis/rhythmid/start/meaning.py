@@ -82,6 +82,9 @@ POSED = frozenset(
 )  # of a motion, where nothing else is said
 ELECTRICAL = {"V": "voltage volt volts", "A": "current currents cur iq amp amps i", "1": "pwm duty"}
 IN_SI = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/", "trajectory_msgs/", "control_msgs/")
+WITH_MEANING = frozenset().union(
+    COMMANDED, COMMANDED_COLUMNS, CONTROLLED, MEASURED, GENERIC, FORCING, BASE, SHAKEN, DRIVING, DEVICES, *WORDS.values()
+)  # fmt: skip
 IGNORED = frozenset("temp temperature battery power error err status mode".split())
 
 
@@ -102,6 +105,11 @@ def words_of(text: str) -> list[str]:
     """Words of a name in lower case: parted at capitals, digits, dots, slashes and underscores."""
     apart = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", text)
     return re.findall(r"[a-z]+|\d+", apart.lower())
+
+
+def is_word(word: str) -> bool:
+    """Whether something is known of a word, so that it is no name."""
+    return word in WITH_MEANING
 
 
 def meaning_of(one: Recorded) -> Meaning:
@@ -291,18 +299,7 @@ def _one(words: list[str], known: Collection[str]) -> str:
 
 def joint_of_column(said: str, side: str = "", names: Collection[str] = ()) -> str:
     """What tells a column from others of the same quantity: `3` of dof_pos[3], `knee` of knee_pos; `names` are words that are names here."""
-    known = (
-        COMMANDED
-        | COMMANDED_COLUMNS
-        | CONTROLLED
-        | MEASURED
-        | GENERIC
-        | FORCING
-        | BASE
-        | SHAKEN
-        | DRIVING
-        | frozenset().union(*WORDS.values(), DEVICES, LETTERS)
-    )
+    known = WITH_MEANING | set(LETTERS)
     words = words_of(said)
     if set(words) & (WORDS["effort"] - FORCES):
         known |= CONTROLLED_SHORT
