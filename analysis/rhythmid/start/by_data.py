@@ -15,6 +15,7 @@ from rhythmid.start.known import Choice, Known
 from rhythmid.start.meaning import (
     Quantity,
     differ_in_number,
+    is_no_effort,
     letter_of,
     meaning_of,
     of_one_array,
@@ -95,6 +96,8 @@ def by_data(one: Known, output: Recorded, measured: Quantity, velocity: Choice |
         return one.taken_for(measured, reason, commanded=True)
     if one.meaning.base:
         return one.taken_for("position", "its name says that it is one of the base")
+    if is_no_effort(one.one):
+        return one
     if one.meaning.commanded or says_that_it_drives(one.one):
         return one.taken_for("effort", _coherence(one, output))
     for quantity, answer in targets:

@@ -82,6 +82,11 @@ POSED = frozenset(
 )  # of a motion, where nothing else is said
 ELECTRICAL = {"V": "voltage volt volts", "A": "current currents cur iq amp amps i", "1": "pwm duty"}
 IN_SI = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/", "trajectory_msgs/", "control_msgs/")
+# what a computer counts or sets, and the place of a tool: without a word of a force none of it drives anything
+NO_EFFORT = frozenset(
+    "counter counters count counts id ids flag flags state states active enable enabled bit bits index idx seq sequence mask crc "
+    "tcp tool flange pose".split()
+)  # fmt: skip
 WITH_MEANING = frozenset().union(
     COMMANDED, COMMANDED_COLUMNS, CONTROLLED, MEASURED, GENERIC, FORCING, BASE, SHAKEN, DRIVING, DEVICES, *WORDS.values()
 )  # fmt: skip
@@ -145,6 +150,11 @@ def meaning_of(one: Recorded) -> Meaning:
 def is_ignored(one: Recorded) -> bool:
     """Whether its name says that it is neither a motion nor what drives one."""
     return bool({*words_of(one.said), *words_of(one.topic)} & IGNORED)
+
+
+def is_no_effort(one: Recorded) -> bool:
+    """Whether its name says that it is something else than what drives a machine."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & NO_EFFORT)
 
 
 def rotary_of(one: Recorded) -> tuple[bool | None, str]:

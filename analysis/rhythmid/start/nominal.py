@@ -97,21 +97,21 @@ def _shown(law: Law, rows: Rows) -> tuple[float, dict[str, str]]:
     """The inertia of a balance, and what is doubtful about it: none is seen that follows damper and spring within an
     interval of the filtered motion, a sample or a tenth of the shortest period that stands out of the noise."""
     found, period = law.coefficients, max(rows.period)
-    if rows.steady and found["acceleration"] > 0.0:
-        doubt = (
+    doubts: list[str] = []
+    if rows.steady:
+        doubts.append(
             "what drives never changes: all values are by how far from its zero it holds the machine, so that this has to be the place where "
             "nothing drives it"
         )
-        return found["acceleration"], {INERTIA: doubt}
     least = max(found["velocity"] * period, found.get("position", 0.0) * period**2)
-    if found["acceleration"] >= least:
-        return found["acceleration"], {}
-    doubt = (
-        f"the records do not tell the inertia, which the balance puts at {found['acceleration']:.1g}: this is the largest that "
-        f"follows the other forces within {1e3 * period:.3g} ms, the interval at which the motion is known once noise is filtered "
-        "out; put in what is known, and fix it"
-    )
-    return least, {INERTIA: doubt}
+    if found["acceleration"] < least:
+        doubts.append(
+            f"the records do not tell the inertia, which the balance puts at {found['acceleration']:.1g}: this is the largest that "
+            f"follows the other forces within {1e3 * period:.3g} ms, the interval at which the motion is known once noise is filtered "
+            "out; put in what is known, and fix it"
+        )
+    inertia = max(found["acceleration"], least)
+    return inertia, {INERTIA: "; ".join(doubts)} if doubts else {}
 
 
 def _restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:
