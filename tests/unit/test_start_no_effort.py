@@ -42,7 +42,9 @@ def test_a_t_before_a_name_of_another_joint_says_nothing(tmp_path):
     assert any("'t' before q_0" in line for line in found.lines())
 
 
-@pytest.mark.parametrize("name", ["tcp_0", "counter_active", "data_id", "system state", "flag", "pose_0"])
+@pytest.mark.parametrize(
+    "name", ["tcp_0", "counter_active", "data_id", "system state", "flag", "pose_0", "target_id"]
+)
 def test_the_place_of_a_tool_a_counter_and_a_flag_are_no_efforts(tmp_path, name):
     position, _ = moved(FORCE, 0.05, 0.3, 6.0)
     assert set(roles_of(table(tmp_path, motor_pos=position, **{name: FORCE}))) == {"output"}

@@ -15,7 +15,7 @@ BY_UNIT: dict[str, Quantity] = {
 WORDS: dict[Quantity, frozenset[str]] = {
     "position": frozenset(
         "position positions pos angle angles theta phi psi alpha pose height distance displacement disp deflection extension "
-        "length travel rotation".split()
+        "length travel rotation translation".split()
     ),
     "velocity": frozenset("velocity velocities vel speed rate omega twist dq qd qdot thetadot dtheta xdot dx angvel gyro gyr gyroscope".split()),
     "acceleration": frozenset(
@@ -81,12 +81,12 @@ POSED = frozenset(
     "des desired ref reference target targets goal setpoint sp".split()
 )  # of a motion, where nothing else is said
 ELECTRICAL = {"V": "voltage volt volts", "A": "current currents cur iq amp amps i", "1": "pwm duty"}
-IN_SI = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/", "trajectory_msgs/", "control_msgs/")
-# what a computer counts or sets, and the place of a tool: without a word of a force none of it drives anything
-NO_EFFORT = frozenset(
-    "counter counters count counts id ids flag flags state states active enable enabled bit bits index idx seq sequence mask crc "
-    "tcp tool flange pose".split()
-)  # fmt: skip
+IN_SI = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/", "tf2_msgs/", "trajectory_msgs/", "control_msgs/")
+# what a computer counts or sets, which neither drives nor is followed
+COUNTED = frozenset(
+    "counter counters count counts id ids flag flags active enable enabled bit bits index idx seq sequence mask crc".split()
+)
+NO_EFFORT = COUNTED | frozenset("state states tcp tool flange pose".split())  # the place of a tool, too
 WITH_MEANING = frozenset().union(
     COMMANDED, COMMANDED_COLUMNS, CONTROLLED, MEASURED, GENERIC, FORCING, BASE, SHAKEN, DRIVING, DEVICES, *WORDS.values()
 )  # fmt: skip
@@ -133,6 +133,7 @@ def meaning_of(one: Recorded) -> Meaning:
         "sensor_msgs/msg/JointState",
         "sensor_msgs/msg/Imu",
         "nav_msgs/msg/Odometry",
+        "tf2_msgs/msg/TFMessage",
     ):
         commanded = False
     forcing = bool(every & FORCING)
@@ -150,6 +151,11 @@ def meaning_of(one: Recorded) -> Meaning:
 def is_ignored(one: Recorded) -> bool:
     """Whether its name says that it is neither a motion nor what drives one."""
     return bool({*words_of(one.said), *words_of(one.topic)} & IGNORED)
+
+
+def is_counted(one: Recorded) -> bool:
+    """Whether its name says that it is a number that a computer counts or sets."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & COUNTED)
 
 
 def is_no_effort(one: Recorded) -> bool:

@@ -18,7 +18,7 @@ from rhythmid.record.signals import Clock, Signals
 from rhythmid.record.standstill import standstill
 from rhythmid.start.force_unit import MODELLED
 from rhythmid.start.known import Ask
-from rhythmid.start.meaning import driving_unit_of
+from rhythmid.start.meaning import driving_unit_of, meaning_of
 from rhythmid.start.named_joints import with_joints
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
 from rhythmid.start.roles import Roles, first_answer, guess_roles
@@ -71,7 +71,7 @@ def guess(
     source: str | Path, joint: str | None = None, rate: float | None = None, ask: Ask = first_answer
 ) -> Guess:
     """Look at one recording and guess which channel is what; parameters and errors as of `start`."""
-    found = with_joints(with_sides(inventory(source, rate)))
+    found = with_joints(with_sides(_inventory(source, rate)))
     roles = guess_roles(found, joint, ask)
     units = _units(roles)
     clock, reason = clock_of(found, roles)
@@ -92,6 +92,15 @@ def guess(
         roles = replace(roles, choices={**roles.choices, "output": output})
         text = signals_yaml(found, roles, units, clock, reason, use_line(clean))
     return Guess(found, roles, text)
+
+
+def _inventory(source: str | Path, rate: float | None) -> Inventory:
+    """What is in a source; of a bag in which nothing was measured, where the vehicle is, too."""
+    found = inventory(source, rate)
+    may_be_motion = (meaning for meaning in map(meaning_of, found.recorded) if meaning.quantity != "effort")
+    if not found.is_bag or any(meaning.commanded is not True for meaning in may_be_motion):
+        return found
+    return inventory(source, rate, vehicle=True)
 
 
 @threadpool_limits.wrap(limits=1)
