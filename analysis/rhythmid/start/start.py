@@ -23,7 +23,7 @@ from rhythmid.start.named_joints import with_joints
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
 from rhythmid.start.roles import Roles, first_answer, guess_roles
 from rhythmid.start.sides import with_sides
-from rhythmid.start.written import GUESSED, clock_of, model_yaml, signals_yaml
+from rhythmid.start.written import GUESSED, as_guessed, clock_of, model_yaml, signals_yaml
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
 
@@ -67,6 +67,7 @@ class Start:
 
 
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
+@as_guessed()
 def guess(
     source: str | Path, joint: str | None = None, rate: float | None = None, ask: Ask = first_answer
 ) -> Guess:
@@ -104,6 +105,7 @@ def _inventory(source: str | Path, rate: float | None) -> Inventory:
 
 
 @threadpool_limits.wrap(limits=1)
+@as_guessed()
 def start(
     sources: Sequence[str | Path],
     joint: str | None = None,

@@ -1,12 +1,15 @@
 """signals.yaml and model.yaml as text, every guess with its reason and its alternatives in comments."""
 
 import json
+import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 
 from rhythmid.elements.element import SLOTS
+from rhythmid.errors import InputError
 from rhythmid.model import INERTIA, Term
 from rhythmid.record.heading import heading_of
 from rhythmid.record.held_command import held_note
@@ -28,6 +31,16 @@ MEANS = {
     "effort": "the measured effort of the actuator", "reference": "what the controller is asked for",
     "forcing": "what pushes in addition to the input",
 }  # fmt: skip
+
+
+@contextmanager
+def as_guessed() -> Iterator[None]:
+    """Errors in what was guessed say so, and name no line of a file that is not there."""
+    try:
+        yield
+    except InputError as error:
+        said = re.sub(rf"^{re.escape(GUESSED)}(?::\d+)?: ", "guessed ", str(error))
+        raise InputError(said) from error
 
 
 def signals_yaml(
