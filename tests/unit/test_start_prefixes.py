@@ -29,7 +29,7 @@ def table(folder: Path, *names: str) -> Path:
         ("rightSpeed", "leftSpeed", "rightPwm", "leftPwm"),
         ("RightWheelSpeed", "LeftWheelSpeed", "RightDuty", "LeftDuty"),
         ("RRspeed", "FLspeed", "RRpwm", "FLpwm"),
-        ("FR_speed", "RL_speed", "FR_pwm", "RL_pwm"),
+        ("FR_speed", "BL_speed", "FR_pwm", "BL_pwm"),
     ],
 )
 def test_a_side_before_a_known_word_is_a_side(tmp_path, names):

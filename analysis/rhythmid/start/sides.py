@@ -10,9 +10,17 @@ from rhythmid.start.meaning import is_word, words_of
 
 OTHER = {"l": "r", "r": "l", "left": "right", "right": "left"}
 SIDES = {
-    "l": "left", "r": "right", "left": "left", "right": "right", "fl": "front_left", "fr": "front_right", "rl": "rear_left",
+    "l": "left",
+    "r": "right",
+    "left": "left",
+    "right": "right",
+    "fl": "front_left",
+    "fr": "front_right",
+    "rl": "rear_left",
     "rr": "rear_right",
-}  # fmt: skip
+    "bl": "back_left",
+    "br": "back_right",
+}
 # a word of its own, the last word of a name such as kneeLeft, the last letter of a name that is one word
 WRITTEN = (
     re.compile(r"(?<![A-Za-z])(left|right|l|r)(?![A-Za-z])", re.IGNORECASE),
@@ -20,7 +28,7 @@ WRITTEN = (
     re.compile(r"^[a-z]{1,4}(l|r)$"),
 )
 # before a name that has a word whose meaning is known; the longer ones first
-BEFORE_NAME = re.compile(r"^(left|right|fl|fr|rl|rr|l|r)([ _.-]*)(?=[a-z]{2})", re.IGNORECASE)
+BEFORE_NAME = re.compile(r"^(left|right|fl|fr|rl|rr|bl|br|l|r)([ _.-]*)(?=[a-z]{2})", re.IGNORECASE)
 
 
 def with_sides(found: Inventory) -> Inventory:
