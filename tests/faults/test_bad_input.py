@@ -140,7 +140,7 @@ NO_RECORDINGS = {
         "is not an sqlite3 bag",
     ),
     "notes.txt": (lambda folder: (folder / "notes.txt").write_text("u, y"), "is neither a bag"),
-    "bag.": (unused, "topic /hopper/excitation is not in"),
+    "bag.": (unused, "no file says which of its topics is what; write one by rhythmid init"),
     "./bag": (texts, "topic /hopper/excitation: field 'effort[leg]': std_msgs/msg/String has no field"),
 }
 

@@ -1,11 +1,13 @@
 """Tables as loggers and oscilloscopes write them: their times, missing values, heads in the middle, and what breaks off."""
 
+import warnings
 from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.io import savemat
+from scipy.io.matlab import MatlabOpaque, MatReadWarning
 
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import inventory
@@ -166,6 +168,21 @@ def test_an_object_of_matlab_is_refused_with_what_to_do_there(tmp_path):
     savemat(tmp_path / "run.mat", {"T": "an object"})
     with pytest.raises(InputError, match="holds no column of numbers; .*writetimetable"):
         inventory(tmp_path / "run.mat")
+
+
+def test_objects_of_matlab_are_refused_by_their_class_and_without_warnings(tmp_path, monkeypatch, capfd):
+    kinds = [(name, "O") for name in ("s0", "s1", "s2", "arr")]
+    stored = np.array([(b"volts", b"MCOS", b"timeseries", np.zeros(6))], dtype=kinds).view(MatlabOpaque)
+
+    def load(*args, **options):
+        warnings.warn("Duplicate variable name", MatReadWarning, stacklevel=1)
+        return {"__globals__": [], "mode": "Sine", "None": stored}
+
+    savemat(tmp_path / "run.mat", {"volts": TIME})
+    monkeypatch.setattr("scipy.io.loadmat", load)
+    with pytest.raises(InputError, match=r"'volts' is an .* class timeseries.*timeseries2timetable\(volts\)"):
+        inventory(tmp_path / "run.mat")
+    assert capfd.readouterr().err == ""
 
 
 def test_a_remark_behind_a_row_is_no_part_of_it(tmp_path):

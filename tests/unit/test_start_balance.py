@@ -63,3 +63,15 @@ def test_a_force_that_explains_nothing_of_the_motion_is_doubted(tmp_path):
     found = begun(tmp_path, FORCE, moved(tones(2, TIME), 0.05, 0.5, 6.0)[0])
     (line,) = (one for one in found.lines() if one.startswith("CHECK inertia"))
     assert "the balance of forces" in line and "put in what is known" in line
+
+
+def test_of_a_speed_that_never_turns_back_neither_gravity_nor_a_spring_is_guessed(tmp_path):
+    volts = np.where(TIME % 1.6 >= 0.8, 8.0, 0.0)
+    speed = np.where(TIME < 9.0, moved(volts, 0.05, 0.3, 0.0)[1], 0.0)  # its sensor fails
+    np.savez(tmp_path / "run.npz", t=TIME, wheel_speed=speed, motor_voltage=volts)
+    assert not labels(start([tmp_path / "run.npz"])) & {"linear_spring", "pendulum_gravity"}
+
+
+def test_of_a_speed_that_turns_back_a_spring_is_guessed_and_no_gravity(tmp_path):
+    np.savez(tmp_path / "run.npz", t=TIME, motor_speed=moved(FORCE, 0.05, 0.3, 6.0)[1], motor_torque=FORCE)
+    assert "linear_spring" in labels(start([tmp_path / "run.npz"]))

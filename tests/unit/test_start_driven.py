@@ -123,7 +123,7 @@ def test_a_second_angle_is_no_effort(tmp_path):
 def test_a_table_of_another_layout_is_told_as_such_and_no_file_is_named_that_is_not_there(tmp_path):
     np.savez(tmp_path / "a.npz", t=TIME, x=X, f=FORCE)
     np.savez(tmp_path / "b.npz", t=TIME, x=X, u=FORCE)
-    with pytest.raises(InputError, match=r"^guessed signals\.yaml:\d+: input: .*b\.npz: has no column 'f'"):
+    with pytest.raises(InputError, match=r"^guessed input: .*b\.npz: has no column 'f'"):
         start([tmp_path / "a.npz", tmp_path / "b.npz"])
 
 

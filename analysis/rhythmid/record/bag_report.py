@@ -22,6 +22,7 @@ from rhythmid.record.output_copy import copy_notes
 from rhythmid.record.quality import ChannelQuality
 from rhythmid.record.read import read_record
 from rhythmid.record.record import Record
+from rhythmid.record.rest_at_ends import rest_notes
 from rhythmid.record.signals import Signals
 from rhythmid.record.standstill import standstill
 from rhythmid.record.timing import Timing
@@ -196,6 +197,7 @@ def quality_report(
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             notes += [note for note in one.quality.notes if note not in notes]
             notes += [f"{begin}{note}" for note in (*copy_notes(one), *unsigned_notes(one), *wrap_notes(one))]
+            notes += [f"{begin}{note}" for note in rest_notes(one) if begin]
             if begin and (still := standstill(one)) is not None:
                 notes.append(f"{begin}output: {still}")
         duration = max(one.duration for one in parts.values())

@@ -13,6 +13,7 @@ from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.outlier import outlying_samples, repeated_samples
 from rhythmid.record.quality import clipped_samples
 from rhythmid.record.record import Record
+from rhythmid.record.rest_at_ends import rest_notes
 
 Mask = NDArray[np.bool_]
 Reason = Literal["outlier", "repeated", "clipped"]
@@ -105,7 +106,7 @@ def cleaned(record: Record) -> Cleaned:
             bad = bad | np.append(bad[1:], False) | np.insert(bad[:-1], 0, False)
         found.append(LeftOut(reason, int(bad.sum()), total, float(channel.time[bad][0]), limits))
         record = replace(record, output=replace(channel, time=channel.time[~bad], value=channel.value[~bad]))
-    return Cleaned(record, tuple(found), wraps)
+    return Cleaned(record, tuple(found), (*wraps, *rest_notes(record)))
 
 
 def peak_note(record: Record) -> str | None:

@@ -13,6 +13,9 @@ from rhythmid.errors import InputError
 _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[\s*([^\[\]]+?)\s*\]")
 LONGEST_POSITION = 10  # digits of a position in a list, whose length is a number of 32 bits
 NAMES = ("name", "names", "joint_names")  # lists that name the entries of the lists beside or below them
+OWN_NAMES = (
+    "child_frame_id",
+)  # texts that name the entry of a list that they stand in, as in a tree of frames
 
 TypeFields = Mapping[
     str, Any
@@ -70,7 +73,7 @@ class Field:
                 continue
             if kind[0] not in (Nodetype.ARRAY, Nodetype.SEQUENCE):
                 raise InputError(f"field {self.text!r}: {done} is not a list")
-            if isinstance(step, tuple) and not named:
+            if isinstance(step, tuple) and not (named or _name_themselves(kind[1][0], types)):
                 raise InputError(
                     f"field {self.text!r}: entries of {done} have no names; give a position such as {done}[0]"
                 )
@@ -80,6 +83,11 @@ class Field:
             done += f"[{step if isinstance(step, int) else step[0]}]"
         if kind[0] != Nodetype.BASE or kind[1][0] in ("string", "wstring"):
             raise InputError(f"field {self.text!r}: {done} is not one number{_hint(kind)}")
+
+
+def _name_themselves(kind: Any, types: TypeFields) -> bool:
+    """Whether the entries of a list are messages that bear names."""
+    return kind[0] == Nodetype.NAME and any(name in dict(types[kind[1]][1]) for name in OWN_NAMES)
 
 
 def _is_list_of_text(kind: Any) -> bool:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.record.compression import largest
+from rhythmid.record.matlab_objects import complaint_of_objects
 from rhythmid.record.own_process import arrays_in_own_process
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -16,13 +17,6 @@ STARTS = (0, 512)  # bytes in front of it that are looked behind: MATLAB writes 
 OF_MATLAB = "MATLAB_class"  # attribute by which MATLAB says what a dataset is
 NUMBERS = "fiub"  # kinds of data types
 OF_OBJECT = "MATLAB_object_decode"  # the same of an object, of which the dataset holds where it is kept, and no number of it
-# what MATLAB is told to write an object of a class as a table
-WRITTEN_BY = {
-    "Simulink.SimulationData.Dataset": "writetimetable(extractTimetable({name}), 'run.csv')",
-    "timeseries": "writetimetable(timeseries2timetable({name}), 'run.csv')",
-    "timetable": "writetimetable({name}, 'run.csv')",
-    "table": "writetable({name}, 'run.csv')",
-}
 REFERENCES = "#"  # with which MATLAB begins the names of the groups to which its structs and cells refer
 DEEPEST = 4  # structs and cells within one another that are looked into
 
@@ -52,18 +46,10 @@ def read_hdf5(path: Path) -> dict[str, NDArray[Any]]:
         with h5py.File(path, "r") as file:
             reader.take_all("", file)
         if reader.objects and not reader.found:
-            raise ValueError(_complaint(reader.objects))
+            raise ValueError(complaint_of_objects(reader.objects))
         return reader.found
 
     return dict(arrays_in_own_process(read, f"{path}: cannot be read as a table"))
-
-
-def _complaint(objects: dict[str, str]) -> str:
-    """Why a file of nothing but MATLAB's objects holds no table, and what to do."""
-    name, kind = next(iter(objects.items()))
-    written = WRITTEN_BY.get(kind, "").format(name=name)
-    mend = f"in MATLAB  {written}" if written else "in MATLAB save its numbers as arrays"
-    return f"{name!r} is an object of MATLAB's class {kind}, which no other program can read; {mend}"
 
 
 @dataclass

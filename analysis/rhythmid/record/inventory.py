@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Topic
 from rhythmid.record.columns import Columns, read_columns
-from rhythmid.record.field import NAMES, Field
+from rhythmid.record.field import NAMES, OWN_NAMES, Field
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.grouped_runs import grouped_runs
 from rhythmid.record.heading import heading_of
@@ -34,12 +35,16 @@ DEEPEST = 5  # messages within messages that are looked into
 SKIPPED_PACKAGES = (
     "diagnostic_msgs",
     "rcl_interfaces",
-    "tf2_msgs",
     "rosgraph_msgs",
     "visualization_msgs",
     "nav_msgs",
+    "tf2_msgs",
 )
+VEHICLES = ("nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage")  # where a vehicle or a robot is, as worked out
+FIXED = "/tf_static"  # frames that never move
+FIRST = 200  # messages whose entries are listed: several nodes tell frames in turn
 SKIPPED_FIELDS = re.compile(r"header|stamp|.*covariance|orientation|layout|points|time_from_start")
+NO_NUMBERS = "Quaternion"  # a direction in four numbers, of which none alone is an angle
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,8 +106,11 @@ class Inventory:
         return self.clock.kind in ("header", "receive")
 
 
-def inventory(source: str | Path, rate: float | None = None) -> Inventory:
-    """What is in a bag or table; `rate` [Hz] is that of a table without a time. Raises InputError, one line."""
+def inventory(source: str | Path, rate: float | None = None, vehicle: bool = False) -> Inventory:
+    """What is in a bag or table; `rate` [Hz] is that of a table without a time. Raises InputError, one line.
+
+    With `vehicle`, a bag's odometry and trees of frames are looked into, too.
+    """
     source = Path(source)
     if not source.exists():
         raise InputError(f"{source}: no such file or directory")
@@ -119,7 +127,7 @@ def inventory(source: str | Path, rate: float | None = None) -> Inventory:
         raise InputError(
             f"{source}: is neither a bag (directory, .mcap, .db3) nor a table ({', '.join(SUFFIXES)})"
         )
-    return _of_bag(Bag(source))
+    return _of_bag(Bag(source), vehicle)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of numbers near the largest, and NaN of every kind
@@ -179,26 +187,28 @@ def _rows_of(columns: list[tuple[str, Array]]) -> int:
     return max(lengths, key=lambda count: (count in timed and lengths.count(count) > 1, lengths.count(count)))
 
 
-def _of_bag(bag: Bag) -> Inventory:
-    first: dict[str, tuple[Topic, bytes]] = {}
+def _of_bag(bag: Bag, vehicle: bool) -> Inventory:
+    first: dict[str, tuple[Topic, list[bytes]]] = {}
     for block in bag.blocks():
         if block.topic.name not in first and len(block):
-            first[block.topic.name] = block.topic, bytes(next(iter(block)))
+            count = FIRST if block.topic.type in VEHICLES else 1
+            first[block.topic.name] = block.topic, [bytes(one) for one in islice(block, count)]
     wanted: dict[str, list[Recorded]] = {}
     left: list[str] = []
     for name, (topic, data) in sorted(first.items()):
-        if topic.type.split("/")[0] in SKIPPED_PACKAGES:
+        looked_into = vehicle and topic.type in VEHICLES and name != FIXED
+        if topic.type.split("/")[0] in SKIPPED_PACKAGES and not looked_into:
             left.append(f"{name}: {topic.type}")
             continue
         try:
-            message = typestore(topic).deserialize_cdr(data, topic.type)
+            messages = [typestore(topic).deserialize_cdr(one, topic.type) for one in data]
         except Exception as error:  # a type that is not defined, or a damaged message
             left.append(f"{name}: {' '.join(str(error).split())}")
             continue
         empty = np.empty(0)
         fields = [
             Recorded(said, empty, empty, topic.name, topic.type, path, joint=joint)
-            for path, said, joint in _numbers(message)
+            for path, said, joint in dict.fromkeys(part for one in messages for part in _numbers(one))
         ]
         if fields:
             wanted[name] = fields
@@ -214,6 +224,8 @@ def _of_bag(bag: Bag) -> Inventory:
     moving = [one for one in found if len(one.value) > 1 and np.ptp(one.value) > 0.0]
     constant = [one for one in found if one not in moving]
     left += [f"{one}: never changes" for one in constant]
+    if not moving and not vehicle:
+        return _of_bag(Bag(bag.path), vehicle=True)
     if not moving:
         raise InputError(
             f"{bag.path}: no topic holds a number that changes; topics: {', '.join(sorted(bag.topics)) or 'none'}"
@@ -242,12 +254,14 @@ def _numbers(
         return
     above = (*above, message)
     for name in getattr(message, "__dataclass_fields__", {}):
-        if name.startswith("__") or SKIPPED_FIELDS.fullmatch(name):
+        # constants of a type are in capitals, and fields are not: docs.ros.org, ROS 2 interface definitions
+        if name.startswith("__") or name.isupper() or SKIPPED_FIELDS.fullmatch(name):
             continue
         value = getattr(message, name)
         here, words = f"{path}.{name}" if path else name, f"{said} {name}".strip()
         if hasattr(value, "__dataclass_fields__"):
-            yield from _numbers(value, here, words, joint, above)
+            if not type(value).__name__.endswith(NO_NUMBERS):
+                yield from _numbers(value, here, words, joint, above)
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
             yield here, words, joint
         elif isinstance(value, (list, tuple, np.ndarray)) and 0 < len(value) <= WIDEST:
@@ -260,7 +274,7 @@ def _entries(
     """The same of every entry of a list; entries are called by name where a list of names stands beside them."""
     if isinstance(values[0], (str, bool, bytes)):
         return
-    names = _names(above[-1], len(values), NAMES)
+    names = _own_names(values) or _names(above[-1], len(values), NAMES)
     interfaces = _names(
         above[-1], len(values), ("interface_names",)
     )  # control_msgs/InterfaceValue: position, effort, …
@@ -275,15 +289,23 @@ def _entries(
             yield here, said, of_joint or (f"#{number}" if len(values) > 1 else "")
 
 
+def _own_names(values: Any) -> list[str] | None:
+    """Names that the entries of a list bear, each of its own."""
+    names = [str(getattr(one, key)) for one in values for key in OWN_NAMES if hasattr(one, key)]
+    return names if len(names) == len(values) == len(set(names)) and all(map(_in_path, names)) else None
+
+
+def _in_path(name: Any) -> bool:
+    """Whether a path can hold this name of an entry."""
+    return isinstance(name, str) and bool(re.fullmatch(r"[^\[\]\s]+", name)) and not name.isdigit()
+
+
 def _names(message: Any, count: int, keys: tuple[str, ...]) -> list[str] | None:
     """Names of `count` entries that stand in the message, each of its own and such as a path can hold."""
     for key in keys:
         names = getattr(message, key, None)
         if isinstance(names, list) and len(names) == count == len(set(names)):
-            if all(
-                isinstance(name, str) and re.fullmatch(r"[^\[\]\s]+", name) and not name.isdigit()
-                for name in names
-            ):
+            if all(map(_in_path, names)):
                 return names
     return None
 

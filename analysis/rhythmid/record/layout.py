@@ -15,7 +15,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys.base import normalize_fieldname
 
 from rhythmid.record.block import Block, gather
-from rhythmid.record.field import NAMES, Field, TypeFields
+from rhythmid.record.field import NAMES, OWN_NAMES, Field, TypeFields
 
 HEAD = 4  # bytes of encapsulation in front of every message; alignment counts from behind it
 LITTLE_ENDIAN = 0x0100  # the first two of them, plain CDR in little-endian byte order, read as a number
@@ -127,7 +127,7 @@ class Layout:
         names: list[Text] = []
         for step in field.steps:
             if isinstance(step, tuple):
-                step, used = _position(step[0], above)
+                step, used = _position(step[0], above, here)
                 names += used
             if isinstance(here, dict):
                 above.append(here)
@@ -162,8 +162,18 @@ class Layout:
             return gather(block.buffer, block.start + number.at, number.dtype).astype(np.float64)
 
 
-def _position(name: str, above: list[dict[str, Any]]) -> tuple[int, list[Text]]:
-    """Position of the entry called `name` by the nearest list of names, and the names that decide it."""
+def _position(name: str, above: list[dict[str, Any]], entries: Any) -> tuple[int, list[Text]]:
+    """Position of the entry called `name`, by the names that entries bear or by the nearest list of names, and the names that decide it."""
+    own = (
+        [entry[key] for entry in entries for key in OWN_NAMES if key in entry]
+        if isinstance(entries, list)
+        else []
+    )
+    if own:
+        position = next((number for number, text in enumerate(own) if text.value == name), None)
+        if position is None:
+            raise LookupError(name)
+        return position, own[: position + 1]
     for part in reversed(above):
         for key in NAMES:
             listed = part.get(key)
@@ -182,7 +192,7 @@ def value_of(message: Any, field: Field) -> float:
     done = ""
     for step in field.steps:
         if isinstance(step, tuple):
-            step = _index_of(step[0], above)
+            step = _index_of(step[0], above, here)
         if isinstance(step, str):
             above.append(here)
             here = getattr(here, normalize_fieldname(step))
@@ -194,7 +204,12 @@ def value_of(message: Any, field: Field) -> float:
     return float(here)
 
 
-def _index_of(name: str, above: list[Any]) -> int:
+def _index_of(name: str, above: list[Any], entries: Any) -> int:
+    own = [str(getattr(entry, key)) for entry in entries for key in OWN_NAMES if hasattr(entry, key)]
+    if own:
+        if name not in own:
+            raise LookupError(f"it names {', '.join(own)}, but not {name}")
+        return own.index(name)
     for part in reversed(above):
         for key in NAMES:
             listed = getattr(part, key, None)

@@ -96,7 +96,7 @@ def read_record(source: str | Path, signals: Signals | str | Path | None = None)
     if not is_bag(source):
         raise InputError(
             f"{source}: is neither a bag (directory, .mcap, .db3) nor a signals.yaml that names tables; "
-            "the columns of a table have to be named with --signals"
+            f"the columns of a table have to be named with --signals, by a file that  rhythmid init {source}  writes"
         )
     if signals is not None and signals.from_tables:
         raise InputError(f"{signals.path}: names tables, so it takes the place of the bag {source}")
@@ -116,6 +116,12 @@ def read_bag(bag: Bag, signals: Signals | None = None) -> Record:
         named = Signals.default(str(description.get("namespace")), str(description.get("joint")))
         if named.channels["output"].topic in bag.topics:
             return read_bag(Bag(bag.path), named)
+    if signals is None and not any(topic in bag.topics for topic in wanted):
+        listed = ", ".join(sorted(bag.topics)) or "none"
+        raise InputError(
+            f"{bag.path}: no file says which of its topics is what; write one by  rhythmid init {bag.path}  and give it with --signals "
+            f"(topics: {listed})"
+        )
     samples = [
         (role, *_from_columns(bag, source, columns, chosen))
         for role, source in chosen.channels.items()

@@ -1,6 +1,7 @@
 """Tables: columns of numbers in .mat, .h5, .npz, .parquet, .json, .csv and other text files, which may be compressed (.csv.gz)."""
 
 import re
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -14,10 +15,11 @@ from rhythmid.errors import InputError
 from rhythmid.record.compression import largest
 from rhythmid.record.counter_wrap import unwrapped
 from rhythmid.record.foreign_file import refuse_foreign
-from rhythmid.record.hdf5_table import is_hdf5, read_hdf5
+from rhythmid.record.hdf5_table import NUMBERS, is_hdf5, read_hdf5
 from rhythmid.record.joined_stamps import with_joined_stamps
 from rhythmid.record.json_table import JSON, read_json
 from rhythmid.record.lfs_pointer import check_content
+from rhythmid.record.matlab_objects import complaint_of_objects
 from rhythmid.record.own_process import arrays_in_own_process
 from rhythmid.record.table_clock import is_called_time
 from rhythmid.record.text_file import COMPRESSED
@@ -171,12 +173,31 @@ def _mat(path: Path) -> dict[str, Any]:
     if is_hdf5(path):  # version 7.3
         return read_hdf5(path)
     from scipy.io import loadmat
+    from scipy.io.matlab import MatlabOpaque, MatReadWarning
 
     def read() -> dict[str, NDArray[Any]]:
-        found = loadmat(path, simplify_cells=True)
-        return dict(_flat({name: value for name, value in found.items() if not name.startswith("__")}))
+        with warnings.catch_warnings():
+            warnings.simplefilter(
+                "ignore", MatReadWarning
+            )  # it reads several objects as one variable without a name
+            found = loadmat(path, simplify_cells=True)
+        opaque = [value for value in found.values() if isinstance(value, MatlabOpaque)]
+        objects = {_first(one["s0"]): _first(one["s2"]) for one in opaque}  # names and classes
+        told = {
+            name: value
+            for name, value in found.items()
+            if not name.startswith("__") and not isinstance(value, MatlabOpaque)
+        }
+        arrays = dict(_flat(told))
+        if objects and not any(array.dtype.kind in NUMBERS for array in arrays.values()):
+            raise ValueError(complaint_of_objects(objects))
+        return arrays
 
     return dict(arrays_in_own_process(read, f"{path}: cannot be read as a table"))
+
+
+def _first(texts: NDArray[Any]) -> str:
+    return np.ravel(texts)[0].decode(errors="replace")
 
 
 def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

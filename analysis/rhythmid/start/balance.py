@@ -27,6 +27,7 @@ COLUMNS = ("acceleration", "velocity", "position", "sine", "cosine", "constant")
 POSITIVE = frozenset({"acceleration", "velocity", "position"})
 MOST_ROWS = 4000  # of the balance: more would not make a first guess better
 FED_BACK = 1e-3  # share of what drives that a multiple of the position leaves, below which a controller made it of the position
+THERE_AND_BACK = 2.0  # of its travel, that a machine goes at least that comes back to where it began
 LEAST_ROWS = 40  # rows of a stretch without which nothing is guessed from it
 
 
@@ -81,6 +82,13 @@ class Rows:
         """Whether what drives never changes: then a constant balances it, and tells nothing of the machine."""
         every = np.concatenate(self.drives)
         return not self.by_base and bool(np.ptp(every) <= STEADY * np.abs(every).max())
+
+    @property
+    def comes_back(self) -> bool:
+        """Whether the position goes more than there and back: its path is twice its travel at least."""
+        place = COLUMNS.index("position")
+        path = sum(float(np.abs(np.diff(one[:, place])).sum()) for one in self.columns)
+        return path >= THERE_AND_BACK * self.span
 
     def delay(self, names: Sequence[str]) -> float:
         """By how much later [s] what drives acts, where that makes the balance of these columns clearly better; else 0.

@@ -15,6 +15,8 @@ from rhythmid.start.known import Choice, Known
 from rhythmid.start.meaning import (
     Quantity,
     differ_in_number,
+    is_counted,
+    is_no_effort,
     letter_of,
     meaning_of,
     of_one_array,
@@ -39,7 +41,7 @@ NAMED = 8  # numbers that a note names
 
 def output_by_data(able: list[Known], known: list[Known], place: str) -> tuple[Choice, list[Known]]:
     """Where no name tells: the integral of another one, else what is driven more by the others than it drives them."""
-    if not able and len(known) == 1:
+    if not able and len(known) == 1 and known[0].meaning.commanded is not True:
         doubts = ("its unit is none of a motion: set kind, unit and scale",)
         return Choice(known[0].one, "the only number that was recorded", (), doubts), [
             known[0].taken_for("position")
@@ -78,7 +80,7 @@ def output_by_data(able: list[Known], known: list[Known], place: str) -> tuple[C
 
 def by_data(one: Known, output: Recorded, measured: Quantity, velocity: Choice | None) -> Known:
     """What a command without a quantity asks for: what it comes closest to."""
-    if one.quantity is not None or of_one_array(one.one, output):
+    if one.quantity is not None or is_counted(one.one) or of_one_array(one.one, output):
         return one
     targets: list[tuple[Quantity, Recorded]] = [(measured, output)]
     if velocity is not None:
@@ -95,6 +97,8 @@ def by_data(one: Known, output: Recorded, measured: Quantity, velocity: Choice |
         return one.taken_for(measured, reason, commanded=True)
     if one.meaning.base:
         return one.taken_for("position", "its name says that it is one of the base")
+    if is_no_effort(one.one):
+        return one
     if one.meaning.commanded or says_that_it_drives(one.one):
         return one.taken_for("effort", _coherence(one, output))
     for quantity, answer in targets:

@@ -9,7 +9,7 @@ from rhythmid.start.direction import COPY, doubt_of_direction
 from rhythmid.start.force_unit import doubt_of_units, matching, of_one_unit
 from rhythmid.start.known import Ask, Choice, Known, chosen, pick, ranked_by_worth, strongest
 from rhythmid.start.meaning import Quantity, meaning_of, says_base, says_it_was_read
-from rhythmid.start.relation import HARDLY, coherent, follows
+from rhythmid.start.relation import GOES_ALONG, HARDLY, coherent, follows
 
 SAYS_READ = "its name says that it was read from a sensor"
 
@@ -44,7 +44,8 @@ def drivers(
         found["forcing"] = strongest(forcing, "moves most of what pushes from outside")
     reference, of = _reference(rest, output, measured)
     if reference is not None:
-        commanded = [one for one in commanded if not _is_hardly_effort(one, output)]
+        commanded = [one for one in commanded if not _is_hardly_effort(one, output, HARDLY)]
+        sensed = [one for one in sensed if not _is_hardly_effort(one, output, GOES_ALONG)]
     base = [one for one in rest if one.meaning.base and one.quantity in ("position", "acceleration")]
     if commanded and sensed:
         found["input"], found["effort"] = _commanded_and_measured(commanded, sensed, output, ask)
@@ -70,9 +71,12 @@ def drivers(
     return found, "force", of
 
 
-def _is_hardly_effort(one: Known, output: Recorded) -> bool:
-    """Whether no name says that a command is an effort, and it hardly goes with the output."""
-    return meaning_of(one.one).quantity is None and coherent(one.one, output) < HARDLY
+def _is_hardly_effort(one: Known, output: Recorded, least: float) -> bool:
+    """Whether no name says that it is an effort, and its coherence with the output is less than that.
+
+    Beside a reference, which makes both, a motion of the tool and much else goes with the output in part.
+    """
+    return meaning_of(one.one).quantity is None and coherent(one.one, output) < least
 
 
 def _beside_base(choice: Choice, base: list[Known]) -> Choice:

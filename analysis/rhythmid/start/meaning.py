@@ -15,7 +15,7 @@ BY_UNIT: dict[str, Quantity] = {
 WORDS: dict[Quantity, frozenset[str]] = {
     "position": frozenset(
         "position positions pos angle angles theta phi psi alpha pose height distance displacement disp deflection extension "
-        "length travel rotation".split()
+        "length travel rotation translation".split()
     ),
     "velocity": frozenset("velocity velocities vel speed rate omega twist dq qd qdot thetadot dtheta xdot dx angvel gyro gyr gyroscope".split()),
     "acceleration": frozenset(
@@ -81,7 +81,15 @@ POSED = frozenset(
     "des desired ref reference target targets goal setpoint sp".split()
 )  # of a motion, where nothing else is said
 ELECTRICAL = {"V": "voltage volt volts", "A": "current currents cur iq amp amps i", "1": "pwm duty"}
-IN_SI = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/", "trajectory_msgs/", "control_msgs/")
+IN_SI = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/", "tf2_msgs/", "trajectory_msgs/", "control_msgs/")
+# what a computer counts or sets, which neither drives nor is followed
+COUNTED = frozenset(
+    "counter counters count counts id ids flag flags active enable enabled bit bits index idx seq sequence mask crc".split()
+)
+NO_EFFORT = COUNTED | frozenset("state states tcp tool flange pose".split())  # the place of a tool, too
+WITH_MEANING = frozenset().union(
+    COMMANDED, COMMANDED_COLUMNS, CONTROLLED, MEASURED, GENERIC, FORCING, BASE, SHAKEN, DRIVING, DEVICES, *WORDS.values()
+)  # fmt: skip
 IGNORED = frozenset("temp temperature battery power error err status mode".split())
 
 
@@ -104,6 +112,11 @@ def words_of(text: str) -> list[str]:
     return re.findall(r"[a-z]+|\d+", apart.lower())
 
 
+def is_word(word: str) -> bool:
+    """Whether something is known of a word, so that it is no name."""
+    return word in WITH_MEANING
+
+
 def meaning_of(one: Recorded) -> Meaning:
     """What a recorded number means by what names it."""
     near, far = words_of(one.said), words_of(one.topic)
@@ -120,6 +133,7 @@ def meaning_of(one: Recorded) -> Meaning:
         "sensor_msgs/msg/JointState",
         "sensor_msgs/msg/Imu",
         "nav_msgs/msg/Odometry",
+        "tf2_msgs/msg/TFMessage",
     ):
         commanded = False
     forcing = bool(every & FORCING)
@@ -137,6 +151,16 @@ def meaning_of(one: Recorded) -> Meaning:
 def is_ignored(one: Recorded) -> bool:
     """Whether its name says that it is neither a motion nor what drives one."""
     return bool({*words_of(one.said), *words_of(one.topic)} & IGNORED)
+
+
+def is_counted(one: Recorded) -> bool:
+    """Whether its name says that it is a number that a computer counts or sets."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & COUNTED)
+
+
+def is_no_effort(one: Recorded) -> bool:
+    """Whether its name says that it is something else than what drives a machine."""
+    return bool({*words_of(one.said), *words_of(one.topic)} & NO_EFFORT)
 
 
 def rotary_of(one: Recorded) -> tuple[bool | None, str]:
@@ -291,18 +315,7 @@ def _one(words: list[str], known: Collection[str]) -> str:
 
 def joint_of_column(said: str, side: str = "", names: Collection[str] = ()) -> str:
     """What tells a column from others of the same quantity: `3` of dof_pos[3], `knee` of knee_pos; `names` are words that are names here."""
-    known = (
-        COMMANDED
-        | COMMANDED_COLUMNS
-        | CONTROLLED
-        | MEASURED
-        | GENERIC
-        | FORCING
-        | BASE
-        | SHAKEN
-        | DRIVING
-        | frozenset().union(*WORDS.values(), DEVICES, LETTERS)
-    )
+    known = WITH_MEANING | set(LETTERS)
     words = words_of(said)
     if set(words) & (WORDS["effort"] - FORCES):
         known |= CONTROLLED_SHORT

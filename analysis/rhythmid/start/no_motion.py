@@ -16,10 +16,15 @@ def no_motion(known: Sequence[Known]) -> str:
     """The complaint, in one line."""
     listed = "; ".join(f"{one.one} ({_taken_for(one)})" for one in known[:LISTED])
     more = f" and {len(known) - LISTED} more" if len(known) > LISTED else ""
-    first = known[0].one
+    measured = [one.one for one in known if one.meaning.commanded is not True]
+    if not measured:
+        return (
+            f"no position, velocity or acceleration is measured; as far as names say, all of it was asked for: {listed}{more}. Record the "
+            "motion, too, such as joint states, odometry or an IMU, or rename what was measured"
+        )
     able = [one.one for one in known if AMBIGUOUS & set(words_of(one.one.said)) and not one.one.unit]
     present = "; 'current' may mean amperes, or what is measured at present" if able else ""
-    one = able[0] if able else first
+    one = able[0] if able else measured[0]
     where = (
         f"topic: {one.topic}, field: {json.dumps(one.field)}"
         if one.topic

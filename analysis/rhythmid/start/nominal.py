@@ -70,7 +70,7 @@ def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Ca
     """Force and motion were recorded: all by the balance of forces."""
     try:
         rows = Rows.of(records, _bare(units))
-        law, kind = _restoring(rows, roles.rotary, inertial=True)
+        law, kind = _restoring(records, rows, roles.rotary, inertial=True)
     except InputError as error:
         return _by_size(records, units, catalogue, str(error))
     inertia, doubts = _shown(law, rows)
@@ -97,25 +97,29 @@ def _shown(law: Law, rows: Rows) -> tuple[float, dict[str, str]]:
     """The inertia of a balance, and what is doubtful about it: none is seen that follows damper and spring within an
     interval of the filtered motion, a sample or a tenth of the shortest period that stands out of the noise."""
     found, period = law.coefficients, max(rows.period)
-    if rows.steady and found["acceleration"] > 0.0:
-        doubt = (
+    doubts: list[str] = []
+    if rows.steady:
+        doubts.append(
             "what drives never changes: all values are by how far from its zero it holds the machine, so that this has to be the place where "
             "nothing drives it"
         )
-        return found["acceleration"], {INERTIA: doubt}
     least = max(found["velocity"] * period, found.get("position", 0.0) * period**2)
-    if found["acceleration"] >= least:
-        return found["acceleration"], {}
-    doubt = (
-        f"the records do not tell the inertia, which the balance puts at {found['acceleration']:.1g}: this is the largest that "
-        f"follows the other forces within {1e3 * period:.3g} ms, the interval at which the motion is known once noise is filtered "
-        "out; put in what is known, and fix it"
-    )
-    return least, {INERTIA: doubt}
+    if found["acceleration"] < least:
+        doubts.append(
+            f"the records do not tell the inertia, which the balance puts at {found['acceleration']:.1g}: this is the largest that "
+            f"follows the other forces within {1e3 * period:.3g} ms, the interval at which the motion is known once noise is filtered "
+            "out; put in what is known, and fix it"
+        )
+    inertia = max(found["acceleration"], least)
+    return inertia, {INERTIA: "; ".join(doubts)} if doubts else {}
 
 
-def _restoring(rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:
-    """The balance with what brings the machine back, if anything does: a spring, gravity of a pendulum, or neither."""
+def _restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:
+    """The balance with what brings the machine back, if anything does: a spring, gravity of a pendulum, or neither.
+
+    The integral of a speed drifts. Gravity goes with the angle itself, which it does not tell; a spring shows in it only where it comes back.
+    """
+    measured = all(record.output_kind == "position" for record in records)
     moving = ["acceleration", "velocity"] if inertial else ["velocity"]
     level = [] if rows.steady else ["constant"]  # a constant would balance what never changes
     full = [*moving, "position", *level]
@@ -125,9 +129,9 @@ def _restoring(rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:
         "constant": rows.fit([*moving, *level], delay),
         "spring": rows.fit(full, delay),
     }
-    if rotary and rows.span >= 2.0 * LEAST_SWING:
+    if rotary and measured and rows.span >= 2.0 * LEAST_SWING:
         options["pendulum"] = rows.fit([*moving, "sine", *(["cosine"] if level else [])], delay)
-    if options["spring"].coefficients["position"] <= 0.0:
+    if options["spring"].coefficients["position"] <= 0.0 or not (measured or rows.comes_back):
         del options["spring"]
     law, kind = plain, "free"
     if options["constant"].earns_place(law):
@@ -289,7 +293,7 @@ def _alone(records: Sequence[Record], units: Units, catalogue: Catalogue, why: s
     reasons = {INERTIA: f"{why}, so all is per unit of inertia"}
     try:
         rows = Rows.of([_as_driven(one) for one in records], model)
-        law, kind = _restoring(rows, units.position == "rad", inertial=False)
+        law, kind = _restoring(records, rows, units.position == "rad", inertial=False)
     except InputError as error:
         return _by_size(records, units, catalogue, str(error), fixed=True)
     model, more = _forces(model, law, kind, rows, catalogue)

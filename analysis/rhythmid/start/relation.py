@@ -50,7 +50,7 @@ class Follows:
     @property
     def is_answer(self) -> bool:
         """Whether the answer may have been made to follow: neither against the command nor before it. One sine goes both ways after another."""
-        return self.later >= NEARLY * abs(self.correlation)
+        return self.later > 0.0 and self.later >= NEARLY * abs(self.correlation)
 
 
 def together(first: Recorded, second: Recorded) -> tuple[float, Array, Array]:
@@ -142,7 +142,8 @@ def coherent(first: Recorded, second: Recorded) -> float:
         return 0.0
     length = max(2 * LAGS, len(u) // SEGMENTS)
     u, y = np.diff(u), np.diff(y)  # slow drifts go together by chance
-    _, share = coherence(u, y, 1.0 / period, nperseg=length)
+    with np.errstate(divide="ignore", invalid="ignore"):  # at frequencies without any power
+        _, share = coherence(u, y, 1.0 / period, nperseg=length)
     _, power = welch(y, 1.0 / period, nperseg=length)
     told = np.isfinite(share)
     return float(np.sum(share[told] * power[told]) / np.sum(power))

@@ -21,7 +21,7 @@ from rhythmid.record.joint_record import JointSignals, load_joint_records
 from rhythmid.start.drivers import not_read
 from rhythmid.start.families import Family, families_of, joints_of
 from rhythmid.start.meaning import Quantity, meaning_of, says_it_was_read
-from rhythmid.start.written import GUESSED, comment, time_of
+from rhythmid.start.written import GUESSED, as_guessed, comment, time_of
 
 LITTLE = 0.02  # share of the effort that a first guess of the viscous damping takes
 # first guess of a controller whose gains nobody tells: this frequency [Hz] and damping ratio with the inertia of the joint
@@ -84,7 +84,8 @@ def start_robot(
     ]
     of_effort = _doubts_of_effort(effort, others, command)
     signals, doubts = _signals(found, joints, output, effort, reference, forward, of_effort)
-    records = load_joint_records(sources, JointSignals.from_text(signals, GUESSED))
+    with as_guessed():
+        records = load_joint_records(sources, JointSignals.from_text(signals, GUESSED))
     speeds = {
         name: float(np.std(np.gradient(one.output.value, one.output.time)))
         for name, one in records[0].joints.items()

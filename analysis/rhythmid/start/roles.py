@@ -27,7 +27,8 @@ from rhythmid.start.meaning import (
     says_who_asks,
 )
 from rhythmid.start.relation import RATIO, coherent, derivative, goes_along
-from rhythmid.start.step_before import BEFORE, set_point_before, step_before
+from rhythmid.start.step_before import BEFORE, duty_before, set_point_before, step_before
+from rhythmid.start.targets import with_targets
 from rhythmid.start.unnamed_joints import column_groups
 from rhythmid.start.unnamed_reference import with_reference
 from rhythmid.start.unsigned_effort import without_unsigned
@@ -59,9 +60,10 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     """Roles of what is in a source. Raises InputError where nothing can be the output, or no joint is called `joint`."""
     known = [Known(one, meaning_of(one)) for one in found.recorded if not is_ignored(one)]
     known = _without_empty_letters(known)
+    everything = [*known, *(Known(one, meaning_of(one)) for one in found.constant)]
+    known, resting = (with_targets(part, everything) for part in (known, everything[len(known) :]))
     if not known:
         raise InputError(f"{found.path}: holds nothing that could be a motion")
-    resting = [Known(one, meaning_of(one)) for one in found.constant]
     if (groups := column_groups(found)) is not None:
         known, resting = ([groups.told(one) for one in part] for part in (known, resting))
     said = [(one.one, one.meaning) for one in known]
@@ -106,6 +108,15 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     step = None if more else step_before(found.constant, chosen)
     if step is not None:
         more = {"input": Choice(step, "the only effort, and nothing else drives", doubts=(BEFORE,))}
+    only = more.get("input") if len(more) == 1 and kind == "force" else None
+    duty = duty_before(found.constant, chosen, output.recorded, measured) if only is not None else None
+    if (
+        only is not None
+        and duty not in (None, only.recorded)
+        and meaning_of(only.recorded).commanded is not True
+    ):
+        reason = f"it feeds a motor from the first sample on, and the machine starts from rest; {only.recorded} was measured"
+        more = {"input": Choice(duty, reason, (only.recorded, *only.others), (BEFORE,))}
     if not more and (step := set_point_before(found.constant, chosen, output.recorded, measured)) is not None:
         reason = f"a {measured} that was asked for, to which the output goes, and nothing else drives"
         more = {"input": Choice(step, reason, doubts=(BEFORE,))}

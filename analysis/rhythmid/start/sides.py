@@ -1,36 +1,58 @@
-"""Columns of a left and a right one: `w_l` and `w_r`, `pwml` and `pwmr`, `left_speed` and `right_speed`. There an `r` is a side, and no
-reference."""
+"""Columns of a left and a right one: `w_l` and `w_r`, `pwml` and `pwmr`, `left_speed` and `right_speed`, `Lspeed` and `RSpeed`, and of the
+corners of a vehicle. There an `r` is a side, and no reference."""
 
 import re
 from collections.abc import Iterator
 from dataclasses import replace
 
 from rhythmid.record.inventory import Inventory, Recorded
+from rhythmid.start.meaning import is_word, words_of
 
 OTHER = {"l": "r", "r": "l", "left": "right", "right": "left"}
-SIDES = {"l": "left", "r": "right", "left": "left", "right": "right"}
+SIDES = {
+    "l": "left",
+    "r": "right",
+    "left": "left",
+    "right": "right",
+    "fl": "front_left",
+    "fr": "front_right",
+    "rl": "rear_left",
+    "rr": "rear_right",
+    "bl": "back_left",
+    "br": "back_right",
+}
 # a word of its own, the last word of a name such as kneeLeft, the last letter of a name that is one word
 WRITTEN = (
     re.compile(r"(?<![A-Za-z])(left|right|l|r)(?![A-Za-z])", re.IGNORECASE),
     re.compile(r"(?<=[a-z0-9])(Left|Right|L|R)(?![a-z])"),
     re.compile(r"^[a-z]{1,4}(l|r)$"),
 )
+# before a name that has a word whose meaning is known; the longer ones first
+BEFORE_NAME = re.compile(r"^(left|right|fl|fr|rl|rr|bl|br|l|r)([ _.-]*)(?=[a-z]{2})", re.IGNORECASE)
 
 
 def with_sides(found: Inventory) -> Inventory:
-    """The inventory with the side of every column whose name is another one's but for it."""
-    names = {one.said.lower() for one in found.recorded if one.column}
-    sided = tuple(_with_side(one, names) if one.column else one for one in found.recorded)
-    return replace(found, recorded=sided)
+    """The inventory with the side of every column whose name is another one's but for it, or that has a side before a known word where
+    another column has another one."""
+    every = [one for one in (*found.recorded, *found.constant) if one.column]
+    names = {one.said.lower() for one in every}
+    begun = len({side for one in every for side, _ in _before_name(one.said)}) > 1
+    recorded, constant = (
+        tuple(_with_side(one, names, begun) if one.column else one for one in part)
+        for part in (found.recorded, found.constant)
+    )
+    return replace(found, recorded=recorded, constant=constant)
 
 
-def _with_side(one: Recorded, names: set[str]) -> Recorded:
-    """The column with its side, and without it in its name, where the other side's is there, too."""
+def _with_side(one: Recorded, names: set[str], begun: bool) -> Recorded:
+    """The column with its side, and without it in its name."""
     for begin, end in _places(one.said):
         side = one.said[begin:end].lower()
         before, after = one.said[:begin], one.said[end:]
         if f"{before}{OTHER[side]}{after}".lower() in names and (before + after).strip("_. "):
             return replace(one, said=f"{before} {after}".strip(), side=SIDES[side])
+    for side, rest in _before_name(one.said) if begun else ():
+        return replace(one, said=rest, side=side)
     return one
 
 
@@ -38,3 +60,13 @@ def _places(name: str) -> Iterator[tuple[int, int]]:
     """Where a side may stand in a name."""
     for written in WRITTEN:
         yield from (match.span(1) for match in written.finditer(name))
+
+
+def _before_name(name: str) -> Iterator[tuple[str, str]]:
+    """The side before a name that holds a known word, and that name. A glued one stands before a capital or right before that word."""
+    match = BEFORE_NAME.match(name)
+    if match is None or is_word(words_of(name)[0]):
+        return
+    rest, words = name[match.end() :], words_of(name[match.end() :])
+    if (match[2] or rest[0].isupper() or is_word(words[0])) and any(map(is_word, words)):
+        yield SIDES[match[1].lower()], rest

@@ -13,16 +13,17 @@ from rhythmid.record.angle_wrap import wraps_of
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.inventory import Inventory, inventory
 from rhythmid.record.read import load_records, read_record
+from rhythmid.record.rest_at_ends import rests_of, use_line
 from rhythmid.record.signals import Clock, Signals
 from rhythmid.record.standstill import standstill
 from rhythmid.start.force_unit import MODELLED
 from rhythmid.start.known import Ask
-from rhythmid.start.meaning import driving_unit_of
+from rhythmid.start.meaning import driving_unit_of, meaning_of
 from rhythmid.start.named_joints import with_joints
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
 from rhythmid.start.roles import Roles, first_answer, guess_roles
 from rhythmid.start.sides import with_sides
-from rhythmid.start.written import GUESSED, clock_of, model_yaml, signals_yaml
+from rhythmid.start.written import GUESSED, as_guessed, clock_of, model_yaml, signals_yaml
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
 
@@ -66,11 +67,12 @@ class Start:
 
 
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
+@as_guessed()
 def guess(
     source: str | Path, joint: str | None = None, rate: float | None = None, ask: Ask = first_answer
 ) -> Guess:
     """Look at one recording and guess which channel is what; parameters and errors as of `start`."""
-    found = with_joints(with_sides(inventory(source, rate)))
+    found = with_joints(with_sides(_inventory(source, rate)))
     roles = guess_roles(found, joint, ask)
     units = _units(roles)
     clock, reason = clock_of(found, roles)
@@ -83,16 +85,27 @@ def guess(
         clock, reason = Clock("receive"), f"the stamps do not serve: {error}"
         text = signals_yaml(found, roles, units, clock, reason)
         record = read_record(source, Signals.from_text(text, GUESSED))
-    doubts = [one for one in (standstill(cleaned(record).record), wraps_of(record)) if one is not None]
+    clean = cleaned(record).record
+    doubts = [one for one in (standstill(clean), wraps_of(record), *rests_of(clean)) if one is not None]
     if doubts:
         output = roles.choices["output"]
         output = replace(output, doubts=(*output.doubts, *doubts))
         roles = replace(roles, choices={**roles.choices, "output": output})
-        text = signals_yaml(found, roles, units, clock, reason)
+        text = signals_yaml(found, roles, units, clock, reason, use_line(clean))
     return Guess(found, roles, text)
 
 
+def _inventory(source: str | Path, rate: float | None) -> Inventory:
+    """What is in a source; of a bag in which nothing was measured, where the vehicle is, too."""
+    found = inventory(source, rate)
+    may_be_motion = (meaning for meaning in map(meaning_of, found.recorded) if meaning.quantity != "effort")
+    if not found.is_bag or any(meaning.commanded is not True for meaning in may_be_motion):
+        return found
+    return inventory(source, rate, vehicle=True)
+
+
 @threadpool_limits.wrap(limits=1)
+@as_guessed()
 def start(
     sources: Sequence[str | Path],
     joint: str | None = None,

@@ -1,12 +1,15 @@
 """signals.yaml and model.yaml as text, every guess with its reason and its alternatives in comments."""
 
 import json
+import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 
 from rhythmid.elements.element import SLOTS
+from rhythmid.errors import InputError
 from rhythmid.model import INERTIA, Term
 from rhythmid.record.heading import heading_of
 from rhythmid.record.held_command import held_note
@@ -30,8 +33,20 @@ MEANS = {
 }  # fmt: skip
 
 
-def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clock_reason: str) -> str:
-    """The text of signals.yaml."""
+@contextmanager
+def as_guessed() -> Iterator[None]:
+    """Errors in what was guessed say so, and name no line of a file that is not there."""
+    try:
+        yield
+    except InputError as error:
+        said = re.sub(rf"^{re.escape(GUESSED)}(?::\d+)?: ", "guessed ", str(error))
+        raise InputError(said) from error
+
+
+def signals_yaml(
+    found: Inventory, roles: Roles, units: Units, clock: Clock, clock_reason: str, use: str | None = None
+) -> str:
+    """The text of signals.yaml; `use` is its line for the part of the record that is worth using, where that is known."""
     lines = [
         *comment(f"Which channel of {found.path.name} is what. Guessed by `rhythmid init`: look through it and correct what is wrong."),
         "",
@@ -78,7 +93,7 @@ def signals_yaml(found: Inventory, roles: Roles, units: Units, clock: Clock, clo
     left = [why for why in found.left_out if not any(why.startswith(f"{one}: ") for one in taken)]
     if left:
         lines += ["", *comment(f"Left out: {_listed(left, LISTED)}.")]
-    lines += ["", *comment("Only a part of the record:"), "# use: [0, 60]                            # s"]
+    lines += ["", *comment("Only a part of the record:"), f"# {use or 'use: [0, 60]':<40}# s"]
     return "\n".join(lines) + "\n"
 
 

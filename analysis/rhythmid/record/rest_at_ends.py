@@ -1,0 +1,106 @@
+"""Rests at the ends of a record that a model of the machine cannot make: an output that stops although the drive goes on as before,
+and one that is held, or not yet pushed, at the beginning of a free motion."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.record.record import Record
+
+Array = NDArray[np.float64]
+LEAST_SHARE = (
+    0.05  # of a record that a rest at its end has to last: a shorter one hardly changes what is fitted
+)
+WINDOWS = 3  # stretches before a rest in all of which a machine has to move, for that to be its custom
+AS_MUCH = 0.9  # of the usual travel of a drive, from which that goes on as before: steps of equal size have 1
+AT_REST = 0.02  # of the way that a motion leads away from its beginning, up to which it has not begun
+HALFWAY = 0.5  # of that way
+# times the time from the begin of a motion to half of its way that a rest before lasts at least. A machine that is let go at the first sample
+# stays within a fiftieth for a quarter of that time at most: that is the parabola of a constant force
+LONG = 1.0
+
+
+def rest_notes(record: Record) -> tuple[str, ...]:
+    """A line on each rest at the beginning or the end of an output that the machine itself does not make."""
+    return tuple(f"output: {said}" for said in rests_of(record))
+
+
+def rests_of(record: Record) -> tuple[str, ...]:
+    """What to tell of such rests, a sentence each."""
+    time, begin, end = record.output.time, release(record), stop(record)
+    found: list[str] = []
+    if begin is not None:
+        found.append(
+            f"it rests for the first {begin - time[0]:.3g} s and then moves, though nothing that drives it was recorded: it was held or "
+            f"pushed, which no model of the machine does; begin where it moves freely:  {use_line(record)}"
+        )
+    if end is not None:
+        found.append(
+            f"it stands still from t = {_written(end)} s to the end ({time[-1] - end:.3g} s), although what drives it changes as much as where it "
+            "moved before: its sensor or its drive failed, or it sticks, which is physics and is kept; where something failed, say  "
+            f"{use_line(record)}"
+        )
+    return tuple(found)
+
+
+def use_line(record: Record) -> str | None:
+    """The line of signals.yaml that leaves such rests out; None where there are none."""
+    time, begin, end = record.output.time, release(record), stop(record)
+    if begin is None and end is None:
+        return None
+    first = math.floor(time[0]) if begin is None else begin
+    last = math.ceil(time[-1]) if end is None else end
+    return f"use: [{_written(first)}, {_written(last)}]"
+
+
+def stop(record: Record) -> float | None:
+    """When [s] an output stopped that stands still to the end while what drives goes on as where the output moved; None where none did."""
+    drive = record.input or record.effort or record.reference
+    value, time = record.output.value, record.output.time
+    moves = np.flatnonzero(np.diff(value))
+    if drive is None or not len(moves):
+        return None
+    last = int(moves[-1]) + 1
+    length = min(len(value) - last, last // WINDOWS)
+    if length < LEAST_SHARE * len(value):
+        return None
+    before = [(begin, begin + length) for begin in range(last - length, -1, -length)]
+    after = [(begin, begin + length) for begin in range(last, len(value) - length + 1, length)]
+    if any(np.ptp(value[begin:end]) == 0.0 for begin, end in before):
+        return None
+    given = np.interp(time, drive.time, drive.value)
+    # the integral, too: a fast drive moves a machine less than a slow one of its size
+    for travel in (lambda part: float(np.ptp(given[part])), lambda part: _integral(time[part], given[part])):
+        usual, now = (float(np.median([travel(slice(*one)) for one in part])) for part in (before, after))
+        if now == 0.0 or now < AS_MUCH * usual:
+            return None
+    return float(time[last])
+
+
+def release(record: Record) -> float | None:
+    """When [s] an output that nothing drives has rested at last, where it rests first; None where it is free from its first sample on."""
+    if any(one is not None for one in (record.input, record.effort, record.reference, record.forcing)):
+        return None
+    value, time = record.output.value, record.output.time
+    away = np.abs(value - np.median(value[:WINDOWS]))
+    way = float(away.max())
+    if way == 0.0:
+        return None
+    moving = int(np.argmax(away > AT_REST * way))
+    if moving == 0:
+        return None
+    half = float(time[np.argmax(away > HALFWAY * way)])
+    rested = float(time[moving - 1])
+    return rested if rested - time[0] >= LONG * (half - rested) else None
+
+
+def _integral(time: Array, given: Array) -> float:
+    """Travel of the integral of what a drive (n,) is beside its mean."""
+    beside = given - given.mean()
+    return float(np.ptp(np.cumsum(0.5 * (beside[1:] + beside[:-1]) * np.diff(time))))
+
+
+def _written(time: float) -> str:
+    """A time [s] to the millisecond, however late it is."""
+    return f"{round(time, 3):.12g}"
