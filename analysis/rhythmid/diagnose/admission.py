@@ -80,7 +80,8 @@ def check_driven(records: Sequence[Record], model: Model) -> str | None:
     if model.term("periodic_forcing") is not None:
         return None
     for record in records:
-        if record.input is not None or record.forcing is not None or record.reference is not None:
+        drives = (record.input, record.forcing, record.reference, record.effort)
+        if any(one is not None for one in drives):
             continue
         sizes = [float(np.std(quarter)) for quarter in np.array_split(record.output.value, 4)]
         if sizes[-1] > DECAYS * sizes[0] and not np.all(np.diff(sizes) < 0.0):
@@ -89,6 +90,6 @@ def check_driven(records: Sequence[Record], model: Model) -> str | None:
                 "name its channel under 'input:' (or 'forcing:') in signals.yaml"
             )
     forced = [record for record in records if record.forcing is not None]
-    if forced and all(record.input is None for record in records):
+    if forced and all(record.input is None and record.effort is None for record in records):
         return "no record has an input channel: if anything but the forcing drove the machine, it counts as missing physics here"
     return None
