@@ -62,3 +62,30 @@ def test_a_controller_is_driven_by_the_reference_and_not_by_the_effort_it_makes(
     found = identify(led, slide(2.0, CONTROLLER))
     assert any("closed loop from the recorded reference" in note for note in found.notes)
     assert "no recorded input changes" not in found.delays.assumption
+
+
+AXIS = "inertia: {{mass: {{value: {mass}, unit: kg}}}}\nforce: [viscous_damper: {{damping: {{value: {damping}, unit: N*s/m}}}}]"
+
+
+def pushed(seed: int = 4) -> Record:
+    """60 s of an axis of 2 kg that nothing holds, which small pushes that were not recorded carry far from where its effort would."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 60.0, 0.01)
+    lines = np.linspace(0.3, 2.0, 8)
+    effort = np.sin(2.0 * np.pi * lines[:, None] * time + rng.uniform(0.0, 6.0, 8)[:, None]).sum(axis=0)
+    pushes = 0.2 * np.repeat(rng.standard_normal(30), 200)
+    truth = Model.from_text(AXIS.format(mass=2.0, damping=0.1))
+    moved = simulate(truth, time, zero_order_hold(time, effort + pushes), None, (0.0, 0.0)).output
+    return Record("axis", Channel(time, moved, "m"), effort=Channel(time, effort, "N"), hold="zero")
+
+
+def test_where_a_free_run_does_not_follow_the_values_by_the_balance_of_the_effort_are_told():
+    found = identify(pushed(), Model.from_text(AXIS.format(mass=1.5, damping=0.1)))
+    assert not found.usable
+    (said,) = [note for note in found.notes if "the balance of the recorded effort" in note]
+    told = float(said.partition("inertia.mass ")[2].partition(" ")[0])
+    assert told == pytest.approx(2.0, rel=0.02) and "`rhythmid diagnose`" in said
+
+
+def test_of_a_free_run_that_follows_nothing_is_said_of_the_balance():
+    assert not any("balance" in note for note in identify(measured(2), slide(1.0)).notes)

@@ -16,6 +16,7 @@ from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.discretisation import with_discretisation_error
 from rhythmid.identify.drive import drive_of, driven
+from rhythmid.identify.effort_note import effort_note
 from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.held_out import admitted_unseen, held_out_runs
 from rhythmid.identify.identifiability import Forcing, Offset, delays_of
@@ -188,6 +189,8 @@ def identify(
     unseen, said = admitted_unseen(cast(tuple[Record, ...], judged), fitted, machine)
     with told_of_wraps(fitted):
         found = _identified(fitted, model, harmonics, method, forcing, offset, htf, tell)
+    balanced = None if found.usable else effort_note(fitted, machine, found.quality["nrmse"])
+    said = (*said, *(() if balanced is None else (balanced,)))
     notes = (*still, *(note for one in clean for note in one.notes), *drives, *cut, *said, *found.notes)
     if not unseen:
         return replace(found, notes=notes)
