@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rhythmid.identify.comparable import check_comparable
 from rhythmid.identify.drive import drive_of, driven
+from rhythmid.identify.early_output import early_outputs
 from rhythmid.identify.moving import moving
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
@@ -59,6 +60,7 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
         *(f"{one.name}: {note}" for one in whole for note in (*punctuality_notes(one.run), *copy_notes(one))),
         *(note for one in clean for note in one.notes),
         *(drive_of(one.record, b) for one, b in zip(clean, given)),
+        *early_outputs(given),
     )
     notes, whole_notes = (
         tuple(dict.fromkeys(note for note in (*said, *more) if note is not None))

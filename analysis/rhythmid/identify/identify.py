@@ -16,6 +16,7 @@ from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.discretisation import with_discretisation_error
 from rhythmid.identify.drive import drive_of, driven
+from rhythmid.identify.early_output import early_outputs
 from rhythmid.identify.effort_note import effort_note
 from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.held_out import admitted_unseen, held_out_runs
@@ -185,6 +186,7 @@ def identify(
     clean, still = moving([cleaned(one) for one in cast(tuple[Record, ...], given)])
     fitted = tuple(driven(one.record, machine) for one in clean)
     drives = [note for one, b in zip(clean, fitted) if (note := drive_of(one.record, b)) is not None]
+    drives += early_outputs(fitted)
     cut = [note for one in fitted for note in cut_at_gaps(one).notes]
     unseen, said = admitted_unseen(cast(tuple[Record, ...], judged), fitted, machine)
     with told_of_wraps(fitted):
