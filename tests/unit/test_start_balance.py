@@ -63,3 +63,12 @@ def test_a_force_that_explains_nothing_of_the_motion_is_doubted(tmp_path):
     found = begun(tmp_path, FORCE, moved(tones(2, TIME), 0.05, 0.5, 6.0)[0])
     (line,) = (one for one in found.lines() if one.startswith("CHECK inertia"))
     assert "the balance of forces" in line and "put in what is known" in line
+
+
+def test_where_the_balance_would_have_a_negative_damping_a_small_one_is_guessed_and_no_rounding(tmp_path):
+    position = moved(FORCE, 0.05, 0.5, 6.0)[0]
+    speed = np.gradient(position, foreign.STEP)
+    force = 0.05 * np.gradient(speed, foreign.STEP) - 0.1 * speed + 6.0 * position
+    found = begun(tmp_path, force, position)
+    assert found.nominal.model.value("viscous_damper.damping") > 1e-4
+    assert "the balance shows no damping" in found.nominal.reasons["viscous_damper"]
