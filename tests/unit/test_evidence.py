@@ -176,16 +176,22 @@ def test_where_rounded_samples_rest_a_model_that_is_right_to_the_last_digit_is_n
 def test_what_a_linear_model_predicts_is_what_refits_without_each_block_predict(seed, columns):
     measured, design = line(240, columns, seed)
     blocks = Blocks.of(rows_of([120, 120]), 1)
-    found = cross_validate(least_squares(measured, design), blocks)
+    whole = least_squares(measured, design)
+    found = cross_validate(whole, blocks)
+    fitted = np.linalg.lstsq(design, measured, rcond=None)[0]
+    spread = scale_of(whole.residual)
+    root = np.sqrt(weights_of(whole.residual, spread) / len(measured)) / spread
+    one_row = np.linalg.qr(
+        design * root[:, None], mode="r"
+    )  # what one row says of the parameters, on average
     for fold in np.unique(blocks.fold):
         out, seen = blocks.left_out(int(fold))
-        values, scale = (
-            np.linalg.lstsq(design, measured, rcond=None)[0],
-            scale_of(least_squares(measured, design).residual[seen]),
-        )
+        values, scale = fitted, scale_of(whole.residual[seen])
         for _ in range(evidence.REWEIGHTED):
-            root = np.sqrt(weights_of(design[seen] @ values - measured[seen], scale))
-            values = np.linalg.lstsq(design[seen] * root[:, None], measured[seen] * root, rcond=None)[0]
+            root = np.sqrt(weights_of(design[seen] @ values - measured[seen], scale)) / scale
+            rows, right = design[seen] * root[:, None], measured[seen] * root
+            rows, right = np.vstack([rows, one_row]), np.concatenate([right, one_row @ fitted])
+            values = np.linalg.lstsq(rows, right, rcond=None)[0]
             scale = scale_of(design[seen] @ values - measured[seen])
         np.testing.assert_allclose(found.error[out], design[out] @ values - measured[out], atol=1e-8)
         np.testing.assert_allclose(found.scale[blocks.block][out], scale, rtol=1e-8)

@@ -8,6 +8,7 @@ from rhythmid.identify.identify import paper_hopper
 from rhythmid.identify.large_shifts import large_shifts
 from rhythmid.record.record import Channel, Record
 
+STIFFNESS = "linear_spring.stiffness"
 TIME = np.arange(0.0, 7.0, 0.01)
 RECORD = Record("run", Channel(TIME, np.sin(TIME), "m"))
 NONE = Estimate(None, None, "s")
@@ -45,3 +46,20 @@ def test_a_delay_longer_than_the_record_is_told_even_where_cycle_and_response_ag
     delays = Delays(*both, Estimate(9.05, 0.001, "s"), True, "the forcing is known", closure=0.3)
     (one,) = large_shifts(paper_hopper(), {}, delays, [RECORD])
     assert one.name == "long_delay" and one.parameter == "delay: input"
+
+
+@pytest.mark.parametrize(
+    ("ratio", "told"),
+    [
+        (1e9, "more than a million times"),
+        (1e-12, "less than a millionth of"),
+        (20.0, "20 times"),
+        (0.1, "a 10th of"),
+    ],
+)
+def test_how_far_a_value_is_from_the_nominal_one_is_told_up_to_a_million(ratio, told):
+    model = paper_hopper()
+    value = ratio * model.value(STIFFNESS)
+    delays = Delays(NONE, NONE, NONE, False, "only the sum is identifiable")
+    (one,) = large_shifts(model, {STIFFNESS: Estimate(value, 1e-3 * value, "N/m")}, delays, [RECORD])
+    assert f"{told} the nominal" in one.text

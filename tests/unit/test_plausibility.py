@@ -222,3 +222,17 @@ def test_a_friction_that_is_missing_too_does_not_hide_the_unit():
     )
     told = likely_mend(slide(False), [spoilt(driven(rubbing, "m", 0.5), Change("input", 12.0))])
     assert told is not None and told.change.factor == pytest.approx(1.0 / 12.0, rel=0.3)
+
+
+def test_a_constant_input_is_not_taken_for_a_motion_that_was_exchanged_with_it():
+    time = np.arange(0.0, 6.0, 0.005)
+    speed = 5.0 * (1.0 - np.exp(-np.maximum(time - 0.05, 0.0) / 0.1))
+    speed *= 1.0 + 0.2 * np.sin(9.0 * time)  # more than a fifth of the motion is nothing that the model does
+    record = Record(
+        "step", Channel(time, speed, "rad/s"), Channel(time, np.full(len(time), 0.3), "N*m"), output_kind="velocity"
+    )  # fmt: skip
+    assert Change("exchange").applied(record) is None
+    model = Model.from_text(
+        "inertia: {mass: {value: 0.005, unit: kg*m^2}}\nforce: [viscous_damper: {damping: {value: 0.06, unit: N*m*s/rad}}]"
+    )
+    assert check_plausible(model, [record]) is None

@@ -75,3 +75,12 @@ def test_of_a_speed_that_never_turns_back_neither_gravity_nor_a_spring_is_guesse
 def test_of_a_speed_that_turns_back_a_spring_is_guessed_and_no_gravity(tmp_path):
     np.savez(tmp_path / "run.npz", t=TIME, motor_speed=moved(FORCE, 0.05, 0.3, 6.0)[1], motor_torque=FORCE)
     assert "linear_spring" in labels(start([tmp_path / "run.npz"]))
+
+
+def test_where_the_balance_would_have_a_negative_damping_a_small_one_is_guessed_and_no_rounding(tmp_path):
+    position = moved(FORCE, 0.05, 0.5, 6.0)[0]
+    speed = np.gradient(position, foreign.STEP)
+    force = 0.05 * np.gradient(speed, foreign.STEP) - 0.1 * speed + 6.0 * position
+    found = begun(tmp_path, force, position)
+    assert found.nominal.model.value("viscous_damper.damping") > 1e-4
+    assert "the balance shows no damping" in found.nominal.reasons["viscous_damper"]

@@ -10,6 +10,7 @@ from rhythmid.diagnose.answer.wording import freed_value, listed, summary_of
 from rhythmid.diagnose.family import MissingFamily
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.identify import paper_hopper
+from rhythmid.model import Model
 
 
 def named_beside(count: int, groups: tuple[tuple[str, ...], ...] = ()) -> str:
@@ -44,9 +45,9 @@ def test_the_summary_says_why_and_does_not_repeat_the_verdict():
 def test_rivals_for_one_effect_are_told_with_the_effects_that_stand_beside_it():
     pair = [supposed(name, predicted(0.1, 700.0, seed=i)) for i, name in enumerate("ab")]
     decision = replace(decided(contest(NOMINAL, *pair))[1], equivalent=(("a", "b"),))
-    named = [MissingEffect(name, "force", "", 0.5, 0.3, {}) for name in ("a", "flight_damping")]
+    named = [MissingEffect(name, "force", "", 0.5, 0.3, {}) for name in ("a", "asymmetric_damping")]
     said = summary_of(decision, named, FitQuality(0.1, 0.1), FitQuality(0.1, 0.1), "motion")
-    assert said.endswith("They are a or b, each beside flight damping.")
+    assert said.endswith("They are a or b, each beside asymmetric damping.")
 
 
 def test_where_something_else_leaves_it_undecided_rivals_are_told_beside_the_reason():
@@ -78,3 +79,12 @@ def test_a_second_effect_whose_family_alone_is_certain_is_told_beside_the_first(
     named = [MissingEffect("friction", "force", "", 1.0, 1.0, {})]
     said = summary_of(decision, named, FitQuality(0.1, 0.1), FitQuality(0.01, 0.01), "motion")
     assert said.endswith(" The model lacks some form of stiffness (90 %), too; the law is undecided.")
+
+
+@pytest.mark.parametrize(("unit", "told"), [("1", "held at 2 as given"), ("kg", "held at 2 kg as given")])
+def test_a_pure_number_is_told_without_a_unit(unit, told):
+    model = Model.from_text(
+        f"units: {{mass: '{unit}', force: '{unit}*m/s^2'}}\n"
+        f"inertia: {{mass: {{value: 2.0, unit: '{unit}', fixed: true}}}}\nforce: [viscous_damper: {{damping: {{value: 1.0}}}}]"
+    )
+    assert told in freed_value(model, model, ("inertia.mass",))

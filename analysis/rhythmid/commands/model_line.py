@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from rhythmid.errors import InputError
 from rhythmid.model import INERTIA, Model
+from rhythmid.report.quantity import with_written_unit
 
 if TYPE_CHECKING:
     from rhythmid.record.record import Record
@@ -32,7 +33,7 @@ def model_lines(path: Path, records: Sequence["Record"], elements: Sequence[Path
     rests = _rests(admitted(records, [], model).whole_records, model) if records else None
     units = model.units
     mass = model.parameters[INERTIA]
-    told = f"inertia {mass.value:g} {mass.unit}{' (fixed)' if mass.fixed else ''}; {_elements(model)}; {_free(model.free)}"
+    told = f"inertia {with_written_unit(f'{mass.value:g}', mass.unit)}{' (fixed)' if mass.fixed else ''}; {_elements(model)}; {_free(model.free)}"
     return [
         f"{path}: {told}; units {units.force}, {units.position}, {units.mass}",
         *(f"  note: {note}" for one in records for note in _foreign_units(one, model)),

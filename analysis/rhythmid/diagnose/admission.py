@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rhythmid.identify.comparable import check_comparable
 from rhythmid.identify.drive import drive_of, driven
+from rhythmid.identify.early_output import early_outputs
 from rhythmid.identify.moving import moving
 from rhythmid.identify.series import prepare
 from rhythmid.model import Model
@@ -59,6 +60,7 @@ def admitted(records: Sequence[Record], holdout: Sequence[Record], model: Model)
         *(f"{one.name}: {note}" for one in whole for note in (*punctuality_notes(one.run), *copy_notes(one))),
         *(note for one in clean for note in one.notes),
         *(drive_of(one.record, b) for one, b in zip(clean, given)),
+        *early_outputs(given),
     )
     notes, whole_notes = (
         tuple(dict.fromkeys(note for note in (*said, *more) if note is not None))
@@ -80,7 +82,8 @@ def check_driven(records: Sequence[Record], model: Model) -> str | None:
     if model.term("periodic_forcing") is not None:
         return None
     for record in records:
-        if record.input is not None or record.forcing is not None or record.reference is not None:
+        drives = (record.input, record.forcing, record.reference, record.effort)
+        if any(one is not None for one in drives):
             continue
         sizes = [float(np.std(quarter)) for quarter in np.array_split(record.output.value, 4)]
         if sizes[-1] > DECAYS * sizes[0] and not np.all(np.diff(sizes) < 0.0):
@@ -89,6 +92,6 @@ def check_driven(records: Sequence[Record], model: Model) -> str | None:
                 "name its channel under 'input:' (or 'forcing:') in signals.yaml"
             )
     forced = [record for record in records if record.forcing is not None]
-    if forced and all(record.input is None for record in records):
+    if forced and all(record.input is None and record.effort is None for record in records):
         return "no record has an input channel: if anything but the forcing drove the machine, it counts as missing physics here"
     return None

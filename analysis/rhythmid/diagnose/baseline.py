@@ -22,6 +22,7 @@ from rhythmid.identify.series import Series, dominant_frequency
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.timing import nominal_period
+from rhythmid.report.quantity import with_written_unit
 from rhythmid.simulation.signal import OVERSAMPLING, band_limited, first_order_hold, is_held
 from rhythmid.simulation.transport import INPUT_DELAY, MEASUREMENT_DELAY
 from rhythmid.value import Prior
@@ -151,8 +152,8 @@ def _as_given(model: Model, name: str) -> Model:
 def _no_mass(model: Model) -> str:
     mass = model.mass
     return (
-        f"The records do not determine the mass: it is kept at {mass.value:g} {mass.unit} as given, and stiffnesses, dampings and "
-        "forces are in proportion to it."
+        f"The records do not determine the mass: it is kept at {with_written_unit(f'{mass.value:g}', mass.unit)} as given, and stiffnesses, "
+        "dampings and forces are in proportion to it."
     )
 
 

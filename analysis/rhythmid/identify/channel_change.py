@@ -34,8 +34,8 @@ class Change:
     def applied(self, record: Record) -> Record | None:
         """The record so changed; None where it has no such channel."""
         if self.role == "exchange":
-            if record.input is None or record.input_kind != "force":
-                return None
+            if record.input is None or record.input_kind != "force" or np.ptp(record.input.value) == 0.0:
+                return None  # what never changes is no motion
             return replace(record, output=record.input, input=record.output)
         channel: Channel | None = getattr(record, self.role)
         if channel is None or np.ptp(channel.value) == 0.0:

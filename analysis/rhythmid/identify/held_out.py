@@ -11,8 +11,8 @@ from typing import Any
 
 from rhythmid.errors import InputError
 from rhythmid.identify.comparable import check_comparable
-from rhythmid.identify.declared import own_model
 from rhythmid.identify.descent import WHITE
+from rhythmid.identify.drive import driven
 from rhythmid.identify.held_out_zeros import held_out_zero_notes
 from rhythmid.identify.joint import JointFit, begun_series, late_by, step_of, stretches_of
 from rhythmid.identify.moving import moving
@@ -96,9 +96,7 @@ def admitted_unseen(
     if not holdout:
         return (), ()
     clean, still = moving([cleaned(one) for one in holdout])
-    unseen = tuple(one.record for one in clean)
-    for one in unseen:
-        own_model(model, one)
+    unseen = tuple(driven(one.record, model) for one in clean)
     judged = prepare(unseen)
     for seen in prepare(fitted):
         for one in judged:

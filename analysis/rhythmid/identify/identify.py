@@ -15,6 +15,9 @@ from rhythmid.identify.caution import Caution, not_identified, other_unit
 from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.declared import own_model, with_declared
 from rhythmid.identify.discretisation import with_discretisation_error
+from rhythmid.identify.drive import drive_of, driven
+from rhythmid.identify.early_output import early_outputs
+from rhythmid.identify.effort_note import effort_note
 from rhythmid.identify.harmonic_likelihood import DELAYS
 from rhythmid.identify.held_out import admitted_unseen, held_out_runs
 from rhythmid.identify.identifiability import Forcing, Offset, delays_of
@@ -179,13 +182,18 @@ def identify(
             "these records are of several joints: give a model with a body:, as Model.load reads it"
         )
     check_held_out(given, judged)
+    machine = model or paper_hopper()
     clean, still = moving([cleaned(one) for one in cast(tuple[Record, ...], given)])
-    cut = [note for one in clean for note in cut_at_gaps(one.record).notes]
-    fitted = tuple(one.record for one in clean)
-    unseen, said = admitted_unseen(cast(tuple[Record, ...], judged), fitted, model or paper_hopper())
+    fitted = tuple(driven(one.record, machine) for one in clean)
+    drives = [note for one, b in zip(clean, fitted) if (note := drive_of(one.record, b)) is not None]
+    drives += early_outputs(fitted)
+    cut = [note for one in fitted for note in cut_at_gaps(one).notes]
+    unseen, said = admitted_unseen(cast(tuple[Record, ...], judged), fitted, machine)
     with told_of_wraps(fitted):
         found = _identified(fitted, model, harmonics, method, forcing, offset, htf, tell)
-    notes = (*still, *(note for one in clean for note in one.notes), *cut, *said, *found.notes)
+    balanced = None if found.usable else effort_note(fitted, machine, found.quality["nrmse"])
+    said = (*said, *(() if balanced is None else (balanced,)))
+    notes = (*still, *(note for one in clean for note in one.notes), *drives, *cut, *said, *found.notes)
     if not unseen:
         return replace(found, notes=notes)
     tell("running the identified model over the held-out records")

@@ -82,7 +82,8 @@ def prepared_model(model: Model, records: Sequence[Record]) -> tuple[Model, Pump
     """The model with both delays, without a forcing that the records already hold; and the pumping of the first.
 
     Both delays may come out negative by a sample and a half: noise scatters about zero, and an input that is not held
-    but simulated as held acts half a sample early.
+    but simulated as held acts half a sample early. Neither exceeds the longest record: beyond it no command acts, and the
+    response is the same for all delays.
     """
     catalogue = load_catalogue()
     own = [term for term in model.terms if term.element.name == "periodic_forcing"]
@@ -106,11 +107,12 @@ def prepared_model(model: Model, records: Sequence[Record]) -> tuple[Model, Pump
         value = model.parameters[INPUT_DELAY]
         model = model.with_parameters({INPUT_DELAY: replace(value, fixed=True)})
     slack = 1.5 * max(record.output.period for record in records)
+    longest = max(record.duration for record in records)
     bounds = {}
     for name in DELAYS:
         if name in model.free:
             low, high = model.parameters[name].bounds
-            bounds[name] = (-slack if low == 0.0 else low, high)
+            bounds[name] = (-slack if low == 0.0 else low, min(high, max(longest, low)))
     return with_bounds(model, bounds), pumping
 
 
@@ -157,7 +159,7 @@ def explained(fit: Fit, pumping: Pumping | None) -> Search:
         count += float(used.sum())
     explained = max(response - floor, 1e-300)
     motion = fit.nrmse() if all(one.ignored is None for one in fit.run.series) else 0.0
-    least = max(floor, 1e-18 * response)
+    least = max(floor, 1e-18 * response, 1e-300)
     unexplained = float(np.sqrt(left / max(explained, 0.01 * response)))
     if pumping is not None and not any(one.commanded for one in fit.run.series):
         unexplained = 0.0  # there is no response to a command, only the cycle

@@ -10,12 +10,13 @@ from rhythmid.identify.identification import Delays, Estimate
 from rhythmid.identify.plausibility import gains
 from rhythmid.model import Model
 from rhythmid.record.record import Record
-from rhythmid.report.quantity import number, rounded
+from rhythmid.report.quantity import number, rounded, with_written_unit
 
 TIMES = 4.0  # ratio of a value to the nominal one from which the shift is told
 SAMPLES = (
     10.0  # sample periods by which a delay may exceed the nominal one: a longer one is seldom transport alone
 )
+MILLION = 1e6  # ratio from which only that is told: one of the two values is no value of a machine
 PASSED_BY = 2.0  # standard deviations by which a limit has to be passed
 # standard deviations, and a share of a sample, by which a delay has to come out negative to be told: a machine without any delay
 # would be accused once in 40 times at two of them
@@ -48,7 +49,7 @@ def _values(nominal: Model, parameters: Mapping[str, Estimate]) -> Iterator[Caut
         ratio, spread = found.value / given, PASSED_BY * found.std / abs(given)
         low, high = ratio - spread, ratio + spread
         facts = (name, found.value, given, found.unit)
-        told = f"{rounded(found.value, found.std)} {found.unit}"
+        told = with_written_unit(rounded(found.value, found.std), found.unit)
         if low <= 0.0 <= high < 1.0 / TIMES:
             yield Caution(
                 "value_at_zero",
@@ -57,15 +58,21 @@ def _values(nominal: Model, parameters: Mapping[str, Estimate]) -> Iterator[Caut
                 *facts,
             )
         elif low > TIMES or high < 1.0 / TIMES:
-            times = (
-                f"{number(ratio, 2)} times" if not 0.0 < ratio < 1.0 else f"a {number(1.0 / ratio, 2)}th of"
-            )
             yield Caution(
                 "large_shift",
-                f"{name} comes out at {told}, {times} the nominal {given:g}: {ABSORBING}",
+                f"{name} comes out at {told}, {_times(ratio)} the nominal {given:g}: {ABSORBING}",
                 f"Is the nominal {name} measured? Then hold it with 'fixed: true' and run `rhythmid diagnose`.",
                 *facts,
             )
+
+
+def _times(ratio: float) -> str:
+    """How a value is to the nominal one, whose size no figure tells where it is a million times the other or more."""
+    if abs(ratio) >= MILLION:
+        return "more than a million times"
+    if 0.0 < ratio <= 1.0 / MILLION:
+        return "less than a millionth of"
+    return f"{number(ratio, 2)} times" if not 0.0 < ratio < 1.0 else f"a {number(1.0 / ratio, 2)}th of"
 
 
 def _negative_delays(nominal: Model, delays: Delays, period: float) -> Iterator[Caution]:
@@ -89,18 +96,20 @@ def _long_delays(nominal: Model, delays: Delays, period: float, length: float) -
     for side, found, expected in _estimated(nominal, delays):
         if found.value is None:
             continue
-        beyond = found.value > length
+        beyond = found.value >= length
         long = found.value - expected - PASSED_BY * (found.std or 0.0) > SAMPLES * period
         if not beyond and (agree or not long):
             continue
-        than = f"{math.floor((found.value - expected) / period)} samples more than the nominal {1e3 * expected:g} ms"
-        if beyond:
-            than = (
+        if beyond:  # its size says nothing
+            told = (
                 f"longer than the record of {number(length, 3)} s, which holds no answer to any command then"
             )
+        else:
+            samples = math.floor((found.value - expected) / period)
+            told = f"at {_size(found)}, {samples} samples more than the nominal {1e3 * expected:g} ms"
         yield Caution(
             "long_delay",
-            f"{_named(side)} at {_size(found)}, {than}: {ABSORBING}",
+            f"{_named(side)} {told}: {ABSORBING}",
             "Is so long a delay known from the bus, the network or the drive? If not, `rhythmid diagnose` weighs it against lags, "
             "play and friction.",
             f"delay: {side}", found.value, expected, "s",

@@ -65,10 +65,10 @@ def _direction(names: Sequence[str], vector: Array, size: Array, felt: Array) ->
 def sum_of(fit: Fit, *names: str) -> Estimate:
     """Sum of parameters with its standard deviation; None where it is not determined."""
     value = sum(fit.model.value(name) for name in names if name in fit.model.parameters)
-    pick = np.array([float(name in names) for name in fit.names])
-    places = pick > 0
+    places = np.array([name in names for name in fit.names], dtype=bool)
     norm = np.linalg.norm(fit.linearisation.jacobian[:, places].sum(axis=1)) if places.any() else 0.0
-    variance = float(pick @ fit.covariance @ pick)
+    own = fit.covariance[np.ix_(places, places)]
+    variance = float(own.sum()) if np.isfinite(own).all() else math.inf
     if (
         places.sum() > 1 and not 0.0 < variance < 1.0
     ):  # the sum of two undetermined ones is lost in their rounding

@@ -83,6 +83,11 @@ def with_unit(text: str, unit: str) -> str:
     return f"{text}\u202f{pretty_unit(unit)}" if pretty_unit(unit) else text
 
 
+def with_written_unit(text: str, unit: str) -> str:
+    """The text and the unit as it is written in files, plain text for a terminal; nothing for a pure number."""
+    return f"{text} {unit}" if pretty_unit(unit) else text
+
+
 def plus_minus(value: float, half: float) -> str:
     """value ± half, both to the second significant digit of half."""
     if not (math.isfinite(value) and math.isfinite(half)) or half <= 0.0:

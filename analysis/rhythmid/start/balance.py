@@ -137,6 +137,7 @@ class Rows:
         size[~told] = 1.0
         low = [0.0 if name in POSITIVE else -np.inf for name in names]
         solved = lsq_linear(matrix / size, side, (low, np.inf))
+        told &= solved.active_mask == 0  # it ends a little inside a bound, which stands for nothing at all
         power = float(np.sum((side - (0.0 if self.steady else side.mean())) ** 2)) or 1.0
         return Law(
             dict(zip(names, np.where(told, solved.x / size, 0.0).tolist(), strict=True)),

@@ -12,7 +12,7 @@ from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.verdict import Decision
 from rhythmid.elements.places import SENTENCES
 from rhythmid.model import Model
-from rhythmid.report.quantity import in_words, number, rounded
+from rhythmid.report.quantity import in_words, number, rounded, with_written_unit
 
 NOT_LOCATED = "not located"
 
@@ -152,9 +152,8 @@ def freed_value(nominal: Model, fitted: Model, elements: Sequence[str]) -> str:
     freed = [name for name in elements if name not in effects]
     beside = f" with {listed(effects)}" if effects else ""
     values = [
-        f"{name} is held at {nominal.parameters[name].value:g} {nominal.parameters[name].unit} as given. Freed it comes out at "
-        f"{fitted.value(name):.4g}"
-        for name in freed
+        f"{name} is held at {with_written_unit(f'{held.value:g}', held.unit)} as given. Freed it comes out at {fitted.value(name):.4g}"
+        for name, held in ((name, nominal.parameters[name]) for name in freed)
     ]
     return (
         f"{'. '.join(values)}, and that{beside} predicts the records better than any effect does while it is held: check "
@@ -172,6 +171,7 @@ def recalibrated(nominal: Model, fitted: Model, stds: Mapping[str, float]) -> tu
         least = max(CONTRADICTS * std, CONTRADICTS_LEAST * abs(value.value))
         if math.isfinite(std) and abs(new - value.value) > least:
             said.append(
-                f"{name}: {value.value:.6g} in the nominal model, {rounded(new, std)} ± {std:.2g} {value.unit} in the records"
+                f"{name}: {value.value:.6g} in the nominal model, {with_written_unit(f'{rounded(new, std)} ± {std:.2g}', value.unit)} in the "
+                "records"
             )
     return tuple(said)

@@ -1,0 +1,43 @@
+"""What the balance of the recorded effort says of a model whose free run does not follow the machine.
+
+A free run adds up every small disturbance; the balance weighs effort and motion at each instant, so that it may serve where no free run does.
+"""
+
+from collections.abc import Sequence
+
+from rhythmid.identify.inverse_dynamics.applicability import applicable
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.estimate import fit_effort, variation_of
+from rhythmid.model import Model
+from rhythmid.record.record import Record
+from rhythmid.report.quantity import rounded, with_written_unit
+
+
+def effort_note(records: Sequence[Record], model: Model, nrmse: float) -> str | None:
+    """The values by which the effort is balanced, and how well, in one line.
+
+    Parameters
+    ----------
+    records : as they drive the model.
+    model : the nominal one.
+    nrmse : share of the motion that the free run leaves.
+
+    None where the effort cannot be scored, or its balance leaves as large a share of it as the free run does of the motion.
+    """
+    way = applicable(records, model)
+    if not way.applies:
+        return None
+    balance = way.balance or Balance.of(records, model)
+    fit = fit_effort(balance, model)
+    left = fit.error / variation_of(balance)
+    if not left < nrmse:
+        return None
+    known = model.parameters
+    values = [
+        f"{name} {with_written_unit(f'{rounded(fit.model.value(name), std)} ± {std:.2g}', known[name].unit)}"
+        for name, std in zip(fit.names, fit.std[1:].tolist(), strict=True)
+    ]
+    return (
+        f"the balance of the recorded effort, which needs no free run, leaves {100.0 * left:.0f} % of the effort, with "
+        f"{', '.join(values)}; `rhythmid diagnose` scores by the effort where it serves better, and names what is missing"
+    )
