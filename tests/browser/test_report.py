@@ -15,7 +15,7 @@ from rhythmid.offline_run import perform
 from rhythmid.record.record import Channel, Record
 from rhythmid.report.page import write_page
 
-CANDIDATES = {"coulomb_friction", "cubic_stiffness", "asymmetric_damping", "sensor_lag"}
+CANDIDATES = {"coulomb_friction", "cubic_stiffness", "flight_damping", "sensor_lag"}
 SECTIONS = (
     "Where model and machine differ", "What is missing", "How much better it fits", "What is left unexplained",
     "Harmonics of the cycle and transfer functions", "The hypotheses", "What is not believed, and why", "Parameters", "Delays", "What remains unknown",

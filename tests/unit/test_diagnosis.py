@@ -144,11 +144,11 @@ def test_all_parameters_fixed_is_refused_with_the_mend():
 
 
 def test_a_drift_beside_a_strong_effect_does_not_pass_for_the_colour_of_the_noise():
-    damped = hopper().with_element(CATALOGUE["asymmetric_damping"], {"damping": 5.0})
+    damped = hopper().with_element(CATALOGUE["flight_damping"], {"damping": 5.0})
     machine = damped.with_element(CATALOGUE["sensor_drift"], {"rate": 1e-4})
     found = conforming(diagnose(records(machine), hopper(), catalogue=CATALOGUE).diagnosis)
     assert found.verdict == "missing_physics"
-    assert {effect.element for effect in found.missing} == {"asymmetric_damping", "sensor_drift"}
+    assert {effect.element for effect in found.missing} == {"flight_damping", "sensor_drift"}
     drift = next(effect for effect in found.missing if effect.element == "sensor_drift").parameters["rate"]
     assert drift.std is not None and abs(drift.value - 1e-4) < 4.0 * drift.std < 5e-5
 

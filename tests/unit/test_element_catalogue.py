@@ -28,7 +28,7 @@ WITHOUT_STARTS = {
 CONTRACT = [
     "input_delay", "periodic_forcing", "gravity", "linear_spring", "switched_damper", "viscous_damper",
     "constant_force", "measurement_delay", "measurement_noise", "coulomb_friction",
-    "asymmetric_coulomb_friction", "stribeck_friction", "quadratic_drag", "asymmetric_damping",
+    "asymmetric_coulomb_friction", "stribeck_friction", "quadratic_drag", "flight_damping",
     "switching_threshold", "position_dependent_damping", "cubic_stiffness", "quadratic_stiffness",
     "bilinear_stiffness", "ground_contact_loss", "end_stop_contact", "position_ripple",
     "elastoplastic_hysteresis", "viscoelastic_relaxation", "second_mode", "stiffness_drift", "stiffness_jump",

@@ -17,9 +17,9 @@ def test_viscous_damper_lets_a_mass_coast_exponentially(rig):
     assert run.velocity == pytest.approx(-3.0 * np.exp(-0.8 * run.time / 2.0), rel=1e-9)
 
 
-def test_asymmetric_damping_acts_in_one_direction_only(rig):
+def test_flight_damping_acts_on_the_way_down_only(rig):
     damping, stiffness = 2.0, 100.0
-    run = rig.run(rig.model("asymmetric_damping", {"damping": damping}, spring=stiffness), 0.7, (0.1, 0.0))
+    run = rig.run(rig.model("flight_damping", {"damping": damping}, spring=stiffness), 0.7, (0.1, 0.0))
     ratio = damping / (2 * math.sqrt(stiffness))
     bottom = -0.1 * math.exp(-math.pi * ratio / math.sqrt(1 - ratio**2))
     assert run.position.min() == pytest.approx(bottom, rel=1e-4)

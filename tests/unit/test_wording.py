@@ -45,9 +45,9 @@ def test_the_summary_says_why_and_does_not_repeat_the_verdict():
 def test_rivals_for_one_effect_are_told_with_the_effects_that_stand_beside_it():
     pair = [supposed(name, predicted(0.1, 700.0, seed=i)) for i, name in enumerate("ab")]
     decision = replace(decided(contest(NOMINAL, *pair))[1], equivalent=(("a", "b"),))
-    named = [MissingEffect(name, "force", "", 0.5, 0.3, {}) for name in ("a", "asymmetric_damping")]
+    named = [MissingEffect(name, "force", "", 0.5, 0.3, {}) for name in ("a", "flight_damping")]
     said = summary_of(decision, named, FitQuality(0.1, 0.1), FitQuality(0.1, 0.1), "motion")
-    assert said.endswith("They are a or b, each beside asymmetric damping.")
+    assert said.endswith("They are a or b, each beside flight damping.")
 
 
 def test_where_something_else_leaves_it_undecided_rivals_are_told_beside_the_reason():

@@ -135,7 +135,7 @@ def _switched_damper(reading: _Reading, term: Term, values: Values) -> None:
         reading.nearly(term, "damping takes the mean of both directions")
 
 
-def _asymmetric_damping(reading: _Reading, term: Term, values: Values) -> None:
+def _flight_damping(reading: _Reading, term: Term, values: Values) -> None:
     reading.add("damping", 0.5 * values["damping"])
     reading.nearly(term, "damping takes the mean of both directions")
 
@@ -233,7 +233,7 @@ READERS: Mapping[str, Callable[[_Reading, Term, Values], None]] = {
     "cubic_stiffness": _sum_into("cubic_stiffness", "coefficient"),
     "viscous_damper": _sum_into("damping", "damping"),
     "switched_damper": _switched_damper,
-    "asymmetric_damping": _asymmetric_damping,
+    "flight_damping": _flight_damping,
     "quadratic_drag": _sum_into("quadratic_damping", "coefficient"),
     "quadratic_damping": _sum_into("quadratic_damping", "coefficient"),
     "coulomb_friction": _sum_into("friction", "force"),

@@ -190,7 +190,7 @@ def viscous_damper(value, t, x, v, f, m, p, s, ds, held, accepted):
 
 
 @equation("leg", "damping")
-def asymmetric_damping(value, t, x, v, f, m, p, s, ds, held, accepted):
+def flight_damping(value, t, x, v, f, m, p, s, ds, held, accepted):
     return value - p[0] * v if v <= 0.0 else value
 
 

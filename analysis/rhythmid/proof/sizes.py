@@ -181,7 +181,7 @@ SIZES: dict[str, Callable[[Rng, Motion], Sized]] = {
         "stiffness", m.stiffness, yield_displacement=m.cycle * _log(rng, 0.1, 1.5)
     ),
     "viscous_damper": lambda rng, m: _of("damping", 2.0 * m.damping),
-    "asymmetric_damping": lambda rng, m: _of("damping", 2.0 * m.damping),
+    "flight_damping": lambda rng, m: _of("damping", 2.0 * m.damping),
     "switching_threshold": lambda rng, m: _of("threshold", _sign(rng) * 1.5 * m.velocity),
     "position_dependent_damping": _position_damping,
     "constant_force": lambda rng, m: _of("force", _sign(rng) * 0.5 * m.unit),
@@ -234,4 +234,4 @@ SIZES: dict[str, Callable[[Rng, Motion], Sized]] = {
 }  # fmt: skip
 
 # Classes of one and the same model: a case draws one of them, and no record can tell which.
-EQUIVALENT = (frozenset({"viscous_damper", "asymmetric_damping"}), frozenset({"clock_skew", "delay_drift"}))
+EQUIVALENT = (frozenset({"viscous_damper", "flight_damping"}), frozenset({"clock_skew", "delay_drift"}))

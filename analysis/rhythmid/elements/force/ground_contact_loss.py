@@ -36,7 +36,7 @@ ELEMENT = Element(
     family="contact",
     confusable={
         "bilinear_stiffness": "keeps the damping, and its kink is anywhere",
-        "asymmetric_damping": "acts beyond the rest length, not by direction",
+        "flight_damping": "acts beyond the rest length, not by direction",
     },
     switches=("x", "rest_length"),
     reference="P. Holmes, R. J. Full, D. Koditschek, J. Guckenheimer, SIAM Review 48(2), 2006, 207-304",

@@ -25,7 +25,7 @@ ELEMENT = Element(
     family="damping",
     confusable={
         "viscous_damper": "one amplitude only: drag's apparent damping grows with amplitude",
-        "asymmetric_damping": "one amplitude only: triple the forcing, or a chirp of large amplitude",
+        "flight_damping": "one amplitude only: triple the forcing, or a chirp of large amplitude",
     },
     reference="L. D. Landau, E. M. Lifshitz, Fluid Mechanics, section 45",
 )

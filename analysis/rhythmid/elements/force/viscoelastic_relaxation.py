@@ -42,7 +42,7 @@ ELEMENT = Element(
     family="damping",
     confusable={
         "viscous_damper": "its limit for short relaxation times: excite high frequencies",
-        "asymmetric_damping": "a viscous damper in both phases with less stance damping: bias force, high frequencies",
+        "flight_damping": "a viscous damper in both phases with less stance damping: bias force, high frequencies",
         "elastoplastic_hysteresis": "its loop depends on speed: repeat slower",
     },
     reference="W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials, 1976",

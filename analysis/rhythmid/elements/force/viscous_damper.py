@@ -22,11 +22,11 @@ ELEMENT = Element(
     also_known_as=("dashpot", "linear damper"),
     family="damping",
     special_case_of=("viscoelastic_relaxation", "second_mode"),  # for τ_m → 0; of a mode far below the motion
-    needless_with=("switched_damper",),  # asymmetric damping and a free stance damping make it up
+    needless_with=("switched_damper",),  # flight damping and a free stance damping make it up
     confusable={
         "coulomb_friction": "one amplitude only: Coulomb's apparent damping falls as 1/amplitude",
         "quadratic_drag": "one amplitude only: drag's apparent damping grows with amplitude",
-        "asymmetric_damping": "the same model where a switched damper's stance damping is free",
+        "flight_damping": "the same model where a switched damper's stance damping is free",
     },
     reference="Any text on vibrations, e.g. D. J. Inman, Engineering Vibration",
 )

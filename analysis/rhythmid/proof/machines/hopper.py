@@ -14,7 +14,7 @@ EFFECTS = (
     "command_lag", "command_hold", "input_delay_drift", "actuator_lag", "actuator_saturation",
     "actuator_rate_limit", "actuator_deadband", "actuator_nonlinearity", "actuator_fade", "backlash",
     "coulomb_friction", "asymmetric_coulomb_friction", "stribeck_friction", "load_dependent_friction",
-    "elastoplastic_hysteresis", "bouc_wen_hysteresis", "viscous_damper", "asymmetric_damping", "switching_threshold",
+    "elastoplastic_hysteresis", "bouc_wen_hysteresis", "viscous_damper", "flight_damping", "switching_threshold",
     "position_dependent_damping", "quadratic_drag", "quadratic_stiffness", "cubic_stiffness", "quintic_stiffness",
     "bilinear_stiffness", "freeplay", "viscoelastic_relaxation", "stiffness_drift", "stiffness_jump",
     "ground_contact_loss", "end_stop_contact", "position_ripple", "periodic_disturbance", "second_mode",

@@ -1,9 +1,7 @@
-"""Asymmetric damping: F = -c_a v for v <= 0, besides what damps in both directions.
-
-In a hopper it is the damping in flight, the phase in which the paper's switched damper is off.
+"""Flight damping: F = -c_f v for v <= 0, the phase in which the paper's switched damper is off.
 
 The force is continuous at the switch; only its slope jumps. Together with a free stance damping it spans the same
-models as a viscous damper in both directions.
+models as a viscous damper in both phases.
 """
 
 from math import inf
@@ -16,15 +14,15 @@ def kernel(x, v, t, f, damping):
 
 
 ELEMENT = Element(
-    name="asymmetric_damping",
+    name="flight_damping",
     slot="force",
-    title="Asymmetric damping",
-    equation="F = −c_a v for v ≤ 0",
-    parameters=(Parameter("damping", "N*s/m", "damping c_a while v ≤ 0", bounds=(0.0, inf)),),
+    title="Flight damping",
+    equation="F = −c_f v for v ≤ 0",
+    parameters=(Parameter("damping", "N*s/m", "damping c_f while v ≤ 0", bounds=(0.0, inf)),),
     kernel=kernel,
     size="damping",
     starts=lambda s: [{"damping": 0.02 * s.damping}],
-    also_known_as=("rebound damping", "flight damping"),
+    also_known_as=("rebound damping", "asymmetric damping"),
     family="damping",
     # for τ_m → 0; of a mode far below the motion, with the stance damping taking up the rest
     special_case_of=("viscoelastic_relaxation", "second_mode"),
