@@ -253,11 +253,12 @@ def diagnose(
 
 
 def _chosen(made: Sequence[Answer]) -> Answer:
-    """The first answer that stands by names. Without one, the first that is not `consistent`: what one way to score does not see of a
-    mismatch, such as an effort beside rests, another one may."""
+    """The first answer that stands by names; without one, the first that is no effort in which nothing is missing: an effort does not show
+    what acts beside rests, or in the command's path, and the motion that was scored after it may."""
     stands = (one for one in made if one.stands)
-    misses = (one for one in made if one.diagnosis.verdict != "consistent")
-    return next(stands, None) or next(misses, made[0])
+    found = ((one.diagnosis.scoring.kind, one.diagnosis.verdict) for one in made)
+    telling = (one for one, said in zip(made, found, strict=True) if said != ("effort", "consistent"))
+    return next(stands, None) or next(telling, made[0])
 
 
 def _warning(case: Case, untried: list[Untried]) -> str | None:
