@@ -145,13 +145,18 @@ def prepare_run(
         lambda: compile_model(model, replace(variant, smooth=False)),
         tuple(series),
         smooth,
-        max_step or _longest_step(series, smooth),
+        max_step or _longest_step(model, series, smooth),
     )
 
 
-def _longest_step(series: Sequence[Series], smooth: bool) -> float:
-    """One Runge-Kutta step [s] a block, or a value of a command at whose knots steps end."""
-    return min([*(one.period * one.block for one in series), *([] if smooth else _ticks(series))])
+def _longest_step(model: Model, series: Sequence[Series], smooth: bool) -> float:
+    """One Runge-Kutta step [s] a block, or a value of a command at whose knots steps end.
+
+    A sample at most where there is a controller: it may be as fast as that, and in steps beyond its stability no fit comes to its gains.
+    """
+    controlled = any(term.element.acts == "feedback" for term in model.terms)
+    blocks = [one.period * (1 if controlled else one.block) for one in series]
+    return min([*blocks, *([] if smooth else _ticks(series))])
 
 
 def start_of(model: Model, run: FreeRun, index: int, position: float, velocity: float) -> Array:
@@ -193,10 +198,9 @@ def sufficient(
 
 
 def coarser(run: FreeRun, factor: float) -> FreeRun:
-    """The run in steps that are longer by a factor, where blocks and knots of the command do not end them anyway."""
-    return replace(
-        run, max_step=max(run.max_step, min(factor * run.max_step, _longest_step(run.series, run.smooth)))
-    )
+    """The run in steps that are longer by a factor, up to where blocks and knots of the command end them."""
+    ends = min([*(one.period * one.block for one in run.series), *([] if run.smooth else _ticks(run.series))])
+    return replace(run, max_step=max(run.max_step, min(factor * run.max_step, ends)))
 
 
 def halved(run: FreeRun) -> FreeRun:

@@ -21,9 +21,12 @@ DEAD = 3e-3
 SEEN = 1e-15  # of the motion, below which a difference is rounding; such a step grows to the size of what it is a step of, and not for ever
 
 
-# times the step of a run, in which its sensitivities are integrated. A run's own error is a few hundredths of the noise at most, and that of a
-# sensitivity as small a share of an effect that stands out of the noise
-COARSER = 4.0
+COARSER = (
+    4.0  # times the step of a run, in which its sensitivities are integrated where that is accurate enough
+)
+# of the residual, below which the error of coarser steps has to stay: the directions in which a fit still gains something move the outputs
+# by about the residual
+COARSE_ERROR = 0.1
 
 
 @dataclass(frozen=True)
@@ -133,9 +136,15 @@ class Problem:
         return total if math.isfinite(total) else math.inf
 
     def _perturbed(
-        self, model: Model, starts: Sequence[Array], signed: Array, state_steps: Array, columns: Sequence[int]
+        self,
+        run: FreeRun,
+        model: Model,
+        starts: Sequence[Array],
+        signed: Array,
+        state_steps: Array,
+        columns: Sequence[int],
     ) -> list[list[Array] | None]:
-        """Outputs with parameter or (from p on) initial state of each of the `columns` moved by its step."""
+        """Outputs of a run with parameter or (from p on) initial state of each of the `columns` moved by its step."""
         cases: list[tuple[Model, Sequence[Array]]] = []
         for c in columns:
             if c < len(self.names):
@@ -145,14 +154,21 @@ class Problem:
                 shift = np.zeros(self.run.states)
                 shift[c - len(self.names)] = state_steps[c - len(self.names)]
                 cases.append((model, [start + shift for start in starts]))
-        return self.coarse.many(cases, self.pool)
+        return run.many(cases, self.pool)
 
-    def _base(self, model: Model, starts: Sequence[Array], residuals: Sequence[Array]) -> list[Array]:
-        """Outputs from which those of `_perturbed` differ; those of the run itself where a coarser one diverges."""
-        outputs = None if self.coarse.max_step == self.run.max_step else self.coarse.outputs(model, starts)
-        if outputs is not None:
-            return outputs
-        return [residual + one.averaged for residual, one in zip(residuals, self.run.series)]
+    def _base(
+        self, model: Model, starts: Sequence[Array], residuals: Sequence[Array]
+    ) -> tuple[FreeRun, list[Array]]:
+        """The run by which sensitivities are taken, and its outputs from which those of `_perturbed` differ."""
+        own = [residual + one.averaged for residual, one in zip(residuals, self.run.series)]
+        if self.coarse.max_step == self.run.max_step:
+            return self.run, own
+        outputs = self.coarse.outputs(model, starts)
+        if outputs is None:
+            return self.run, own
+        error = sum(float(np.sum((a - b) ** 2)) for a, b in zip(outputs, own))
+        left = sum(float(np.sum(residual**2)) for residual in residuals)
+        return (self.coarse, outputs) if error < COARSE_ERROR**2 * left else (self.run, own)
 
     def settle_steps(
         self,
@@ -168,7 +184,7 @@ class Problem:
         Their natural sizes span many powers of ten (a stiffness, a delay, a hidden state of an actuator). Those that are `known`
         (p + q) stay as they are.
         """
-        base = self._base(model, starts, residuals)
+        run, base = self._base(model, starts, residuals)
         joint = np.concatenate([steps, state_steps])
         p = len(self.names)
         todo = [column for column, settled in enumerate(known) if not settled]
@@ -176,7 +192,7 @@ class Problem:
             if not todo:
                 break
             signed = self._signed(model, joint[:p])
-            outputs = self._perturbed(model, starts, signed, joint[p:], todo)
+            outputs = self._perturbed(run, model, starts, signed, joint[p:], todo)
             again = []
             for c, case in zip(todo, outputs):
                 if case is None:
@@ -216,10 +232,10 @@ class Problem:
         next steps.
         """
         signed = self._signed(model, steps)
+        run, base = self._base(model, starts, residuals)
         outputs = self._perturbed(
-            model, starts, signed, state_steps, range(len(self.names) + self.run.states)
+            run, model, starts, signed, state_steps, range(len(self.names) + self.run.states)
         )
-        base = self._base(model, starts, residuals)
         p, q = len(self.names), self.run.states
         rows, columns, bases, states, places = [], [], [], [], []
         place = 0
