@@ -47,7 +47,9 @@ def eliminate(
         return found
 
     best = _without_idle(best, run, margin)
-    found = run(best, _swaps(best, series, catalogue, trials, rounds))
+    single = [trial for trial in trials.values() if len(trial.added) == 1]
+    alone = _alone(under_noise(single, series, noise, step, 0)) if len(best.added) > 1 else {}
+    found = run(best, _swaps(best, series, catalogue, trials, alone, rounds))
     earlier = [t for t in trials.values() if t.added and _stands_for(t, best)]
     plainer = [t for t in [*found, *under_noise(earlier, series, noise, step)] if _stands_for(t, best)]
     simpler = [t for t in plainer if t.bic() < best.bic() + margin]
@@ -76,12 +78,12 @@ def _swaps(
     series: Sequence[Series],
     catalogue: Catalogue,
     trials: Mapping[tuple[str, ...], Trial],
+    alone: Mapping[str, Trial],
     rounds: Sequence[Round],
 ) -> list[Proposal]:
     """Models with another element in the place of one of the effects."""
     swaps: list[Proposal] = []
     scored = {score.element.name for score, _ in distinct(rounds[0].scores, RIVALS_TRIED)}
-    alone = _alone(trials)
     for label in best.added:
         element = best.element(label)
         family = {e.name for e in catalogue.values() if element.name in e.special_case_of and e.candidate}
@@ -104,11 +106,10 @@ def _swaps(
     return swaps
 
 
-def _alone(trials: Mapping[tuple[str, ...], Trial]) -> dict[str, Trial]:
-    """The models with one effect that fit best, by its name."""
-    single = sorted((t for t in trials.values() if len(t.added) == 1), key=lambda t: t.bic())
-    named = [(t.element(t.added[0]).name, t) for t in single]
-    return {name: t for name, t in named[:RIVALS_TRIED] if name == t.added[0]}
+def _alone(single: Sequence[Trial]) -> dict[str, Trial]:
+    """Of models with one effect, all under one noise and the best first, those that fit best, by its name."""
+    named = [(trial.element(trial.added[0]).name, trial) for trial in single[:RIVALS_TRIED]]
+    return {name: trial for name, trial in named if name == trial.added[0]}
 
 
 def _values(trial: Trial, label: str) -> dict[str, float]:
