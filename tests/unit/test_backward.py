@@ -1,5 +1,7 @@
 """Backward elimination tries chosen effects against being left out, and against others in their place."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -75,3 +77,39 @@ def test_what_an_exchange_makes_idle_is_left_out(monkeypatch: pytest.MonkeyPatch
         best, [SERIES], CATALOGUE, {best.added: best}, QUIET, 1e-3, [first], 10.0, lambda _: None
     )
     assert kept.added == ("quadratic_drag",)
+
+
+def test_models_with_one_effect_are_compared_under_one_noise(monkeypatch: pytest.MonkeyPatch):
+    tried = []
+    later = {
+        "quadratic_stiffness": 2000.0,
+        "quintic_stiffness": 2500.0,
+        "cubic_stiffness": 3000.0,
+        "bilinear_stiffness": 4000.0,
+    }
+
+    def run_trials(proposals, *_, **__):
+        tried.extend(proposals)
+        return [], []
+
+    def under_noise(trials, *_):
+        level = [replace(one, chi2=later[one.added[0]]) for one in trials if one.added[0] in later]
+        return sorted(level, key=lambda one: one.chi2)
+
+    monkeypatch.setattr(module, "run_trials", run_trials)
+    monkeypatch.setattr(module, "under_noise", under_noise)
+    best = trial(100.0, 200.0, coulomb_friction={"force": 1.0}, quadratic_drag={"coefficient": 0.1})
+    alone = [  # the first two were fitted again under the noise that a better model leaves
+        trial(2000.0, 150.0, quadratic_stiffness={"coefficient": 3.0}),
+        trial(2500.0, 150.0, quintic_stiffness={"coefficient": 3.0}),
+        trial(300.0, 150.0, cubic_stiffness={"coefficient": 3.0}),
+        trial(
+            400.0, 150.0, bilinear_stiffness={p.name: 0.1 for p in CATALOGUE["bilinear_stiffness"].parameters}
+        ),
+    ]
+    trials = {one.added: one for one in (best, *alone)}
+    first = Round((), 0.0)
+    module.eliminate(best, [SERIES], CATALOGUE, trials, QUIET, 1e-3, [first], 10.0, lambda _: None)
+    swapped = {name for one in tried if len(one.added) == 2 for name in one.added} - set(best.added)
+    assert {"quadratic_stiffness", "quintic_stiffness"} <= swapped
+    assert not {"cubic_stiffness", "bilinear_stiffness"} & swapped

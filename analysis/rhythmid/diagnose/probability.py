@@ -15,14 +15,16 @@ from rhythmid.diagnose.constants import ADEQUATE, HOLDS, OPEN, STEEPNESS, VAGUE,
 from rhythmid.diagnose.evidence import probabilities
 from rhythmid.diagnose.hypothesis import Hypothesis
 from rhythmid.diagnose.rejections import keeps_shape
-from rhythmid.diagnose.selection import Contest, Selection
+from rhythmid.diagnose.selection import Contest, Selection, beside_small_effects
 
 
 def weights_of(contest: Contest, selection: Selection) -> dict[tuple[str, ...], float]:
     """Weight of each hypothesis, by its key, among those with no more effects than the chosen one."""
-    most = len(selection.chosen.elements)
-    rivals = [one for one in contest.hypotheses if len(one.elements) <= most and keeps_shape(one.shape)]
-    return {one.key: float(weight) for one, weight in zip(rivals, probabilities(rivals))}
+    chosen = selection.chosen
+    sound = [one for one in contest.hypotheses if keeps_shape(one.shape)]
+    rivals = [one for one in sound if len(one.elements) <= len(chosen.elements)]
+    compared = [beside_small_effects(one, chosen, sound) for one in rivals]
+    return {one.key: float(weight) for one, weight in zip(rivals, probabilities(compared))}
 
 
 def adequacy(explained: float) -> float:

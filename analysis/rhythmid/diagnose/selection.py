@@ -6,8 +6,8 @@ where no row of the table of rejections speaks against the best of them.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from rhythmid.diagnose.constants import EQUIVALENT, RICHER
 from rhythmid.diagnose.evidence import removed, weight_for
@@ -121,7 +121,56 @@ def select(contest: Contest) -> Selection:
         else:
             # rounding decides nothing
             smaller = max(smaller, sound[0], key=lambda one: round(one.prediction.score, 6))
+    grown[-1] = _beside_others(grown[-1], contest, {row.hypothesis for row in told})
     return Selection(grown[-1], tuple(grown), tuple(told))
+
+
+def _beside_others(chosen: Hypothesis, contest: Contest, refused: Collection[tuple[str, ...]]) -> Hypothesis:
+    """The chosen hypothesis, or the kin of it that is decisively better where both have the same further effects."""
+    sound = [one for one in contest.hypotheses if keeps_shape(one.shape)]
+    rivals = [(one, beside_small_effects(one, chosen, sound)) for one in sound if one.elements not in refused]
+    weights = [
+        (weight_for(compared.prediction, chosen.prediction), one)
+        for one, compared in rivals
+        if compared is not one
+    ]
+    weight, best = max(weights, key=lambda pair: pair[0], default=(0.0, chosen))
+    return best if weight > decisive(1) else chosen
+
+
+def beside_small_effects(rival: Hypothesis, chosen: Hypothesis, sound: Sequence[Hypothesis]) -> Hypothesis:
+    """A rival that predicts as much better than the chosen hypothesis as it does where both have the same further effects.
+
+    Of laws of one family the wrong one may do better alone: it takes on a part of small effects that are too small to be named. The
+    further effects are those with which either of the two predicts best, among the `sound` hypotheses. Without any the rival is as it
+    is, and so is one that is no kin, or whose law contains the other one's.
+    """
+    kin = sorted(rival.family.values()) == sorted(chosen.family.values())
+    if rival is chosen or not kin or special_case(rival, chosen) or special_case(chosen, rival):
+        return rival
+    pairs = [
+        (one, other)
+        for one, beside in _further(rival, sound)
+        for other, same in _further(chosen, sound)
+        if beside == same
+    ]
+    if not pairs:
+        return rival
+    one, other = max(pairs, key=lambda pair: max(each.prediction.score for each in pair))
+    density = chosen.prediction.log_density + one.prediction.log_density - other.prediction.log_density
+    return replace(rival, prediction=replace(rival.prediction, log_density=density))
+
+
+def _further(one: Hypothesis, sound: Sequence[Hypothesis]) -> list[tuple[Hypothesis, frozenset[str]]]:
+    """Hypotheses that predict better than this one with more effects, with those that they have beside it."""
+    own = set(one.elements)
+    return [
+        (more, frozenset(more.elements) - own)
+        for more in sound
+        if more.kind == "effects"
+        and own < set(more.elements)
+        and more.prediction.score > one.prediction.score
+    ]
 
 
 def _simplest(close: Sequence[Hypothesis]) -> Hypothesis:
