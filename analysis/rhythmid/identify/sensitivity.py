@@ -20,10 +20,8 @@ Array = NDArray[np.float64]
 DEAD = 3e-3
 SEEN = 1e-15  # of the motion, below which a difference is rounding; such a step grows to the size of what it is a step of, and not for ever
 
-
-COARSER = (
-    4.0  # times the step of a run, in which its sensitivities are integrated where that is accurate enough
-)
+# times the step of a run, in which its sensitivities are integrated where that is accurate enough
+COARSER = 4.0
 # of the residual, below which the error of coarser steps has to stay: the directions in which a fit still gains something move the outputs
 # by about the residual
 COARSE_ERROR = 0.1

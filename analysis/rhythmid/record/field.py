@@ -13,9 +13,8 @@ from rhythmid.errors import InputError
 _STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[\s*([^\[\]]+?)\s*\]")
 LONGEST_POSITION = 10  # digits of a position in a list, whose length is a number of 32 bits
 NAMES = ("name", "names", "joint_names")  # lists that name the entries of the lists beside or below them
-OWN_NAMES = (
-    "child_frame_id",
-)  # texts that name the entry of a list that they stand in, as in a tree of frames
+# texts that name the entry of a list that they stand in, as in a tree of frames
+OWN_NAMES = ("child_frame_id",)
 
 TypeFields = Mapping[
     str, Any

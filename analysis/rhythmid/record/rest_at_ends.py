@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from rhythmid.record.record import Record
 
 Array = NDArray[np.float64]
-LEAST_SHARE = (
-    0.05  # of a record that a rest at its end has to last: a shorter one hardly changes what is fitted
-)
+# of a record that a rest at its end has to last: a shorter one hardly changes what is fitted
+LEAST_SHARE = 0.05
 WINDOWS = 3  # stretches before a rest in all of which a machine has to move, for that to be its custom
 AS_MUCH = 0.9  # of the usual travel of a drive, from which that goes on as before: steps of equal size have 1
 AT_REST = 0.02  # of the way that a motion leads away from its beginning, up to which it has not begun

@@ -47,13 +47,13 @@ HOP_DISTANCES = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minim
 # log likelihood of a twentieth per sample, where a few per record decide
 EXCESS = 0.1
 LEAST_EXCESS = 60.0  # the same for few samples
-HALVINGS = 6  # of the nominal model's step at most: of samples 20 ms apart to 0.3 ms
+MOST_HALVINGS = 6  # of the nominal model's step at most: of samples 20 ms apart to 0.3 ms
 TOLERANCE = 0.05  # of chi2, at which a trial has converged: far below what an element has to earn
 
 
 def fine_enough(run: FreeRun, model: Model, starts: Sequence[Array], noise: float) -> FreeRun:
     """The run in steps whose error of integration is far below the `noise` (rms): an element may be stiff, or bend its force within a step."""
-    return sufficient(run, model, starts, INTEGRATION * noise, HALVINGS)
+    return sufficient(run, model, starts, INTEGRATION * noise, MOST_HALVINGS)
 
 
 def _run_of(trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float) -> FreeRun:
