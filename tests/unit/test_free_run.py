@@ -7,6 +7,7 @@ import pytest
 from scipy.interpolate import PPoly
 
 from machines import CATALOGUE, hopper
+from rhythmid.diagnose.search.refit import fine_enough
 from rhythmid.identify.free_run import prepare_run, start_of, sufficient
 from rhythmid.identify.series import Series
 from rhythmid.model import Model
@@ -151,3 +152,12 @@ def test_a_held_command_that_changes_often_between_samples_has_a_smooth_surrogat
     assert outputs is not None
     expected = simulate(model, one.centres, COMMAND, FORCING, start, 1e-4).output
     np.testing.assert_allclose(outputs[0], expected, atol=2e-5)
+
+
+def test_steps_are_halved_six_times_at_most_however_often_a_run_is_looked_at():
+    model, one = machine(), series(block=10)
+    run = prepare_run(model, [one])
+    start = start_of(model, run, 0, 0.15, 0.1)
+    for _ in range(3):  # nothing is fine enough for no noise at all
+        run = fine_enough(run, model, [start], 0.0)
+        assert run.max_step == pytest.approx(run.longest_step / 64)

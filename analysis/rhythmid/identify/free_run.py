@@ -55,6 +55,13 @@ class FreeRun:
         """Length of the state vector."""
         return len(self.compiled.layout.states)
 
+    @property
+    def longest_step(self) -> float:
+        """Step [s] beyond which blocks, or knots of the command, end every one."""
+        return min(
+            [*(one.period * one.block for one in self.series), *([] if self.smooth else _ticks(self.series))]
+        )
+
     def rows(self, model: Model, index: int, start: Array, disturbance: PPoly | None = None) -> Array | None:
         """Rows (blocks, states + 2) of the compiled loop at the block centres of series `index`.
 
@@ -199,8 +206,7 @@ def sufficient(
 
 def coarser(run: FreeRun, factor: float) -> FreeRun:
     """The run in steps that are longer by a factor, up to where blocks and knots of the command end them."""
-    ends = min([*(one.period * one.block for one in run.series), *([] if run.smooth else _ticks(run.series))])
-    return replace(run, max_step=max(run.max_step, min(factor * run.max_step, ends)))
+    return replace(run, max_step=max(run.max_step, min(factor * run.max_step, run.longest_step)))
 
 
 def halved(run: FreeRun) -> FreeRun:

@@ -47,13 +47,16 @@ HOP_DISTANCES = 0.25, -0.25, 0.5, -0.5, 1.0, -1.0  # times the distance of minim
 # log likelihood of a twentieth per sample, where a few per record decide
 EXCESS = 0.1
 LEAST_EXCESS = 60.0  # the same for few samples
-MOST_HALVINGS = 6  # of the nominal model's step at most: of samples 20 ms apart to 0.3 ms
+# of the longest step at most, however often a run is looked at: of samples 20 ms apart to 0.3 ms. Beyond it is no error of integration that
+# is left, but jumps, such as a dead band's, that fall elsewhere with every step
+MOST_HALVINGS = 6
 TOLERANCE = 0.05  # of chi2, at which a trial has converged: far below what an element has to earn
 
 
 def fine_enough(run: FreeRun, model: Model, starts: Sequence[Array], noise: float) -> FreeRun:
     """The run in steps whose error of integration is far below the `noise` (rms): an element may be stiff, or bend its force within a step."""
-    return sufficient(run, model, starts, INTEGRATION * noise, MOST_HALVINGS)
+    left = MOST_HALVINGS - round(math.log2(run.longest_step / run.max_step))
+    return sufficient(run, model, starts, INTEGRATION * noise, left) if left > 0 else run
 
 
 def _run_of(trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float) -> FreeRun:
