@@ -1,6 +1,8 @@
-"""A process that nobody asked: commands 5 N on /hopper/command for some seconds, and says in JSON whom it reached and what it heard.
+"""A process that nobody asked: commands 5 N for some seconds, and says in JSON whom it reached and what it heard.
 
-python stranger.py SECONDS
+python stranger.py SECONDS [NAMESPACE]
+
+The plant that it commands is in the namespace /hopper unless told otherwise.
 """
 
 import json
@@ -13,11 +15,12 @@ from sensor_msgs.msg import JointState
 
 
 def main() -> None:
+    namespace = sys.argv[2] if len(sys.argv) > 2 else "hopper"
     rclpy.init()
     node = Node("stranger")
     heard: list[JointState] = []
-    node.create_subscription(JointState, "/hopper/plant/joint_states", heard.append, 10)
-    publisher = node.create_publisher(JointState, "/hopper/command", 10)
+    node.create_subscription(JointState, f"/{namespace}/plant/joint_states", heard.append, 10)
+    publisher = node.create_publisher(JointState, f"/{namespace}/command", 10)
     reached = 0
     end = time.monotonic() + float(sys.argv[1])
     while time.monotonic() < end and not (reached and heard):

@@ -17,13 +17,16 @@ from rhythmid_bringup.environment import run_environment
 HERE = Path(__file__).parent
 MODEL = HERE.parents[1] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"
 STRANGER = [sys.executable, str(HERE / "stranger.py")]
+HIDDEN = "hidden"  # name and namespace of the isolated plant; no other test uses it, so whoever sees it has seen this one
 PLANT = [
     sys.executable,
     "-m",
     "rhythmid_nodes.plant",
     "--ros-args",
     "-r",
-    "__ns:=/hopper",
+    f"__ns:=/{HIDDEN}",
+    "-r",
+    f"__node:={HIDDEN}",
     "-p",
     f"model:={MODEL}",
 ]
@@ -31,16 +34,16 @@ REASON = isolation.why_not()
 needs_namespaces = pytest.mark.skipif(REASON is not None, reason=f"no namespaces here: {REASON}")
 
 
-def call(seconds: float) -> dict:
-    """What a stranger on this machine reaches within some seconds."""
-    done = subprocess.run([*STRANGER, str(seconds)], capture_output=True, text=True, check=True)
+def call(seconds: float, namespace: str = "hopper") -> dict:
+    """What a stranger on this machine reaches in a namespace within some seconds."""
+    done = subprocess.run([*STRANGER, str(seconds), namespace], capture_output=True, text=True, check=True)
     return json.loads(done.stdout)
 
 
 @needs_namespaces
 def test_a_stranger_in_the_same_domain_reaches_an_open_plant_but_no_isolated_one(domain, graph, monkeypatch):
     monkeypatch.delenv("RHYTHMID_SUPERVISOR")  # its child is a shell
-    script = f"{' '.join(PLANT)} & {' '.join(STRANGER)} 30; wait"
+    script = f"{' '.join(PLANT)} & {' '.join(STRANGER)} 30 {HIDDEN}; wait"
     with subprocess.Popen(
         isolation.isolated(["sh", "-c", script]), stdout=subprocess.PIPE, text=True, start_new_session=True
     ) as inside:
@@ -48,9 +51,9 @@ def test_a_stranger_in_the_same_domain_reaches_an_open_plant_but_no_isolated_one
             assert inside.stdout is not None
             insider = json.loads(inside.stdout.readline())
             assert insider["reached"] and insider["heard"], "the isolated plant does not work"
-            outsider = call(5.0)
+            outsider = call(5.0, HIDDEN)
             assert outsider == {"reached": 0, "heard": 0, "nodes": outsider["nodes"]}
-            assert "plant" not in outsider["nodes"]
+            assert HIDDEN not in outsider["nodes"]
         finally:
             os.killpg(inside.pid, signal.SIGKILL)
     graph.spawn("plant", "plant", model=str(MODEL))
