@@ -28,7 +28,7 @@ FEW = CATALOGUE.without(*(name for name in CATALOGUE if name not in (*KEPT, "vis
 
 def errors_of(found: EffortSearch, *hypotheses: Fitted) -> list[float]:
     """Mean squared errors with which these, and last a free map beside the nominal model, predict what their fits did not see."""
-    fits = [*(one.linearised for one in hypotheses), found.reference]
+    fits = [*(one.linearised for one in hypotheses), found.reference.linearised]
     return [one.mean_square for one in predict(fits, found.blocks, found.balance.record)]
 
 
@@ -72,7 +72,7 @@ def test_what_is_left_by_the_nominal_model_goes_with_the_speed(friction):
 def test_all_hypotheses_predict_the_same_rows(friction):
     count = len(friction.balance.measured)
     assert all(len(one.linearised.residual) == count for one in friction.hypotheses)
-    assert len(friction.reference.residual) == count
+    assert len(friction.reference.linearised.residual) == count
 
 
 def test_of_laws_of_which_one_contains_the_other_one_stands_alone(friction):
@@ -176,10 +176,10 @@ def test_effort_of_a_record_that_no_fit_has_seen_is_predicted(friction):
 def test_a_free_map_predicts_held_out_records_as_it_predicts_its_own(friction):
     found = friction
     seen = found.balance
-    again = residual_with_map(seen, seen, found.nominal, found.reference)
-    np.testing.assert_allclose(again, found.reference.residual, atol=0.05 * variation_of(seen))
+    again = residual_with_map(seen, found.nominal, found.reference)
+    np.testing.assert_allclose(again, found.reference.linearised.residual, atol=0.05 * variation_of(seen))
     unseen = HeldOut.of([axis(7)], axis_model(), seen)
-    mapped = residual_with_map(unseen.balance, seen, found.nominal, found.reference)
+    mapped = residual_with_map(unseen.balance, found.nominal, found.reference)
     plain = unseen.residual(found.nominal)
     assert np.sqrt(np.mean(mapped**2)) < 0.5 * np.sqrt(np.mean(plain**2))
 

@@ -13,7 +13,7 @@ from rhythmid.diagnose.discrepancy import mean_product
 from rhythmid.diagnose.effort.candidate import columns_of, screen, starts_of
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.held_out import HeldOut
-from rhythmid.diagnose.effort.reference import reference_of, residual_with_map
+from rhythmid.diagnose.effort.reference import HISTORY, Mapped, reference_of, residual_with_map
 from rhythmid.diagnose.effort.remainder import Remainder, remainder_of
 from rhythmid.diagnose.effort.scales import scales_at
 from rhythmid.diagnose.effort.search import GAP, MOST_EFFECTS, EffortSearch, search_effort
@@ -70,20 +70,17 @@ class _Rows:
 
     def predicted(
         self,
-        found: EffortSearch,
         fitted: Fitted,
-        with_map: Linearised | None = None,
-        beside: str | None = None,
+        mapped: Mapped | None = None,
     ) -> CrossValidated:
-        """Errors of prediction of a fit, or of one `with_map`: a free map beside its parameters, of the motion of the joint `beside` this
-        one, too."""
-        seen = with_map or fitted.linearised
+        """Errors of prediction of a fit, or of the same with a free map beside its parameters."""
+        seen = fitted.linearised if mapped is None else mapped.linearised
         if self.heldout is None:
             return cross_validate(seen, self.blocks)
-        if with_map is None:
+        if mapped is None:
             other = self.heldout.residual(fitted)
         else:
-            other = residual_with_map(self.heldout.balance, found.balance, fitted, with_map, beside)
+            other = residual_with_map(self.heldout.balance, fitted, mapped)
         residual = np.concatenate([seen.residual, other])
         jacobian = np.vstack([seen.jacobian, np.zeros((len(other), seen.jacobian.shape[1]))])
         return cross_validate(Linearised(residual, jacobian, seen.precision, seen.departure), self.blocks)
@@ -130,13 +127,16 @@ def effort_run(
     case.tell("weighing the hypotheses on data that no fit has seen")
     rows = _rows(case, found, unseen)
     size = variation_of(found.balance)
-    predicted = {one.elements: rows.predicted(found, one) for one in found.hypotheses}
-    ruled_out = {one.elements: rows.predicted(found, one) for one in found.ruled_out}
+    predicted = {one.elements: rows.predicted(one) for one in found.hypotheses}
+    ruled_out = {one.elements: rows.predicted(one) for one in found.ruled_out}
     left = remainder_of(found.balance, found.chosen)
-    mapped = {left.of_the_motion: rows.predicted(found, found.chosen, found.beyond)}
+    mapped = {
+        left.of_the_motion: rows.predicted(found.chosen, found.beyond),
+        HISTORY: rows.predicted(found.chosen, found.history),
+    }
     if (beside := left.curves[0].joint) is not None:
         coupled = reference_of(found.balance, found.chosen, found.blocks, beside)
-        mapped[left.goes_with] = rows.predicted(found, found.chosen, coupled, beside)
+        mapped[left.goes_with] = rows.predicted(found.chosen, coupled)
     every = [*predicted.values(), *mapped.values()]
     best = min(every, key=lambda one: float(np.sum(one.error**2)))
     time = autocorrelation_time(best.error, rows.record)

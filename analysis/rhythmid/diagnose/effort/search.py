@@ -30,9 +30,9 @@ from rhythmid.diagnose.effort.candidate import (
 )
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.kin import at_values_of, contained, kin, shortlist
-from rhythmid.diagnose.effort.reference import reference_of
+from rhythmid.diagnose.effort.reference import Mapped, history_of, reference_of
 from rhythmid.diagnose.effort.scales import scales_at, scales_of
-from rhythmid.diagnose.evidence import Blocks, Linearised, predict
+from rhythmid.diagnose.evidence import Blocks, predict
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, special_case
 from rhythmid.diagnose.rejections import Claim, keeps_shape, rejections_of, replaces
 from rhythmid.diagnose.shape import within_bounds
@@ -67,7 +67,8 @@ class EffortSearch:
     nominal : the nominal model, its free values fitted.
     hypotheses : all that were fitted, the nominal among them.
     ruled_out : what was fitted, too, and explains no motion.
-    reference, beyond : the nominal model, and the chosen one, with a free map beside them.
+    reference, beyond : the nominal model, and the chosen one, with curves over the motion beside them.
+    history : the chosen model with a free function of the motion and its past beside it.
     chosen : the hypothesis with which the search ended.
     condition : of the nominal model's scaled columns.
     not_tried : why candidates of the catalogue took no part, by name; and what the budget cut off.
@@ -81,8 +82,9 @@ class EffortSearch:
     hypotheses: tuple[Fitted, ...]
     ruled_out: tuple[Fitted, ...]
     chosen: Fitted
-    reference: Linearised
-    beyond: Linearised
+    reference: Mapped
+    beyond: Mapped
+    history: Mapped
     condition: float
     not_tried: Mapping[str, str]
     candidates: int
@@ -132,8 +134,9 @@ def search_effort(
     for one in (chosen, best) if best is not chosen else (chosen,):
         search.reduce(one)
     beyond = reference_of(balance, chosen, search.blocks)
+    history = history_of(balance, chosen, search.blocks)
     return EffortSearch(
-        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)) | search.cut, len(search.tried), bool(search.cut),
+        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, history, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)) | search.cut, len(search.tried), bool(search.cut),
     )  # fmt: skip
 
 
@@ -145,7 +148,7 @@ class _Search:
     catalogue: Catalogue
     blocks: Blocks
     nominal: Fitted
-    reference: Linearised  # the nominal model with a free map beside it
+    reference: Mapped  # the nominal model with a free map beside it
     found: list[Fitted]
     promising: float | None = None
     recorded: Array | None = None  # efforts as they were recorded
@@ -189,7 +192,9 @@ class _Search:
         new = self._nearer(new)
         self.found.extend(new)
         fits = [one.linearised for one in (*new, parent, self.nominal)]
-        *others, before, start, free = predict([*fits, self.reference], self.blocks, self.balance.record)
+        *others, before, start, free = predict(
+            [*fits, self.reference.linearised], self.blocks, self.balance.record
+        )
         order = sorted(range(len(new)), key=lambda index: -others[index].score)
         best = order[0]
         claimed = [one.claimed(prediction) for one, prediction in zip(new, others)]
@@ -327,7 +332,7 @@ class _Search:
     def _shape(self, made: Fitted, base: Fitted, label: str, element: Element) -> dict[str, float]:
         """Statistics of an effect, by the rule that looks at them; `base` is the hypothesis without it."""
         model, sizes = made.fit.model, scales_of(self.balance, base.fit.model)
-        own = beyond_motion(self.balance, model, label, self.nominal.linearised, self.reference)
+        own = beyond_motion(self.balance, model, label, self.nominal.linearised, self.reference.linearised)
         shape = {"more_than_motion": own}
         if element.slot != "actuator":
             return shape

@@ -19,13 +19,12 @@ LEAST_SWING = (
 
 
 def starts(scales):
-    """Hanging at the middle of the motion; of one that goes round, nowhere in particular; of a small one not at all."""
+    """Hanging at the middle of the motion, and turned from there: an arm's link may hang outside of its travel. Of a small motion not at all."""
     if 0.5 * (scales.high - scales.low) < LEAST_SWING:
         return []
     moment = max(0.1 * scales.stiffness, 0.1 * scales.effort)
-    around = scales.high - scales.low > 2.0 * math.pi
-    references = [0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi] if around else [scales.centre]
-    return [{"moment": moment, "reference": reference} for reference in references]
+    turns = (0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi)
+    return [{"moment": moment, "reference": scales.centre + turn} for turn in turns]
 
 
 ELEMENT = Element(

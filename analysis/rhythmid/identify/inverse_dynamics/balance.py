@@ -6,7 +6,7 @@ itself requires. One zero-phase filter acts on the recorded effort and on all th
 """
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -117,7 +117,7 @@ class Balance:
         made.measured[:] = measured
         return made
 
-    def rows(self, signals: Sequence[Array], shift: float = 0.0) -> Array:
+    def rows(self, signals: Iterable[Array], shift: float = 0.0) -> Array:
         """Signals, one (n,) or (n, p) for each motion, filtered, at the rows, `shift` [s] later; (rows,) or (rows, p)."""
         return np.concatenate(
             [

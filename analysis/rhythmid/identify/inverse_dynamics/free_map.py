@@ -50,13 +50,13 @@ class FreeMap:
     """Columns of a free map over the motions: a spline of the speed for each direction, one of the position, and
     sgn(v) times the position, its square, and the load. `bends` (q,) marks those whose size is curvature.
 
-    With a joint `beside` this one there are splines of its speed, too, and of the sum and the difference of the two speeds: a belt or a
+    A load counts as a share of `size`, that of the effort. With a joint `beside` this one there are splines of its speed, too, and of the sum and the difference of the two speeds: a belt or a
     differential gear on the way to the motor makes that turn with both.
     """
 
-    def __init__(self, motions: list[Motion], beside: str | None = None) -> None:
+    def __init__(self, motions: list[Motion], size: float = 1.0, beside: str | None = None) -> None:
         position = np.concatenate([motion.leg_position for motion in motions])
-        self._beside = beside
+        self._beside, self._size = beside, size
         speeds = zip(*(self._speeds_of(motion) for motion in motions), strict=True)
         self._speeds = [_two_sided(np.concatenate(one)) for one in speeds]
         self._position = Spline(position, PLACES)
@@ -83,7 +83,7 @@ class FreeMap:
         ]
         found.append(self._position(motion.leg_position)[:, self._first :])
         place = np.clip((motion.leg_position - self._centre) / self._width, -3.0, 3.0)
-        found.append(np.column_stack([sign * place, sign * place**2, sign * np.abs(load)]))
+        found.append(np.column_stack([sign * place, sign * place**2, sign * np.abs(load) / self._size]))
         return np.hstack(found)
 
 

@@ -130,8 +130,10 @@ def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> 
             assert grid.effort is not None
             drive = grid.effort
         else:
-            assert grid.input is not None
-            drive = grid.input if grid.forcing is None else grid.input + grid.forcing
+            assert grid.input is not None and record.input is not None
+            held = record.hold == "zero"
+            drive = _mean_held(record.input, grid.time, grid.period) if held else grid.input
+            drive = drive if grid.forcing is None else drive + grid.forcing
         short = short_gaps(grid.missing, int(longest / grid.period))
         bridged = short | (
             grid.missing & grid.valid
@@ -282,6 +284,16 @@ def _before_sensor(stretch: Stretch, model: Model) -> Array:
             values = {name: value.value for name, value in term.values.items()}
             output = output - effect_along(term.element, values, model, path)
     return output
+
+
+def _mean_held(channel: Channel, time: Array, period: float) -> Array:
+    """Mean (n,) of a held effort over a period about each time: what the machine answers to. The value at the time itself would be one
+    hold older or younger as the stamps happen to jitter about the grid."""
+    ends = np.array([min(channel.time[0], time[0]) - period, max(channel.time[-1], time[-1]) + period])
+    knots = np.concatenate([ends[:1], channel.time[1:], ends[1:]])  # before the first sample it was as there
+    impulse = np.concatenate([[0.0], np.cumsum(channel.value * np.diff(knots))])
+    first, last = (np.interp(time + side * period, knots, impulse) for side in (-0.5, 0.5))
+    return (last - first) / period
 
 
 def _spline(channel: Channel) -> CubicSpline:

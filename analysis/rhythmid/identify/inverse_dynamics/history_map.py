@@ -1,0 +1,75 @@
+"""A free function of the motion and its past: physics without a name that no sum of curves over single quantities draws.
+
+What a joint gives back depends on several quantities at once, and play and hysteresis on where it last turned. The function is a
+Gaussian process of position, velocity, acceleration, load, and the states of stop operators of three widths, which remember the last
+turns (M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, Springer, 1996, ch. 2). It is reduced to a number of centres among the rows
+(C. K. I. Williams, M. Seeger, Using the Nyström method to speed up kernel machines, NIPS 13, 2000).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+from scipy.spatial.distance import cdist
+
+from rhythmid.identify.inverse_dynamics.motion import Motion
+
+Array = NDArray[np.float64]
+WIDTHS = (
+    0.02,
+    0.1,
+    0.4,
+)  # of the stops, in standard deviations of the position: presliding, play, a soft transmission
+CENTRES = 80  # with 40 a hysteresis is drawn coarsely, with 160 nothing is gained
+LENGTH = 2.0  # of the function, in standard deviations of each quantity: 1.5 to 3 predict alike
+JITTER = 1e-6  # added to the kernel of the centres, so that near ones do no harm
+FAR = 4.0  # standard deviations beyond which a quantity of other records is taken to be there
+
+
+@njit("float64[::1](float64[::1], float64)", cache=True)
+def stop(position: Array, width: float) -> Array:
+    """State (n,) of a stop operator, from −1 to 1: it follows the position until it is `width` from where that last turned."""
+    state = np.empty_like(position)
+    state[0] = 0.0
+    for k in range(1, len(position)):
+        moved = state[k - 1] + (position[k] - position[k - 1]) / width
+        state[k] = min(max(moved, -1.0), 1.0)
+    return state
+
+
+class HistoryMap:
+    """Columns of the function over motions; `places` are the rows of each among which the centres are, `loads` (n,) the efforts that a
+    model predicts, never the measured ones. The size of every column is that of a bend of a free map."""
+
+    def __init__(
+        self, motions: Sequence[Motion], places: Sequence[NDArray[np.int64]], loads: Sequence[Array]
+    ) -> None:
+        self._travel = float(np.std(np.concatenate([motion.leg_position for motion in motions]))) or 1.0
+        rows = np.vstack(
+            [self._quantities(m, load)[p] for m, load, p in zip(motions, loads, places, strict=True)]
+        )
+        self._middle, self._spread = rows.mean(axis=0), rows.std(axis=0)
+        self._spread[self._spread == 0.0] = 1.0
+        some = np.random.default_rng(0).choice(len(rows), min(CENTRES, len(rows)), replace=False)
+        self._centres = self._scaled(rows[some])
+        within = self._kernel(self._centres) + JITTER * np.eye(len(some))
+        self._root = cholesky(within, lower=True)
+        self.bends = np.ones(len(some), dtype=bool)
+
+    def _quantities(self, motion: Motion, load: Array) -> Array:
+        place = np.ascontiguousarray(motion.leg_position, dtype=float)
+        stops = [stop(place, width * self._travel) for width in WIDTHS]
+        return np.column_stack([place, motion.leg_velocity, motion.acceleration, load, *stops])
+
+    def _scaled(self, quantities: Array) -> Array:
+        return np.clip((quantities - self._middle) / self._spread, -FAR, FAR)
+
+    def _kernel(self, scaled: Array) -> Array:
+        return np.exp(-0.5 * cdist(scaled, self._centres, "sqeuclidean") / LENGTH**2)
+
+    def columns(self, motion: Motion, load: Array) -> Array:
+        """Columns (n, q) of one motion; independent coefficients of one variance give the process."""
+        found = self._kernel(self._scaled(self._quantities(motion, load)))
+        return solve_triangular(self._root, found.T, lower=True).T
