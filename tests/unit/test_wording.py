@@ -81,7 +81,7 @@ def test_a_second_effect_whose_family_alone_is_certain_is_told_beside_the_first(
     assert said.endswith(" The model lacks some form of stiffness (90 %), too; the law is undecided.")
 
 
-@pytest.mark.parametrize(("unit", "told"), [("1", "held at 2 as given"), ("kg", "held at 2 kg as given")])
+@pytest.mark.parametrize(("unit", "told"), [("1", "held at 2."), ("kg", "held at 2 kg.")])
 def test_a_pure_number_is_told_without_a_unit(unit, told):
     model = Model.from_text(
         f"units: {{mass: '{unit}', force: '{unit}*m/s^2'}}\n"

@@ -4,6 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
+from rhythmid.body.body import BODY
 from rhythmid.diagnose.answer.result import FitQuality, Location, MissingEffect
 from rhythmid.diagnose.constants import CONTRADICTS, CONTRADICTS_LEAST, STATED
 from rhythmid.diagnose.hypothesis import Verdict
@@ -152,12 +153,14 @@ def freed_value(nominal: Model, fitted: Model, elements: Sequence[str]) -> str:
     freed = [name for name in elements if name not in effects]
     beside = f" with {listed(effects)}" if effects else ""
     values = [
-        f"{name} is held at {with_written_unit(f'{held.value:g}', held.unit)} as given. Freed it comes out at {fitted.value(name):.4g}"
+        f"{name} is held at {with_written_unit(f'{held.value:.4g}', held.unit)}. Freed it comes out at {fitted.value(name):.4g}"
         for name, held in ((name, nominal.parameters[name]) for name in freed)
     ]
+    what = "that value" if len(freed) == 1 else "these values"
+    file = any(name.startswith(f"{BODY}.") for name in freed)  # a body's file says nothing of what is free
     return (
-        f"{'. '.join(values)}, and that{beside} predicts the records better than any effect does while it is held: check "
-        f"{'that value' if len(freed) == 1 else 'these values'}, or drop its 'fixed: true'."
+        f"{'. '.join(values)}, and that{beside} predicts the records better than any effect does while it is held: check {what}"
+        f"{'' if file else ', or drop its ' + repr('fixed: true')}."
     )
 
 

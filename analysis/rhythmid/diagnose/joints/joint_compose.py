@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from rhythmid.body.body import BODY
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
+from rhythmid.diagnose.constants import STATED
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, name_of
@@ -161,13 +162,20 @@ def summary_of_joints(
     said = []
     for one in missing:
         what = f"the {one.of_link}" if one.link else in_words(one.element)
-        said.append(f"{one.joint}: {what}")
+        others = [] if one.probability >= STATED or one.link else _in_its_place(one, answers[one.joint])
+        said.append(f"{one.joint}: {' or '.join([what, *others])}")
     words = f"The model is wrong at {'; '.join(said)}." if said else ""
     for why, joints in _alike(unknown, answers).items():
         words += f" At {', '.join(joints)} {why[0].lower()}{why[1:]}"
     for why, joints in _alike(undecided, answers).items():
         words += f" At {', '.join(joints)} the records do not decide: {why}"
     return words.strip() or "Nothing of practical size is missing at any joint."
+
+
+def _in_its_place(one: JointEffect, answer: Diagnosis) -> list[str]:
+    """In words the effects that explain a joint as well as this one does."""
+    groups = [group for group in answer.indistinguishable if one.element in group]
+    return [in_words(name) for group in groups for name in group if name != one.element]
 
 
 def _alike(joints: Sequence[str], answers: Mapping[str, Diagnosis]) -> dict[str, list[str]]:
