@@ -39,6 +39,7 @@ def families_of(
     weights: Mapping[tuple[str, ...], float],
     left: float,
     open_: Collection[str],
+    size_errors: Mapping[str, float],
 ) -> tuple[MissingFamily, ...]:
     """Families of the chosen hypothesis' effects, that with the largest share first.
 
@@ -47,6 +48,8 @@ def families_of(
     shares, weights : of the effects by label, and of the hypotheses by key.
     left : share of the mismatch that the chosen hypothesis is expected to leave.
     open_ : labels of its effects that are hardly true; what those of another family explain may be this one's as well.
+    size_errors : relative standard deviations of the effects' sizes, by label. The largest one of a family speaks for it: what is in a
+        limit of its law may be one of a law of another family.
     """
     labels: dict[str, list[str]] = {}
     for label, name in zip(chosen.elements, chosen.names):
@@ -57,7 +60,8 @@ def families_of(
         share = min(sum(shares[label] for label in mine), 1.0)
         others = [label for label in open_ if label not in mine]
         laws, held = _laws(contest, family, weights)
-        chance = chance_of_law(share, left + removed_by(others, chosen, contest)) * held
+        vague = size_errors.get(max(mine, key=lambda label: shares[label]), 0.0)
+        chance = chance_of_law(share, left + removed_by(others, chosen, contest), vague) * held
         own = [
             name for name in chosen.names if chosen.family.get(name) == family
         ]  # as good as those with more weight

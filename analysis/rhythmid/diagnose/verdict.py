@@ -241,7 +241,9 @@ def decide(
         left,
         1.0 - left.share,
         tuple(names[label] for label in labels if label not in named and label in chosen.effects),
-        families_of(contest, chosen, shares, weights, left.expected, open_) if rule.tells_family else (),
+        families_of(contest, chosen, shares, weights, left.expected, open_, size_errors)
+        if rule.tells_family
+        else (),
     )
 
 
