@@ -114,7 +114,7 @@ def _missing(fitted: Fitted, label: str, result: EffortResult) -> MissingEffect:
 def _remainder(result: EffortResult) -> Remainder:
     """What is left, as the decision has it, with the curve over the quantity that it names; effects that are granted no place have none."""
     left = result.decision.unexplained
-    drawn = next((one for one in result.remainder.curves if one.quantity == left.goes_with), None)
+    drawn = next((one for one in result.remainder if one.quantity == left.goes_with), None)
     curve = None if drawn is None else Curve(tuple(map(float, drawn.value)), tuple(map(float, drawn.mean)))
     return Remainder(left.share, left.significant, left.goes_with, curve)
 

@@ -41,7 +41,6 @@ from rhythmid.elements.element import Element
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import (
     Alignment,
-    condition_of,
     fit_effort,
     linearise,
     priors_of,
@@ -69,7 +68,6 @@ class EffortSearch:
     ruled_out : what was fitted, too, and explains no motion.
     reference, beyond : the nominal model, and the chosen one, with a free map beside them.
     chosen : the hypothesis with which the search ended.
-    condition : of the nominal model's scaled columns.
     not_tried : why candidates of the catalogue took no part, by name; and what the budget cut off.
     candidates : number of effects that were tried.
     cut_short : whether the budget ended the search.
@@ -83,7 +81,6 @@ class EffortSearch:
     chosen: Fitted
     reference: Linearised
     beyond: Linearised
-    condition: float
     not_tried: Mapping[str, str]
     candidates: int
     cut_short: bool = False
@@ -133,7 +130,7 @@ def search_effort(
         search.reduce(one)
     beyond = reference_of(balance, chosen, search.blocks)
     return EffortSearch(
-        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)) | search.cut, len(search.tried), bool(search.cut),
+        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, not_tried(catalogue, model, scales_of(balance, model)) | search.cut, len(search.tried), bool(search.cut),
     )  # fmt: skip
 
 

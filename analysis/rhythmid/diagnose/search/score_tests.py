@@ -39,9 +39,8 @@ from rhythmid.simulation.signal import first_order_hold, is_held
 from rhythmid.simulation.transport import delayed_command, delays, physical_times
 
 Array = NDArray[np.float64]
-FULL_PRECISION_ROWS = (
-    200_000  # averages in all, beyond which changes are kept to seven digits: a score needs no more
-)
+# averages in all, beyond which changes are kept to seven digits: a score needs no more
+FULL_PRECISION_ROWS = 200_000
 
 
 @dataclass(frozen=True)
@@ -390,9 +389,8 @@ def residual_line(fit: Fit) -> float:
     return float((place + (0.5 * (below - above) / bend if bend < 0.0 else 0.0)) / (length * period))
 
 
-def p_value(scores: Sequence[Score], inflation: float = 1.0) -> float:
+def p_value(scores: Sequence[Score]) -> float:
     """Probability of a best score as high as this where nothing is missing (Bonferroni over all guesses)."""
     if not scores:
         return 1.0
-    best = scores[0].statistic / max(inflation, 1.0)
-    return float(min(1.0, len(scores) * chi2_distribution.sf(best, 1)))
+    return float(min(1.0, len(scores) * chi2_distribution.sf(scores[0].statistic, 1)))
