@@ -228,5 +228,5 @@ def _moved(base: Trial, term: Term, place: Slot) -> Proposal:
         slot=place,
         initial=lambda x, v, f, **_: (x if measured else f,) * len(term.element.own),
     )
-    values = {name: value.value for name, value in term.values.items()}
+    values = term.numbers
     return propose(base.model, element, [values], base.added)

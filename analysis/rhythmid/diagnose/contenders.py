@@ -24,7 +24,7 @@ from rhythmid.diagnose.hypothesis import Hypothesis, Kind, family_of, names_of, 
 from rhythmid.diagnose.search.refit import whole_fit
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.errors import InputError
-from rhythmid.identify.noise import NoiseModel, runs
+from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, start_only
 from rhythmid.identify.series import Series, record_of
 from rhythmid.identify.start_cost import felt_starts, start_freedom
@@ -71,7 +71,7 @@ class Rows:
     @property
     def held(self) -> tuple[tuple[slice, ...], ...]:
         """Stretches of each separate series."""
-        return tuple(_long_enough(one, self.noise) for one in self.unseen)
+        return tuple(one.stretches(self.noise) for one in self.unseen)
 
     @property
     def heldout(self) -> NDArray[np.bool_]:
@@ -81,9 +81,9 @@ class Rows:
 
 def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseModel) -> Rows:
     """The rows of these series and of separate held-out ones, under a noise model."""
-    seen = tuple(_long_enough(one, noise) for one in series)
-    hidden = tuple(_long_enough(one, noise, True) for one in series)
-    others = tuple(_long_enough(one, noise) for one in unseen)
+    seen = tuple(one.stretches(noise) for one in series)
+    hidden = tuple(one.stretches(noise, hidden=True) for one in series)
+    others = tuple(one.stretches(noise) for one in unseen)
     names = list(dict.fromkeys(record_of(one) for one in series))
     other_names = list(dict.fromkeys(record_of(one) for one in unseen))
     lengths: list[tuple[int, int]] = []
@@ -130,9 +130,8 @@ def linearised(fit: Fit, rows: Rows) -> Linearised:
     there."""
     unseen = [_of_unseen(fit, rows)] if rows.unseen else []
     hidden = [
-        rows.noise.whiten(one.levelled(residual[part], part))
+        one.whitened(rows.noise, residual, parts)
         for one, residual, parts in zip(fit.run.series, fit.residuals, rows.hidden)
-        for part in parts
     ]
     residual = np.concatenate([fit.linearisation.residual, *hidden, *unseen])
     jacobian = np.zeros((len(residual), len(fit.names)))
@@ -159,18 +158,13 @@ def _of_unseen(fit: Fit, rows: Rows) -> Array:
     try:
         return start_only(fit.model, rows.unseen, rows.noise, fit.run.max_step).linearisation.residual
     except InputError:
+        motions = [one.averaged - one.averaged.mean() for one in rows.unseen]
         return np.concatenate(
             [
-                rows.noise.whiten(one.levelled(one.averaged[part] - one.averaged.mean(), part))
-                for one in rows.unseen
-                for part in _long_enough(one, rows.noise)
+                one.whitened(rows.noise, motion, parts)
+                for one, motion, parts in zip(rows.unseen, motions, rows.held)
             ]
         )
-
-
-def _long_enough(one: Series, noise: NoiseModel, hidden: bool = False) -> tuple[slice, ...]:
-    """Stretches of a series that are long enough to be whitened."""
-    return tuple(s for s in runs(one.counted(hidden)) if s.stop - s.start > noise.order + 1)
 
 
 @dataclass(frozen=True)

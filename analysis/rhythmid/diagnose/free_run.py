@@ -77,8 +77,6 @@ class FreeRunResult:
     """
 
     scoring: Scoring
-    series: tuple[Series, ...]
-    unseen: tuple[Series, ...]
     calibration: Calibration
     search: Search
     before: tuple[Dependence, ...]
@@ -177,8 +175,6 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     found = replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed))
     return FreeRunResult(
         scoring,
-        tuple(seen),
-        tuple(scoring.unseen),
         calibration,
         found,
         tuple(before),
@@ -267,11 +263,8 @@ def _with_jitter(scoring: Scoring) -> Calibration:
     if jitter is None:
         return found
     fit = weighed(found.fit, jitter)
-    return replace(found, fit=fit, series=fit.run.series, notes=(*found.notes, _sentence(jitter.words)))
-
-
-def _sentence(words: str) -> str:
-    return f"{words[0].upper()}{words[1:]}."
+    note = f"{jitter.words[0].upper()}{jitter.words[1:]}."
+    return replace(found, fit=fit, series=fit.run.series, notes=(*found.notes, note))
 
 
 def _trial_of(hypothesis: Hypothesis, contenders: Sequence[Contender]) -> Trial:

@@ -369,11 +369,9 @@ class _Search:
         return replace(made, shape={"within_bounds": min(ends, default=math.inf)})
 
     def _aligned(self, elements: Sequence[str]) -> Alignment:
-        usual = Alignment.of(self.balance)
         if INPUT_DELAY not in elements:
-            return usual
-        most = late_start(self.balance, self.nominal.fit)[0]
-        return most
+            return Alignment.of(self.balance)
+        return late_start(self.balance, self.nominal.fit)[0]
 
     def _known(self, fitted: Fitted) -> bool:
         return any(set(one.elements) == set(fitted.elements) for one in self.found)

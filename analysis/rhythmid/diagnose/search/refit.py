@@ -176,17 +176,8 @@ def _hopped(
             if not low < value < high:
                 continue
             moved = before.model.with_values({name: value})
-            again = descend(
-                moved,
-                run,
-                names,
-                noise,
-                before.starts,
-                BRIEF,
-                None,
-                TOLERANCE,
-                similar=_steps(before, run, [name]),
-            )
+            steps = _steps(before, run, [name])
+            again = descend(moved, run, names, noise, before.starts, BRIEF, None, TOLERANCE, similar=steps)
             best = min(best, again, key=lambda end: end.chi2)
         if best.chi2 > before.chi2 - 1.0:
             break
@@ -332,18 +323,6 @@ def whole_fit(
     )  # fmt: skip
 
 
-def _again(
-    trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int, reach: float
-) -> Outcome:
-    """Where a trial's descent under a noise model ends; without `iterations`, the trial as it is."""
-    run = _run_of(trial, series, noise, max_step)
-    names = tuple(trial.model.free)
-    end = descend(
-        trial.model, run, names, noise, trial.starts, iterations, None, TOLERANCE, trial.differences, reach
-    )
-    return outcome_of(end, run, noise)
-
-
 def under_noise(
     trials: Sequence[Trial],
     series: Sequence[Series],
@@ -353,12 +332,25 @@ def under_noise(
     reach: float = math.inf,
 ) -> list[Trial]:
     """The trials, best first, all under one noise model: those that were fitted under another are fitted again, as far as they may
-    come to `reach`."""
+    come to `reach`; without `iterations` they stay as they are."""
     done = [trial for trial in trials if _settled(trial, noise)]
     others = [trial for trial in trials if not _settled(trial, noise)]
 
     def one(trial: Trial) -> Outcome:
-        return _again(trial, series, noise, max_step, iterations, reach)
+        run, names = _run_of(trial, series, noise, max_step), tuple(trial.model.free)
+        end = descend(
+            trial.model,
+            run,
+            names,
+            noise,
+            trial.starts,
+            iterations,
+            None,
+            TOLERANCE,
+            trial.differences,
+            reach,
+        )
+        return outcome_of(end, run, noise)
 
     again = [
         trial_of(others[index].added, others[index].model, result, noise)
