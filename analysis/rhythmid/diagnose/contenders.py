@@ -19,16 +19,16 @@ from rhythmid.diagnose.evidence import (
     Whole,
     cross_validate,
     prediction,
+    time_of_best,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, family_of, names_of, richer_of
 from rhythmid.diagnose.search.refit import whole_fit
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.errors import InputError
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.output_error import Fit, start_only
+from rhythmid.identify.output_error import Fit, rerun
 from rhythmid.identify.series import Series, record_of
 from rhythmid.identify.start_cost import felt_starts, start_freedom
-from rhythmid.identify.student import autocorrelation_time
 from rhythmid.parallel import fork_map
 from rhythmid.progress import Tell, counted, silent
 
@@ -155,16 +155,12 @@ def _at_bound(fit: Fit) -> NDArray[np.bool_]:
 def _of_unseen(fit: Fit, rows: Rows) -> Array:
     """What a fit leaves of separate held-out records, only their initial states estimated; of a model that diverges there, which
     predicts nothing, the motion itself."""
-    try:
-        return start_only(fit.model, rows.unseen, rows.noise, fit.run.max_step).linearisation.residual
-    except InputError:
-        motions = [one.averaged - one.averaged.mean() for one in rows.unseen]
-        return np.concatenate(
-            [
-                one.whitened(rows.noise, motion, parts)
-                for one, motion, parts in zip(rows.unseen, motions, rows.held)
-            ]
-        )
+    again = rerun(fit.model, rows.unseen, rows.noise, fit.run.max_step)
+    if again is not None:
+        return again.linearisation.residual
+    motions = [one.averaged - one.averaged.mean() for one in rows.unseen]
+    cases = zip(rows.unseen, motions, rows.held)
+    return np.concatenate([one.whitened(rows.noise, motion, parts) for one, motion, parts in cases])
 
 
 @dataclass(frozen=True)
@@ -257,8 +253,7 @@ def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> 
 
 def remembered(contenders: Sequence[Contender], rows: Rows) -> float:
     """Autocorrelation time in rows of the errors of the contender that predicts best."""
-    best = min(contenders, key=lambda one: float(np.sum(one.found.error**2)))
-    return autocorrelation_time(best.found.error, rows.record)
+    return time_of_best([one.found for one in contenders], rows.record)
 
 
 def heldout_error(error: Array, rows: Rows) -> float | None:

@@ -208,9 +208,14 @@ def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[P
     found = [cross_validate(fit, blocks) for fit in fits]
     if not found:
         return []
-    best = min(found, key=lambda one: float(np.sum(one.error**2)))
-    time = autocorrelation_time(best.error, record)
+    time = time_of_best(found, record)
     return [prediction(one, blocks, time) for one in found]
+
+
+def time_of_best(found: Sequence[CrossValidated], record: Whole) -> float:
+    """Autocorrelation time in rows of the errors of what predicts best."""
+    best = min(found, key=lambda one: float(np.sum(one.error**2)))
+    return autocorrelation_time(best.error, record)
 
 
 def difference(first: Prediction, second: Prediction) -> tuple[float, float]:

@@ -17,10 +17,9 @@ from rhythmid.diagnose.contenders import Rows, linearised
 from rhythmid.diagnose.evidence import CrossValidated, Linearised, cross_validate
 from rhythmid.diagnose.free_functions import FreeMap, free_maps
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
-from rhythmid.errors import InputError
 from rhythmid.freed_memory import give_back
 from rhythmid.identify.free_run import prepare_run
-from rhythmid.identify.output_error import Fit, start_only
+from rhythmid.identify.output_error import Fit, rerun
 
 Array = NDArray[np.float64]
 RIDGE = 1e-4  # prior precision of a coefficient, relative to the information that all rows have of it
@@ -71,11 +70,8 @@ def _parts(rows: Rows) -> list[tuple[Sequence[slice], Sequence[slice]]]:
 def with_held_out(fit: Fit, rows: Rows) -> Fit:
     """The fit with its runs over the separate held-out records beside those that it saw; the fit itself without any, or where it diverges
     there."""
-    if not rows.unseen:
-        return fit
-    try:
-        beyond = start_only(fit.model, rows.unseen, rows.noise, fit.run.max_step)
-    except InputError:
+    beyond = rerun(fit.model, rows.unseen, rows.noise, fit.run.max_step)
+    if beyond is None:
         return fit
     return replace(
         fit,

@@ -27,10 +27,9 @@ from rhythmid.diagnose.evidence import difference
 from rhythmid.diagnose.free_run import FreeRunResult
 from rhythmid.diagnose.selection import Contest
 from rhythmid.diagnose.verdict import Decision
-from rhythmid.errors import InputError
 from rhythmid.identify.held_out_zeros import held_out_zero_notes
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.output_error import Fit, start_only
+from rhythmid.identify.output_error import Fit, rerun
 from rhythmid.identify.repeats import noise_from_repeats
 from rhythmid.identify.series import Series
 from rhythmid.identify.zero_estimates import zeros_told
@@ -209,8 +208,5 @@ def _floor(series: Sequence[Series], noises: Sequence[NoiseModel]) -> float:
 def _nominal_error(nominal: Model, fit: Fit, noise: NoiseModel) -> float | None:
     """Error of the nominal model exactly as given, its initial states fitted; None where it diverges."""
     values = {name: value.value for name, value in nominal.parameters.items() if name in fit.model.parameters}
-    try:
-        again = start_only(fit.model.with_values(values), fit.run.series, noise, fit.run.max_step)
-    except InputError:
-        return None
-    return again.nrmse()
+    again = rerun(fit.model.with_values(values), fit.run.series, noise, fit.run.max_step)
+    return None if again is None else again.nrmse()

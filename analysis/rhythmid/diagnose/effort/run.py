@@ -23,6 +23,7 @@ from rhythmid.diagnose.evidence import (
     cross_validate,
     detectable,
     prediction,
+    time_of_best,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.model_uncertainty import covariance_between
@@ -35,7 +36,6 @@ from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit, variation_of
 from rhythmid.identify.robust_covariance import root_weights, weighted, with_robust_std
-from rhythmid.identify.student import autocorrelation_time
 
 Array = NDArray[np.float64]
 
@@ -137,9 +137,7 @@ def effort_run(
     if (beside := left[0].joint) is not None:
         coupled = reference_of(found.balance, found.chosen, found.blocks, beside)
         mapped[left[0].quantity] = rows.predicted(found, found.chosen, coupled, beside)
-    every = [*predicted.values(), *mapped.values()]
-    best = min(every, key=lambda one: float(np.sum(one.error**2)))
-    time = autocorrelation_time(best.error, rows.record)
+    time = time_of_best([*predicted.values(), *mapped.values()], rows.record)
 
     def made(one: CrossValidated) -> Prediction:
         return prediction(one, rows.blocks, time)
