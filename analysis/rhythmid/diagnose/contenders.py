@@ -21,7 +21,7 @@ from rhythmid.diagnose.evidence import (
     prediction,
     time_of_best,
 )
-from rhythmid.diagnose.hypothesis import Hypothesis, Kind, family_of, names_of, richer_of
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind
 from rhythmid.diagnose.search.refit import whole_fit
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.errors import InputError
@@ -235,17 +235,15 @@ def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> 
     """The contenders as hypotheses, under the autocorrelation time of the one that predicts best."""
     time = remembered(contenders, rows)
     return [
-        Hypothesis(
+        Hypothesis.of(
+            one.trial.model,
             one.trial.added,
-            names_of(one.trial.model, one.trial.added),
             one.kind,
             one.trial.free,
             prediction(one.found, rows.blocks, time, one.error),
             heldout_error(one.error, rows),
             shape(one.trial) if one.kind == "effects" else {},
-            richer_of(one.trial.model, one.trial.added),
             one.values,
-            family_of(one.trial.model, one.trial.added),
         )
         for one in contenders
     ]
