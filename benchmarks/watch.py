@@ -26,9 +26,10 @@ from numpy.typing import NDArray
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.identify import identify
 from rhythmid.model import INERTIA, Model
+from rhythmid.record.clock_time import DAY
 from rhythmid.record.record import Channel, Record
 from rhythmid.twin.changes import DELAYS
-from rhythmid.twin.settings import DAY, Settings
+from rhythmid.twin.settings import Settings
 from rhythmid.twin.twin import Status, Twin
 
 Array = NDArray[np.float64]

@@ -352,7 +352,7 @@ def _forcing(given: Forcing | None, model: Model) -> tuple[Forcing, Model]:
     term = model.term("periodic_forcing")
     if term is None or given is not None:
         return given or Forcing(), model if term is None else model.without("periodic_forcing")
-    return Forcing(**{name: value.value for name, value in term.values.items()}), model
+    return Forcing(**term.numbers), model
 
 
 def _experiment(

@@ -34,6 +34,11 @@ class Term:
     values: Mapping[str, Value]
 
     @property
+    def numbers(self) -> dict[str, float]:
+        """Values of its parameters by name, in the model's units."""
+        return {name: value.value for name, value in self.values.items()}
+
+    @property
     def against(self) -> Against | None:
         """Against what a friction or a damper acts; None where that is no choice."""
         return self.element.against

@@ -20,7 +20,7 @@ from rhythmid.proof.draw import draw_case
 from rhythmid.proof.examine import _records
 from rhythmid.proof.machines.designs import DESIGNS
 from rhythmid.proof.perform import JUDGE, LEARN, NOMINAL, perform
-from rhythmid.proof.replay import redecider, replay, replay_campaign, told_hashes
+from rhythmid.proof.replay import replay_campaign, told_hashes
 from rhythmid.proof.seal import seal, truth_of
 from rhythmid.record.read import load_records
 
@@ -103,35 +103,15 @@ def kept(catalogue, tmp_path) -> tuple[Path, Campaign]:
     return out, campaign
 
 
-def test_kept_answers_are_scored_again_without_touching_the_campaign(kept):
+def test_kept_answers_are_scored_by_a_verdict_reached_anew_without_touching_the_campaign(kept):
     out, campaign = kept
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
-    (one,), _ = replay_campaign(out, campaign, campaign.tasks)
+    (one,), anew = replay_campaign(out, campaign, campaign.tasks)
+    assert anew == 1 and (one.seconds, one.processor_seconds) == (2.0, 3.0)
     assert one.false_alarm and one.stated_wrong == ("quadratic_drag",)
     assert "--replay" in (out / "replay.md").read_text()
     assert json.loads((out / "replay.json").read_text())["cases"][0]["case"] == one.case
     assert {path: path.read_bytes() for path in before} == before
-
-
-def test_a_verdict_is_reached_anew_from_the_evidence_that_an_answer_holds():
-    asked = []
-
-    def redecide(answer):
-        asked.append(answer["evidence"])
-        return {"verdict": "consistent", "missing": []}
-
-    plain = {"verdict": "undecided", "seconds": 1.0, "processor_seconds": 2.0}
-    assert (
-        replay(plain, redecide) is plain and replay({**plain, "evidence": {}}, None)["verdict"] == "undecided"
-    )
-    anew = replay({**plain, "evidence": {"scores": []}}, redecide)
-    assert anew["verdict"] == "consistent" and anew["processor_seconds"] == 2.0
-    assert asked == [{"scores": []}]
-
-
-def test_replay_does_without_a_diagnosis_that_decides_anew(monkeypatch):
-    monkeypatch.setattr("rhythmid.proof.replay.REDECIDES", "rhythmid.diagnose.not_there")
-    assert redecider() is None
 
 
 def test_a_folder_without_answers_cannot_be_replayed(tmp_path):

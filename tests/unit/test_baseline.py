@@ -123,12 +123,12 @@ def noticed(monkeypatch, delay: float, tick: float, period: float) -> tuple[base
 @pytest.mark.parametrize(("tick", "period"), [(0.01, 0.05), (0.01, 0.01), (0.01, 0.004)])
 def test_how_late_a_held_input_acts_is_told_in_samples_of_its_own(monkeypatch, tick, period):
     found, told = noticed(monkeypatch, -0.5 * tick, tick, period)
-    assert found.late_by == pytest.approx(0.5) and found.reconstructed
+    assert "about half a sample late" in found.notes[0] and found.reconstructed
     assert told == ["the held input is late by 0.50 sample; reconstructing it between its samples"]
 
 
 def test_a_delay_of_many_samples_of_the_input_is_not_put_down_to_holding(monkeypatch):
     found, told = noticed(monkeypatch, -0.06, 0.01, 0.05)
     (note,) = found.notes
-    assert found.late_by is None and not found.reconstructed and told == []
+    assert not found.reconstructed and told == []
     assert "-60.000" in note and "(-6.0 of its samples)" in note and "clocks" in note

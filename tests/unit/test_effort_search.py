@@ -11,7 +11,6 @@ from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.diagnosis import diagnose
 from rhythmid.diagnose.effort import search as module
 from rhythmid.diagnose.effort.fitted import Fitted
-from rhythmid.diagnose.effort.held_out import HeldOut
 from rhythmid.diagnose.effort.kin import contained
 from rhythmid.diagnose.effort.reference import residual_with_map
 from rhythmid.diagnose.effort.remainder import remainder_of
@@ -30,6 +29,11 @@ def errors_of(found: EffortSearch, *hypotheses: Fitted) -> list[float]:
     """Mean squared errors with which these, and last a free map beside the nominal model, predict what their fits did not see."""
     fits = [*(one.linearised for one in hypotheses), found.reference.linearised]
     return [one.mean_square for one in predict(fits, found.blocks, found.balance.record)]
+
+
+def left_of(balance: Balance, fitted: Fitted) -> np.ndarray:
+    """Predicted less recorded effort (n,)."""
+    return balance.predicted(fitted.fit.model, fitted.fit.alignment) - balance.measured
 
 
 @pytest.fixture(scope="module")
@@ -65,8 +69,9 @@ def test_a_name_predicts_no_worse_than_unknown_physics(friction):
 def test_what_is_left_by_the_nominal_model_goes_with_the_speed(friction):
     before = remainder_of(friction.balance, friction.nominal)
     after = remainder_of(friction.balance, friction.chosen)
-    assert before.goes_with == "velocity" and before.curves[0].share > 0.5
-    assert after.size < 0.3 * before.size and after.curves[0].share < 0.1
+    assert before[0].quantity == "velocity" and before[0].share > 0.5
+    assert np.std(friction.chosen.fit.residual) < 0.3 * np.std(friction.nominal.fit.residual)
+    assert after[0].share < 0.1
 
 
 def test_all_hypotheses_predict_the_same_rows(friction):
@@ -168,9 +173,10 @@ def test_a_law_that_the_catalogue_lacks_is_predicted_by_the_map():
 
 
 def test_effort_of_a_record_that_no_fit_has_seen_is_predicted(friction):
-    unseen = HeldOut.of([axis(7, amplitude=0.5)], axis_model(), friction.balance)
-    assert unseen.error(friction.chosen) < 0.06  # the noise is a twentieth of the effort
-    assert unseen.error(friction.nominal) > 2.0 * unseen.error(friction.chosen)
+    unseen = Balance.of([axis(7, amplitude=0.5)], axis_model(), friction.balance.bandwidth)
+    chosen, nominal = (np.std(left_of(unseen, one)) for one in (friction.chosen, friction.nominal))
+    assert chosen < 0.06 * variation_of(unseen)  # the noise is a twentieth of the effort
+    assert nominal > 2.0 * chosen
 
 
 def test_a_free_map_predicts_held_out_records_as_it_predicts_its_own(friction):
@@ -178,9 +184,9 @@ def test_a_free_map_predicts_held_out_records_as_it_predicts_its_own(friction):
     seen = found.balance
     again = residual_with_map(seen, found.nominal, found.reference)
     np.testing.assert_allclose(again, found.reference.linearised.residual, atol=0.05 * variation_of(seen))
-    unseen = HeldOut.of([axis(7)], axis_model(), seen)
-    mapped = residual_with_map(unseen.balance, found.nominal, found.reference)
-    plain = unseen.residual(found.nominal)
+    unseen = Balance.of([axis(7)], axis_model(), seen.bandwidth)
+    mapped = residual_with_map(unseen, found.nominal, found.reference)
+    plain = left_of(unseen, found.nominal)
     assert np.sqrt(np.mean(mapped**2)) < 0.5 * np.sqrt(np.mean(plain**2))
 
 

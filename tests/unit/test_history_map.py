@@ -6,10 +6,10 @@ import numpy as np
 from axes import CATALOGUE, axis, axis_model
 
 from rhythmid.diagnose.diagnosis import diagnose
-from rhythmid.diagnose.effort.held_out import HeldOut
 from rhythmid.diagnose.effort.reference import HISTORY, history_of, residual_with_map
 from rhythmid.diagnose.effort.search import search_effort
 from rhythmid.diagnose.evidence import cross_validate
+from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import variation_of
 from rhythmid.identify.inverse_dynamics.history_map import stop
 
@@ -54,9 +54,10 @@ def test_a_function_of_the_past_predicts_records_that_it_has_not_seen():
     map_ = history_of(found.balance, found.nominal, found.blocks)
     again = residual_with_map(found.balance, found.nominal, map_)
     np.testing.assert_allclose(again, map_.linearised.residual, atol=0.05 * variation_of(found.balance))
-    unseen = HeldOut.of([hysteretic(7)], axis_model(), found.balance)
-    plain = unseen.residual(found.nominal)
-    mapped = residual_with_map(unseen.balance, found.nominal, map_)
+    unseen = Balance.of([hysteretic(7)], axis_model(), found.balance.bandwidth)
+    fit = found.nominal.fit
+    plain = unseen.predicted(fit.model, fit.alignment) - unseen.measured
+    mapped = residual_with_map(unseen, found.nominal, map_)
     assert np.sqrt(np.mean(mapped**2)) < 0.8 * np.sqrt(np.mean(plain**2))
 
 

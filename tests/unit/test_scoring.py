@@ -180,7 +180,7 @@ def tried(monkeypatch: pytest.MonkeyPatch, *errors: float) -> tuple[list[Scoring
 
     monkeypatch.setattr(scoring, "_ladder", ladder)
     monkeypatch.setattr(scoring, "calibrate", calibrated)
-    monkeypatch.setattr(scoring, "_error", lambda fit: fit.error)
+    monkeypatch.setattr(Scoring, "error", property(lambda made: made.calibration.fit.error))
     monkeypatch.setattr(scoring, "hold_out_tail", lambda cut: (cut, ()))
     monkeypatch.setattr(
         scoring, "with_zeros", lambda calibration, _, unseen, *__: (calibration, list(unseen))

@@ -8,6 +8,7 @@ from contests import NOMINAL, contest, decided, friction, predicted, supposed
 from rhythmid.diagnose.answer.result import FitQuality, MissingEffect
 from rhythmid.diagnose.answer.wording import freed_value, listed, summary_of
 from rhythmid.diagnose.family import MissingFamily
+from rhythmid.diagnose.hypothesis import Hypothesis
 from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.identify.identify import paper_hopper
 from rhythmid.model import Model
@@ -57,6 +58,11 @@ def test_where_something_else_leaves_it_undecided_rivals_are_told_beside_the_rea
     assert said.endswith("with these effects either. These records do not separate a and b.")
 
 
+def freed(*elements: str) -> Hypothesis:
+    """The hypothesis that these are its effects and freed values."""
+    return replace(NOMINAL, elements=elements, kind="freed_value")
+
+
 @pytest.mark.parametrize(
     ("elements", "said"),
     [
@@ -69,7 +75,7 @@ def test_where_something_else_leaves_it_undecided_rivals_are_told_beside_the_rea
 def test_a_freed_value_is_told_wherever_it_stands_among_the_effects(elements, said):
     fitted = paper_hopper().with_element(load_catalogue()["coulomb_friction"], {"force": 0.1})
     fitted = fitted.with_values({"inertia.mass": 0.3})
-    assert said in freed_value(paper_hopper(), fitted, elements)
+    assert said in freed_value(paper_hopper(), fitted, freed(*elements))
 
 
 def test_a_second_effect_whose_family_alone_is_certain_is_told_beside_the_first():
@@ -87,4 +93,4 @@ def test_a_pure_number_is_told_without_a_unit(unit, told):
         f"units: {{mass: '{unit}', force: '{unit}*m/s^2'}}\n"
         f"inertia: {{mass: {{value: 2.0, unit: '{unit}', fixed: true}}}}\nforce: [viscous_damper: {{damping: {{value: 1.0}}}}]"
     )
-    assert told in freed_value(model, model, ("inertia.mass",))
+    assert told in freed_value(model, model, freed("inertia.mass"))

@@ -264,7 +264,7 @@ def start_states(
             if not element.own or element.initial is None:
                 continue
             borrowed = {n: model.borrowed(s, default) for n, (s, default) in element.borrows.items()}
-            values = {n: value.value for n, value in term.values.items()} | borrowed
+            values = term.numbers | borrowed
             signal = (
                 asked if element.slot == "command" else _effort(model, x, v, asked) + float(forcing[place])
             )
@@ -277,7 +277,7 @@ def _effort(model: Model, position: float, velocity: float, command: float) -> f
     """What a controller in the path asks for at this command; the command where there is none."""
     for term in model.terms:
         if term.element.acts == "feedback" and not term.element.own and term.element.kernel is not None:
-            values = {name: value.value for name, value in term.values.items()}
+            values = term.numbers
             return float(term.element.kernel(command, position, velocity, 0.0, **values))
     return command
 

@@ -29,7 +29,7 @@ class SoftConstraint:
     @classmethod
     def of(cls, term: Term, mass: float) -> "SoftConstraint":
         """The friction of a term, of a path with this inertia."""
-        values = {name: value.value for name, value in term.values.items()}
+        values = term.numbers
         return cls(values["force"], values["softness"] / mass, values["lead"])
 
     def solver(self, weight: float, step: float) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -15,6 +15,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import fminbound
 
 from rhythmid.ltp.pumping import active_pumping
+from rhythmid.record.outlier import USUAL
 from rhythmid.record.record import Channel, Record
 from rhythmid.simulation.signal import fast_length
 
@@ -59,7 +60,7 @@ def white_level(value: Array) -> float:
     """Standard deviation of the white part of a smooth signal's samples, by their third differences."""
     if len(value) < 16:
         return 0.0
-    return float(1.4826 * np.median(np.abs(np.diff(value, 3))) / math.sqrt(20.0))
+    return float(USUAL * np.median(np.abs(np.diff(value, 3))) / math.sqrt(20.0))
 
 
 def align(simulation: Record, recording: Record) -> Alignment:

@@ -165,6 +165,4 @@ class Requirements:
 def forcing_of(model: Model) -> Forcing:
     """The model's own forcing where it has one, else the paper's."""
     term = model.term("periodic_forcing")
-    return (
-        Forcing() if term is None else Forcing(**{name: value.value for name, value in term.values.items()})
-    )
+    return Forcing() if term is None else Forcing(**term.numbers)

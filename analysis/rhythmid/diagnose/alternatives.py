@@ -76,15 +76,14 @@ def alternatives(
         "free_map": list(_one_law(chosen, known, sizes)),
         "effects": [*kin, *_reduced(chosen, weighed)],
     }
-    proposals = {tuple(sorted(one.added)): one for group in made.values() for one in group}
-    kinds: dict[tuple[str, ...], Kind] = {
-        tuple(sorted(one.added)): kind for kind, group in made.items() for one in group
+    kept: dict[tuple[str, ...], tuple[Proposal, Kind]] = {
+        tuple(sorted(one.added)): (one, kind) for kind, group in made.items() for one in group
     }
-    if not kinds:
+    if not kept:
         return []
-    given = list(proposals.values())
+    given = [one for one, _ in kept.values()]
     trials, _ = run_trials(given, series, Origin.of(chosen), noise, step, reach=reach, tell=tell)
-    return [(trial, kinds[tuple(sorted(trial.added))]) for trial in trials]
+    return [(trial, kept[tuple(sorted(trial.added))][1]) for trial in trials]
 
 
 def _reduced(chosen: Trial, weighed: Sequence[Trial]) -> Iterator[Proposal]:
@@ -228,5 +227,5 @@ def _moved(base: Trial, term: Term, place: Slot) -> Proposal:
         slot=place,
         initial=lambda x, v, f, **_: (x if measured else f,) * len(term.element.own),
     )
-    values = {name: value.value for name, value in term.values.items()}
+    values = term.numbers
     return propose(base.model, element, [values], base.added)

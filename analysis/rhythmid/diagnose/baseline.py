@@ -30,12 +30,8 @@ from rhythmid.value import Prior
 NO_ORIGIN = "No position was measured, so that its origin is arbitrary: the spring's rest length is kept as it was given."
 EVEN = 1e-3  # of the period; spread of the times between samples that still counts as even
 SETTLED = 0.1  # error, as a share of the motion, up to which a fit is not begun again from short windows
-FAR_DELAYS = (
-    0.03,
-    0.08,
-    0.15,
-    0.25,
-)  # [s] at which another minimum is sought: from a few samples to a slow network
+# [s] at which another minimum is sought: from a few samples to a slow network
+FAR_DELAYS = (0.03, 0.08, 0.15, 0.25)
 
 
 @dataclass(frozen=True)
@@ -48,8 +44,6 @@ class Calibration:
     fit: Fit
     series: tuple[Series, ...]
     notes: tuple[str, ...]
-    # [samples of the input] how late a held input acts, where that shows it is not held
-    late_by: float | None
     reconstructed: bool = False
 
 
@@ -200,7 +194,7 @@ def _hold(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None, t
     predicts the next sample better decides, as far as a model can that may lack something. Holding delays by half a sample of the
     command, so that one of many samples has another cause.
     """
-    kept = Calibration(fit, tuple(series), (), None)
+    kept = Calibration(fit, tuple(series), ())
     held = [one for one in series if one.command is not None and is_held(one.command)]
     if INPUT_DELAY not in fit.names or not held or fit.nrmse() > FOLLOWS:
         return kept
@@ -223,6 +217,6 @@ def _hold(fit: Fit, series: Sequence[Series], pool: ThreadPoolExecutor | None, t
     smooth = [reconstructed(one) for one in series]
     again = estimate(fit.model.with_values({INPUT_DELAY: 0.0}), smooth, pool=pool)
     if again.noise.std > fit.noise.std:
-        return replace(kept, notes=(note + " Holding it fits better all the same.",), late_by=late)
+        return replace(kept, notes=(note + " Holding it fits better all the same.",))
     note += " The input is not held but band-limited; it is reconstructed so in all that follows."
-    return Calibration(again, tuple(smooth), (note,), late, reconstructed=True)
+    return Calibration(again, tuple(smooth), (note,), reconstructed=True)

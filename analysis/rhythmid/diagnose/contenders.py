@@ -19,16 +19,16 @@ from rhythmid.diagnose.evidence import (
     Whole,
     cross_validate,
     prediction,
+    time_of_best,
 )
-from rhythmid.diagnose.hypothesis import Hypothesis, Kind, family_of, names_of, richer_of
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind
 from rhythmid.diagnose.search.refit import whole_fit
 from rhythmid.diagnose.search.trial import Trial
 from rhythmid.errors import InputError
-from rhythmid.identify.noise import NoiseModel, runs
-from rhythmid.identify.output_error import Fit, start_only
+from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.output_error import Fit, rerun
 from rhythmid.identify.series import Series, record_of
 from rhythmid.identify.start_cost import felt_starts, start_freedom
-from rhythmid.identify.student import autocorrelation_time
 from rhythmid.parallel import fork_map
 from rhythmid.progress import Tell, counted, silent
 
@@ -71,7 +71,7 @@ class Rows:
     @property
     def held(self) -> tuple[tuple[slice, ...], ...]:
         """Stretches of each separate series."""
-        return tuple(_long_enough(one, self.noise) for one in self.unseen)
+        return tuple(one.stretches(self.noise) for one in self.unseen)
 
     @property
     def heldout(self) -> NDArray[np.bool_]:
@@ -81,9 +81,9 @@ class Rows:
 
 def rows_of(series: Sequence[Series], unseen: Sequence[Series], noise: NoiseModel) -> Rows:
     """The rows of these series and of separate held-out ones, under a noise model."""
-    seen = tuple(_long_enough(one, noise) for one in series)
-    hidden = tuple(_long_enough(one, noise, True) for one in series)
-    others = tuple(_long_enough(one, noise) for one in unseen)
+    seen = tuple(one.stretches(noise) for one in series)
+    hidden = tuple(one.stretches(noise, hidden=True) for one in series)
+    others = tuple(one.stretches(noise) for one in unseen)
     names = list(dict.fromkeys(record_of(one) for one in series))
     other_names = list(dict.fromkeys(record_of(one) for one in unseen))
     lengths: list[tuple[int, int]] = []
@@ -130,9 +130,8 @@ def linearised(fit: Fit, rows: Rows) -> Linearised:
     there."""
     unseen = [_of_unseen(fit, rows)] if rows.unseen else []
     hidden = [
-        rows.noise.whiten(one.levelled(residual[part], part))
+        one.whitened(rows.noise, residual, parts)
         for one, residual, parts in zip(fit.run.series, fit.residuals, rows.hidden)
-        for part in parts
     ]
     residual = np.concatenate([fit.linearisation.residual, *hidden, *unseen])
     jacobian = np.zeros((len(residual), len(fit.names)))
@@ -156,21 +155,12 @@ def _at_bound(fit: Fit) -> NDArray[np.bool_]:
 def _of_unseen(fit: Fit, rows: Rows) -> Array:
     """What a fit leaves of separate held-out records, only their initial states estimated; of a model that diverges there, which
     predicts nothing, the motion itself."""
-    try:
-        return start_only(fit.model, rows.unseen, rows.noise, fit.run.max_step).linearisation.residual
-    except InputError:
-        return np.concatenate(
-            [
-                rows.noise.whiten(one.levelled(one.averaged[part] - one.averaged.mean(), part))
-                for one in rows.unseen
-                for part in _long_enough(one, rows.noise)
-            ]
-        )
-
-
-def _long_enough(one: Series, noise: NoiseModel, hidden: bool = False) -> tuple[slice, ...]:
-    """Stretches of a series that are long enough to be whitened."""
-    return tuple(s for s in runs(one.counted(hidden)) if s.stop - s.start > noise.order + 1)
+    again = rerun(fit.model, rows.unseen, rows.noise, fit.run.max_step)
+    if again is not None:
+        return again.linearisation.residual
+    motions = [one.averaged - one.averaged.mean() for one in rows.unseen]
+    cases = zip(rows.unseen, motions, rows.held)
+    return np.concatenate([one.whitened(rows.noise, motion, parts) for one, motion, parts in cases])
 
 
 @dataclass(frozen=True)
@@ -245,17 +235,15 @@ def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> 
     """The contenders as hypotheses, under the autocorrelation time of the one that predicts best."""
     time = remembered(contenders, rows)
     return [
-        Hypothesis(
+        Hypothesis.of(
+            one.trial.model,
             one.trial.added,
-            names_of(one.trial.model, one.trial.added),
             one.kind,
             one.trial.free,
             prediction(one.found, rows.blocks, time, one.error),
             heldout_error(one.error, rows),
             shape(one.trial) if one.kind == "effects" else {},
-            richer_of(one.trial.model, one.trial.added),
             one.values,
-            family_of(one.trial.model, one.trial.added),
         )
         for one in contenders
     ]
@@ -263,8 +251,7 @@ def hypotheses_of(contenders: Sequence[Contender], rows: Rows, shape: Shape) -> 
 
 def remembered(contenders: Sequence[Contender], rows: Rows) -> float:
     """Autocorrelation time in rows of the errors of the contender that predicts best."""
-    best = min(contenders, key=lambda one: float(np.sum(one.found.error**2)))
-    return autocorrelation_time(best.found.error, rows.record)
+    return time_of_best([one.found for one in contenders], rows.record)
 
 
 def heldout_error(error: Array, rows: Rows) -> float | None:

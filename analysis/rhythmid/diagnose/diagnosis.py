@@ -83,7 +83,7 @@ class Answer(Result):
     @property
     def block(self) -> int:
         """Samples that were averaged before they were compared."""
-        return self.result.series[0].block if isinstance(self.result, FreeRunResult) else 1
+        return self.result.calibration.series[0].block if isinstance(self.result, FreeRunResult) else 1
 
     @property
     def stands(self) -> bool:

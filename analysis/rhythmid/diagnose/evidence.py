@@ -195,13 +195,7 @@ def prediction(
     """
     seen = blocks.fold != UNSEEN
     counts = blocks.sums(np.ones(len(found.error)))
-    density = block_densities(
-        blocks.split(found.error),
-        found.scale,
-        time,
-        seen,
-        blocks.least,
-    )
+    density = block_densities(blocks.split(found.error), found.scale, time, seen, blocks.least)
     error = found.error if measured is None else measured
     return Prediction(density - found.penalty * counts * seen / time, blocks.sums(error**2), counts, ~seen)
 
@@ -214,9 +208,14 @@ def predict(fits: Sequence[Linearised], blocks: Blocks, record: Whole) -> list[P
     found = [cross_validate(fit, blocks) for fit in fits]
     if not found:
         return []
-    best = min(found, key=lambda one: float(np.sum(one.error**2)))
-    time = autocorrelation_time(best.error, record)
+    time = time_of_best(found, record)
     return [prediction(one, blocks, time) for one in found]
+
+
+def time_of_best(found: Sequence[CrossValidated], record: Whole) -> float:
+    """Autocorrelation time in rows of the errors of what predicts best."""
+    best = min(found, key=lambda one: float(np.sum(one.error**2)))
+    return autocorrelation_time(best.error, record)
 
 
 def difference(first: Prediction, second: Prediction) -> tuple[float, float]:
@@ -274,19 +273,19 @@ def _summed(gain: Array) -> tuple[float, float]:
     return float(gain.sum()), error
 
 
-def _resampled(count: int, seed: int = 0) -> Array:
+def _resampled(count: int) -> Array:
     """Weights (draws, count) of the Bayesian bootstrap of so many blocks; each draw sums to one."""
-    return np.random.default_rng(seed).dirichlet(np.ones(count), DRAWS)
+    return np.random.default_rng(0).dirichlet(np.ones(count), DRAWS)
 
 
-def probabilities(hypotheses: Sequence[Hypothesis], seed: int = 0) -> Array:
+def probabilities(hypotheses: Sequence[Hypothesis]) -> Array:
     """Probability (h,) of each hypothesis among these: pseudo-BMA weights under the Bayesian bootstrap of the blocks."""
     if not hypotheses:
         return np.zeros(0)
     densities = np.array([one.prediction.log_density for one in hypotheses])
     prior = -EFFECT_PRIOR * np.array([len(one.elements) for one in hypotheses], dtype=float)
     count = densities.shape[1]
-    scores = count * _resampled(count, seed) @ densities.T + prior
+    scores = count * _resampled(count) @ densities.T + prior
     scores -= scores.max(axis=1, keepdims=True)
     each = np.exp(scores)
     return np.asarray((each / each.sum(axis=1, keepdims=True)).mean(axis=0), dtype=np.float64)

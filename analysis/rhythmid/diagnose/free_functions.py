@@ -8,7 +8,7 @@ sensor's error is a function of its output. Each is a sum of functions whose eff
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import accumulate
 
 import numpy as np
@@ -46,8 +46,8 @@ class FreeMap:
 
     quantity: str
     columns: tuple[tuple[Array, ...], ...]
-    grid: Array
-    basis: Array
+    grid: Array = field(default_factory=lambda: np.empty(0))
+    basis: Array = field(default_factory=lambda: np.empty((0, 0)))
 
 
 def _splines(values: Sequence[Array], count: int) -> tuple[list[list[Array]], Array, Array]:
@@ -125,26 +125,20 @@ def _simulated(
 
 def values_of(known: Trajectories, name: str) -> list[Array]:
     """Values of the quantity that a spline depends on, of each series; `name` is that of the simulator's map, as in `SPLINED`."""
-    values: dict[str, list[Array]] = {
-        "position": [path.position for path in known.legs],
-        "velocity": [path.velocity for path in known.legs],
-        "effort": [path.effort for path in known.paths],
-        "signal": list(known.outputs),
-    }
-    return values[name]
+    if name == "signal":
+        return list(known.outputs)
+    return [getattr(path, name) for path in (known.paths if name == "effort" else known.legs)]
 
 
 def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:
     """The free functions beside a fitted model, each made when it is asked for: over long records each is large."""
     fit = known.fit
-    none, nowhere = np.empty(0), np.empty((0, 0))
-    moving = any(np.ptp(p.effort) > 0 for p in known.paths)
     quantities: dict[str, list[Array]] = {
         "position": values_of(known, "position"),
         "velocity": values_of(known, "velocity"),
         "time": [p.time - p.time[0] for p in known.paths],
     }
-    if moving:
+    if _driven(known):
         quantities["actuator force"] = values_of(known, "effort")
     for name, values in quantities.items():
         functions, grid, basis = _splines(values, SPLINES)
@@ -153,14 +147,14 @@ def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> It
     both = [_splines(quantities[name], SPLINES_OF_TWO)[0] for name in ("position", "velocity")]
     if all(both):
         products = ([a * b for a, b in zip(x, v)] for x in both[0] for v in both[1])
-        yield FreeMap("position and velocity", _simulated(known, products, pool), none, nowhere)
-    yield FreeMap("past position", _simulated(known, _slipped(quantities["position"]), pool), none, nowhere)
+        yield FreeMap("position and velocity", _simulated(known, products, pool))
+    yield FreeMap("past position", _simulated(known, _slipped(quantities["position"]), pool))
     yield from filtered(known, pool)
     line = residual_line(fit)
     if line > 0.0:
         times = [p.time for p in known.paths]
         waves = [[wave(2.0 * np.pi * line * t) for t in times] for wave in (np.cos, np.sin)]
-        yield FreeMap(f"a vibration at {line:.3g} Hz", _simulated(known, waves, pool), none, nowhere)
+        yield FreeMap(f"a vibration at {line:.3g} Hz", _simulated(known, waves, pool))
     functions, grid, basis = _splines(values_of(known, "signal"), SPLINES)
     if functions:
         columns = tuple(tuple(s.of_block(f) for s, f in zip(fit.run.series, one)) for one in functions)
@@ -171,14 +165,19 @@ def filtered(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Ite
     """Forces that linear filters make of the past velocity and of the past actuator force: a linear part that the model lacks."""
     times, frequency = [p.time for p in known.paths], _frequency(known)
     past = {"past velocity": values_of(known, "velocity")}
-    if any(np.ptp(p.effort) > 0 for p in known.paths):
+    if _driven(known):
         past["past actuator force"] = values_of(known, "effort")
     line = residual_line(known.fit)
     for name, values in past.items():
         functions = _remembered(values, times, frequency)
         if line > 0.0:
             functions += _resonant(values, times, line)
-        yield FreeMap(name, _simulated(known, functions, pool), np.empty(0), np.empty((0, 0)))
+        yield FreeMap(name, _simulated(known, functions, pool))
+
+
+def _driven(known: Trajectories) -> bool:
+    """Whether an actuator's force varies."""
+    return any(np.ptp(path.effort) > 0 for path in known.paths)
 
 
 def _frequency(known: Trajectories) -> float:

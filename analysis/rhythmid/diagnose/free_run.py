@@ -49,13 +49,11 @@ from rhythmid.diagnose.verdict import Decision, decide
 from rhythmid.elements.candidates import candidates
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.elements.element import Scales
-from rhythmid.errors import InputError
 from rhythmid.identify.command_jitter import command_jitter, weighed
 from rhythmid.identify.covariance import covariance_of
-from rhythmid.identify.output_error import Fit, start_only
+from rhythmid.identify.output_error import Fit, rerun
 from rhythmid.identify.record_scales import scales
 from rhythmid.identify.robust_covariance import with_robust_covariance
-from rhythmid.identify.series import Series
 from rhythmid.identify.student import autocorrelation_time
 
 # what competes beside the effects that were searched for, where there is time
@@ -77,8 +75,6 @@ class FreeRunResult:
     """
 
     scoring: Scoring
-    series: tuple[Series, ...]
-    unseen: tuple[Series, ...]
     calibration: Calibration
     search: Search
     before: tuple[Dependence, ...]
@@ -175,16 +171,17 @@ def _free_run(case: Case, scoring: Scoring) -> FreeRunResult:
     fit = with_robust_covariance(found.fit)
     errors = size_errors(fit.model, selection.chosen.elements, fit.std)
     found = replace(found, fit=replace(fit, covariance=fit.covariance + between + unnamed))
+    nominal_there, chosen_there = (
+        rerun(one.model, shown, found.noise, one.run.max_step) for one in (found.nominal, found.fit)
+    )
     return FreeRunResult(
         scoring,
-        tuple(seen),
-        tuple(scoring.unseen),
         calibration,
         found,
         tuple(before),
         tuple(after),
-        _rerun(found.nominal, shown, found),
-        _rerun(found.fit, shown, found),
+        nominal_there,
+        chosen_there,
         contest,
         selection,
         decide(contest, selection, least, errors),
@@ -267,11 +264,8 @@ def _with_jitter(scoring: Scoring) -> Calibration:
     if jitter is None:
         return found
     fit = weighed(found.fit, jitter)
-    return replace(found, fit=fit, series=fit.run.series, notes=(*found.notes, _sentence(jitter.words)))
-
-
-def _sentence(words: str) -> str:
-    return f"{words[0].upper()}{words[1:]}."
+    note = f"{jitter.words[0].upper()}{jitter.words[1:]}."
+    return replace(found, fit=fit, series=fit.run.series, notes=(*found.notes, note))
 
 
 def _trial_of(hypothesis: Hypothesis, contenders: Sequence[Contender]) -> Trial:
@@ -340,13 +334,3 @@ def _detectable(contenders: Sequence[Contender], chosen: Hypothesis, rows: Rows)
     """The smallest rms that would show in these records, as a share of what errors are a share of."""
     error = next(one.error for one in contenders if tuple(sorted(one.trial.added)) == chosen.key)
     return detectable(error, autocorrelation_time(error, rows.record)) / max(rows.size, 1e-300)
-
-
-def _rerun(fit: Fit, unseen: Sequence[Series], found: Search) -> Fit | None:
-    """A model's run over separate held-out records, only their initial states estimated."""
-    if not unseen:
-        return None
-    try:
-        return start_only(fit.model, unseen, found.noise, fit.run.max_step)
-    except InputError:
-        return None

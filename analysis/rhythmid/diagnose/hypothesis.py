@@ -1,6 +1,6 @@
 """A hypothesis: one explanation of the records, fitted, with what it predicts of data that its fit has not seen."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -70,6 +70,19 @@ class Hypothesis:
     values: Mapping[str, float] = field(default_factory=dict)
     family: Mapping[str, str] = field(default_factory=dict)
 
+    @classmethod
+    def of(
+        cls, model: Model, elements: tuple[str, ...], kind: Kind, free: int, prediction: Prediction,
+        heldout_nrmse: float | None, shape: Mapping[str, float], values: Mapping[str, float],
+    ) -> "Hypothesis":  # fmt: skip
+        """The hypothesis that a fitted model is, with what the catalogue says of its effects."""
+        terms = [model.term(label) for label in elements]
+        names = tuple(label if one is None else one.element.name for label, one in zip(elements, terms))
+        effects = [one.element for one in terms if one is not None]
+        richer = {one.name: one.special_case_of for one in effects}
+        family = {one.name: one.family for one in effects}
+        return cls(elements, names, kind, free, prediction, heldout_nrmse, shape, richer, values, family)
+
     @property
     def effects(self) -> tuple[str, ...]:
         """Labels of effects; a freed value and a delay go by the name of a parameter, "label.parameter"."""
@@ -79,24 +92,6 @@ class Hypothesis:
     def key(self) -> tuple[str, ...]:
         """The elements in alphabetical order: the same for the same structure."""
         return tuple(sorted(self.elements))
-
-
-def names_of(model: Model, elements: Sequence[str]) -> tuple[str, ...]:
-    """Catalogue names of the effects with these labels; what is no effect keeps its own name."""
-    terms = [(label, model.term(label)) for label in elements]
-    return tuple(label if term is None else term.element.name for label, term in terms)
-
-
-def richer_of(model: Model, elements: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """By name, the laws that contain the effects with these labels as special cases."""
-    terms = [model.term(label) for label in elements]
-    return {term.element.name: term.element.special_case_of for term in terms if term is not None}
-
-
-def family_of(model: Model, elements: Sequence[str]) -> dict[str, str]:
-    """By name, the families of the effects with these labels."""
-    terms = [model.term(label) for label in elements]
-    return {term.element.name: term.element.family for term in terms if term is not None}
 
 
 def special_case(first: Hypothesis, second: Hypothesis) -> bool:

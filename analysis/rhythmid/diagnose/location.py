@@ -17,11 +17,9 @@ from rhythmid.diagnose.contenders import Rows, linearised
 from rhythmid.diagnose.evidence import CrossValidated, Linearised, cross_validate
 from rhythmid.diagnose.free_functions import FreeMap, free_maps
 from rhythmid.diagnose.search.score_tests import Trajectories, trajectories
-from rhythmid.errors import InputError
 from rhythmid.freed_memory import give_back
 from rhythmid.identify.free_run import prepare_run
-from rhythmid.identify.output_error import Fit, start_only
-from rhythmid.identify.series import Series
+from rhythmid.identify.output_error import Fit, rerun
 
 Array = NDArray[np.float64]
 RIDGE = 1e-4  # prior precision of a coefficient, relative to the information that all rows have of it
@@ -64,11 +62,6 @@ class Reach:
         return hidden - self.starts / norms @ taken
 
 
-def _white(rows: Rows, one: Series, values: Array, parts: Sequence[slice]) -> Array:
-    white = [rows.noise.whiten(one.levelled(values[part], part)) for part in parts]
-    return np.concatenate(white or [values[:0]])
-
-
 def _parts(rows: Rows) -> list[tuple[Sequence[slice], Sequence[slice]]]:
     """Stretches of each series, and of each separate held-out one after them: those to which its start is fitted, and hidden ones."""
     return [*zip(rows.seen, rows.hidden, strict=True), *((parts, parts) for parts in rows.held)]
@@ -77,11 +70,8 @@ def _parts(rows: Rows) -> list[tuple[Sequence[slice], Sequence[slice]]]:
 def with_held_out(fit: Fit, rows: Rows) -> Fit:
     """The fit with its runs over the separate held-out records beside those that it saw; the fit itself without any, or where it diverges
     there."""
-    if not rows.unseen:
-        return fit
-    try:
-        beyond = start_only(fit.model, rows.unseen, rows.noise, fit.run.max_step)
-    except InputError:
+    beyond = rerun(fit.model, rows.unseen, rows.noise, fit.run.max_step)
+    if beyond is None:
         return fit
     return replace(
         fit,
@@ -105,7 +95,7 @@ def reach_of(fit: Fit, rows: Rows, pool: ThreadPoolExecutor | None = None) -> li
         for column, output in enumerate(outputs):
             if output is not None and here is not None:
                 change[:, column] = (output[index] - here[index]) / scale[column]
-        seen, hidden = (_white(rows, series, change, which) for which in parts)
+        seen, hidden = (series.whitened(rows.noise, change, which) for which in parts)
         plain = Reach(hidden[:, :p], hidden[:, p:], seen[:, p:])
         found.append(Reach(plain.refitted(seen[:, :p], hidden[:, :p]), plain.starts, plain.seen))
     return found
@@ -129,7 +119,7 @@ def beside(fit: Fit, base: Linearised, one: FreeMap, rows: Rows, reach: Sequence
     first, below = 0, rows.fitted  # where the next seen rows, and the next hidden ones, go
     for index, (series, parts) in enumerate(zip(fit.run.series, _parts(rows))):
         columns = np.column_stack([column[index] for column in one.columns])
-        white, unseen = (_white(rows, series, columns, which) for which in parts)
+        white, unseen = (series.whitened(rows.noise, columns, which) for which in parts)
         if index < len(bases):
             added[first : first + len(white)] = white - bases[index] @ (bases[index].T @ white)
             first += len(white)

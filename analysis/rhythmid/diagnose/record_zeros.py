@@ -28,7 +28,7 @@ from rhythmid.diagnose.search.score_tests import under
 from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.output_error import Fit, estimate, start_only
+from rhythmid.identify.output_error import Fit, estimate, rerun
 from rhythmid.identify.record_scales import scales
 from rhythmid.identify.record_zero import moved, others_marked, with_record_zero
 from rhythmid.identify.series import Series, record_of
@@ -65,8 +65,7 @@ class _Seen:
         columns = tuple(
             tuple(np.full(one.blocks, float(record_of(one) == name)) for one in series) for name in names
         )
-        none = np.empty(0)
-        return beside(self.fit, self.base, FreeMap("zero", columns, none, none), self.rows, self.reach)
+        return beside(self.fit, self.base, FreeMap("zero", columns), self.rows, self.reach)
 
     def refitted(self, pool: ThreadPoolExecutor | None) -> Linearised | None:
         """The fit with a zero of each record, everything fitted again: an effect that was fitted without them is far from where it is with
@@ -139,8 +138,5 @@ def _of_unseen(one: Series, fit: Fit, zeros: Mapping[str, float]) -> Series:
     if any(record_of(other) == record_of(one) for other in fit.run.series):
         return _moved_by(one, zeros)
     one = moved(one, 0.0)
-    try:
-        alone = zeros_of(start_only(fit.model, [one], fit.noise, fit.run.max_step))
-    except InputError:
-        return one
-    return moved(one, alone[record_of(one)][0])
+    alone = rerun(fit.model, [one], fit.noise, fit.run.max_step)
+    return one if alone is None else moved(one, zeros_of(alone)[record_of(one)][0])

@@ -21,7 +21,6 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.multiple_shooting import LEAST_BLOCKS, forgets, periods_long
 from rhythmid.identify.multiple_shooting import windows as cut_up
-from rhythmid.identify.output_error import Fit
 from rhythmid.identify.series import Series, hold_out_tail
 from rhythmid.model import Model
 from rhythmid.progress import Tell
@@ -56,7 +55,9 @@ class Scoring:
     @property
     def error(self) -> float:
         """rms of the residuals that the calibrated model leaves, in the output's unit."""
-        return _error(self.calibration.fit)
+        fit = self.calibration.fit
+        left = [residual[one.used] for residual, one in zip(fit.residuals, fit.run.series)]
+        return float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
 
 
 def settle(
@@ -84,25 +85,18 @@ def settle(
             break
         if how.kind != "free_run":
             tell(f"scoring in {how.reason}")
-        cut, unseen = how.of(series), how.of(separate)
-        if not separate:
-            cut, unseen = hold_out_tail(cut)
         try:
-            calibration = calibrate(model, cut, catalogue, pool, tell)
-            if how.kind == "free_run":  # windows have starts of their own, which take up most of a zero
-                calibration, unseen = with_zeros(calibration, model, unseen, catalogue, pool, tell)
+            scoring = _scored(how, model, series, separate, catalogue, pool, tell)
         except InputError as error:
             failure = failure or error
             continue
-        if tried and _error(calibration.fit) > BETTER_STEP * tried[-1].error:
+        if tried and scoring.error > BETTER_STEP * tried[-1].error:
             idle += 1
             if idle == PATIENCE:
                 break
             continue
-        if calibration.reconstructed:
-            unseen = [reconstructed(one) for one in unseen]
-        tried.append(Scoring(calibration, tuple(unseen), how.kind, how.reason))
-        if calibration.fit.nrmse() < FOLLOWS:
+        tried.append(scoring)
+        if scoring.calibration.fit.nrmse() < FOLLOWS:
             break
     if not windows:
         return tuple(one for one in tried if one.calibration.fit.nrmse() < FOLLOWS)
@@ -112,39 +106,20 @@ def settle(
     longest, best = tried[0], tried[-1]
     if longest.kind != "free_run":
         chosen = longest if best.error >= BETTER_TOGETHER * longest.error else best
-        return (chosen, *_disturbed_free_run(model, series, separate, catalogue, pool, tell))
+        if time_is_up():
+            return (chosen,)
+        # no window shows what is slow
+        free = _Way("free_run", DISTURBED_FREE_RUN, list)
+        try:
+            disturbed = _scored(free, model, series, separate, catalogue, pool, tell)
+        except InputError:
+            return (chosen,)
+        return (chosen, disturbed) if disturbed.calibration.fit.nrmse() < FOLLOWS else (chosen,)
     error = longest.calibration.fit.nrmse()
     if best.error >= BETTER_TOGETHER * longest.error:
         return (longest if error < FOLLOWS else replace(longest, reason=FREE_RUN_IN_PART),)
     near = error < HOPELESS
     return (best, replace(longest, reason=FREE_RUN_BESIDE)) if near and best is not longest else (best,)
-
-
-def _disturbed_free_run(
-    model: Model,
-    series: Sequence[Series],
-    separate: Sequence[Series],
-    catalogue: Catalogue,
-    pool: ThreadPoolExecutor | None,
-    tell: Tell,
-) -> tuple[Scoring, ...]:
-    """The free run of a machine that integrates or is unstable, where the model follows it: no window shows what is slow."""
-    if time_is_up():
-        return ()
-    cut, unseen = list(series), list(separate)
-    if not separate:
-        cut, unseen = hold_out_tail(cut)
-    try:
-        calibration, unseen = with_zeros(
-            calibrate(model, cut, catalogue, pool, tell), model, unseen, catalogue, pool, tell
-        )
-    except InputError:
-        return ()
-    if calibration.fit.nrmse() >= FOLLOWS:
-        return ()
-    if calibration.reconstructed:
-        unseen = [reconstructed(one) for one in unseen]
-    return (Scoring(calibration, tuple(unseen), "free_run", DISTURBED_FREE_RUN),)
 
 
 @dataclass(frozen=True)
@@ -154,6 +129,22 @@ class _Way:
     kind: ScoringKind
     reason: str
     of: Callable[[Sequence[Series]], list[Series]]
+
+
+def _scored(
+    how: _Way, model: Model, series: Sequence[Series], separate: Sequence[Series], catalogue: Catalogue,
+    pool: ThreadPoolExecutor | None, tell: Tell,
+) -> Scoring:  # fmt: skip
+    """The nominal model calibrated in one way to score. Raises InputError where that fails."""
+    cut, unseen = how.of(series), how.of(separate)
+    if not separate:
+        cut, unseen = hold_out_tail(cut)
+    calibration = calibrate(model, cut, catalogue, pool, tell)
+    if how.kind == "free_run":  # windows have starts of their own, which take up most of a zero
+        calibration, unseen = with_zeros(calibration, model, unseen, catalogue, pool, tell)
+    if calibration.reconstructed:
+        unseen = [reconstructed(one) for one in unseen]
+    return Scoring(calibration, tuple(unseen), how.kind, how.reason)
 
 
 def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
@@ -169,13 +160,6 @@ def _ladder(model: Model, series: Sequence[Series]) -> Iterator[_Way]:
     while length >= shortest:
         yield _Way("windows", _words(length, LOSES if free else INTEGRATES), partial(cut_up, length=length))
         length /= SHORTER
-
-
-def _error(fit: Fit) -> float:
-    """rms of the residuals, in the output's unit."""
-    return float(
-        np.sqrt(np.mean(np.concatenate([r[one.used] for r, one in zip(fit.residuals, fit.run.series)]) ** 2))
-    )
 
 
 def _words(length: float, reason: str) -> str:

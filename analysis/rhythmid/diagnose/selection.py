@@ -86,11 +86,9 @@ class Contest:
 
 @dataclass(frozen=True)
 class Selection:
-    """The chosen hypothesis, with the ones of each smaller number of effects that it grew from, the nominal model first; and
-    all rejections."""
+    """The chosen hypothesis, and all rejections."""
 
     chosen: Hypothesis
-    grown: tuple[Hypothesis, ...]
     rejections: tuple[Rejection, ...]
 
 
@@ -101,7 +99,7 @@ def select(contest: Contest) -> Selection:
     two that mask one another neither does much by itself.
     """
     told: list[Rejection] = []
-    grown, smaller = [contest.nominal], contest.nominal
+    chosen = smaller = contest.nominal
     most = max(len(one.elements) for one in (*contest.hypotheses, *contest.ruled_out))
     for count in range(1, most + 1):
         sound: list[Hypothesis] = []
@@ -115,14 +113,13 @@ def select(contest: Contest) -> Selection:
         refused = {row.hypothesis for row in told}
         granted = [one for one in close if one.elements not in refused]
         if granted:
-            smaller = _simplest(granted)
-            grown.append(smaller)
+            chosen = smaller = _simplest(granted)
             told += _beaten(smaller, granted, contest)
         else:
             # rounding decides nothing
             smaller = max(smaller, sound[0], key=lambda one: round(one.prediction.score, 6))
-    grown[-1] = _beside_others(grown[-1], contest, {row.hypothesis for row in told})
-    return Selection(grown[-1], tuple(grown), tuple(told))
+    chosen = _beside_others(chosen, contest, {row.hypothesis for row in told})
+    return Selection(chosen, tuple(told))
 
 
 def _beside_others(chosen: Hypothesis, contest: Contest, refused: Collection[tuple[str, ...]]) -> Hypothesis:

@@ -47,7 +47,7 @@ def _acts_within(known: Trajectories, model: Model, term: Term) -> float:
     element = term.element
     if element.kernel is None or element.own or element.history:
         return math.inf
-    values = {name: value.value for name, value in term.values.items()}
+    values = term.numbers
     bent: list[float] = []
     for times in (REACH, FAR_RANGES):
         path = _instants(_met(known, element), times)

@@ -65,7 +65,7 @@ def laws_of(trial: Trial, sizes: Scales) -> dict[tuple[str, str], dict[str, Arra
     for label in trial.added:
         term = trial.model.term(label)
         assert term is not None
-        values = {name: value.value for name, value in term.values.items()}
+        values = term.numbers
         law = law_of(term.element, values, trial.model, sizes)
         if law is not None:
             found.setdefault((term.element.slot, law[0]), {})[label] = law[1]

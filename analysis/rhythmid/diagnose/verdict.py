@@ -57,7 +57,6 @@ class Decision:
     weights : of each hypothesis, by its key.
     equivalent : groups of names that the evidence does not separate, the chosen one first; of `named` only.
     unexplained : what is left.
-    explained : share of what anything explains that the names explain.
     beside : names of effects that the chosen model has, too, too uncertain for the answer to stand by them.
     families : of the effects of the chosen hypothesis, where the verdict tells them.
     """
@@ -72,7 +71,6 @@ class Decision:
     weights: dict[tuple[str, ...], float]
     equivalent: tuple[tuple[str, ...], ...]
     unexplained: Unexplained
-    explained: float
     beside: tuple[str, ...] = ()
     families: tuple[MissingFamily, ...] = ()
 
@@ -239,7 +237,6 @@ def decide(
         weights,
         tuple(group for group in groups if group[0] in told),
         left,
-        1.0 - left.share,
         tuple(names[label] for label in labels if label not in named and label in chosen.effects),
         families_of(contest, chosen, shares, weights, left.expected, open_, size_errors)
         if rule.tells_family

@@ -55,7 +55,7 @@ def joint_of(model: Model, name: str) -> Joint:
         )
     reading = _Reading(model.mass.value, model.units.position == "rad")
     for term in model.terms:
-        values = {key: value.value for key, value in term.values.items()}
+        values = term.numbers
         if term.element.size and values.get(term.element.size) == term.element.absent:
             continue
         READERS.get(term.element.name, _unknown)(reading, term, values)

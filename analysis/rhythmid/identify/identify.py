@@ -80,7 +80,7 @@ def forced_by(model: Model, record: Record) -> tuple[Model, Pumping]:
         model = model.without(term.label)
     pumping = pumping_of(record)
     if pumping is None and own:
-        values = {name: value.value for name, value in own[0].values.items()}
+        values = own[0].numbers
         if values["frequency"] > 0.0:
             pumping = Pumping.cosine(values["amplitude"], values["frequency"], values["phase"], "model")
     return model, pumping or Pumping(1.0, np.zeros(2, dtype=complex), 0.0, "none")

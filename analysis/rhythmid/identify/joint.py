@@ -93,7 +93,7 @@ def prepared_model(model: Model, records: Sequence[Record]) -> tuple[Model, Pump
         for term in own:
             model = model.without(term.label)
     elif own:
-        values = {name: value.value for name, value in own[0].values.items()}
+        values = own[0].numbers
         if values["frequency"] > 0.0 and values["amplitude"] != 0.0:
             pumping = Pumping.cosine(values["amplitude"], values["frequency"], values["phase"], "model")
     excited = any(record.input is not None and np.ptp(record.input.value) > 0.0 for record in records)

@@ -244,6 +244,14 @@ def estimate(
     return minimise(end.model, run, chosen, noise, end.starts, iterations, pool, differences=end.differences)
 
 
+def rerun(model: Model, series: Sequence[Series], noise: NoiseModel, step: float) -> Fit | None:
+    """`start_only`; None without any series, and where the model diverges."""
+    try:
+        return start_only(model, series, noise, step) if series else None
+    except InputError:
+        return None
+
+
 def start_only(model: Model, series: Sequence[Series], noise: NoiseModel, max_step: float) -> Fit:
     """Free run over records that the model has not seen: only their initial states are estimated, whatever the time."""
     run = prepare_run(model, series, max_step)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.identify.free_run import FreeRun, coarser, start_of
-from rhythmid.identify.noise import NoiseModel, runs
+from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.record_zero import zero_place
 from rhythmid.identify.series import record_of
 from rhythmid.model import Model
@@ -53,18 +53,14 @@ class Problem:
         self.spread = max(float(np.std(one.averaged)) for one in run.series) or 1.0
         # zeros differ by no more than the outputs do
         self.reach = float(np.ptp([[one.averaged.min(), one.averaged.max()] for one in run.series])) or 1.0
-        self.stretches = [
-            [s for s in runs(one.used) if s.stop - s.start > noise.order + 1] for one in run.series
-        ]
+        self.stretches = [one.stretches(noise) for one in run.series]
         self.ignored = [
             None if one.ignored is None else span(self._white(i, one.ignored))
             for i, one in enumerate(run.series)
         ]
 
     def _white(self, index: int, samples: Array) -> Array:
-        one = self.run.series[index]
-        parts = [self.noise.whiten(one.levelled(samples[s], s)) for s in self.stretches[index]]
-        return np.concatenate(parts) if parts else samples[:0]
+        return self.run.series[index].whitened(self.noise, samples, self.stretches[index])
 
     def whitened(self, index: int, samples: Array) -> Array:
         """Used stretches of series `index`, whitened and joined, what is ignored projected out; (n,) or (n, q)."""

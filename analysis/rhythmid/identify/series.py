@@ -16,7 +16,7 @@ from scipy.interpolate import PPoly
 
 from rhythmid.errors import InputError
 from rhythmid.identify.inputs import Inputs, Pieces
-from rhythmid.identify.noise import NoiseModel
+from rhythmid.identify.noise import NoiseModel, runs
 from rhythmid.identify.spread import relative_spreads
 from rhythmid.motion_power import motion_power
 from rhythmid.record.record import Record
@@ -183,6 +183,15 @@ class Series:
         if self.spread is None:
             return samples
         return samples / self.spread[part].reshape(-1, *[1] * (samples.ndim - 1))
+
+    def stretches(self, noise: NoiseModel, hidden: bool = False) -> tuple[slice, ...]:
+        """Stretches of the averages that the fit sees, or of those hidden from it, that are long enough to be whitened."""
+        return tuple(s for s in runs(self.counted(hidden)) if s.stop - s.start > noise.order + 1)
+
+    def whitened(self, noise: NoiseModel, samples: Array, parts: Sequence[slice]) -> Array:
+        """Samples of the averages (n // block,) or (n // block, q) in these stretches, levelled, whitened and joined."""
+        white = [noise.whiten(self.levelled(samples[part], part)) for part in parts]
+        return np.concatenate(white) if white else samples[:0]
 
     def power(self, chosen: Mask) -> float:
         """Sum of squares of the motion that errors of the chosen averages are a share of; see `motion_power`."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import correlate
 from scipy.stats import norm
 
+from rhythmid.record.outlier import USUAL
 from rhythmid.record.record import Record
 from rhythmid.record.rounding import resolution
 
@@ -24,7 +25,6 @@ AVERAGED = 8  # samples that a driver may average or hold, beyond which memory i
 WHITE = 2  # the same of a larger one, whose memory may be that of a machine that is damped well
 CREST = 8.0  # standard deviations, from which a lone move is an event and no noise
 CHANCE = 1e-3  # with which noise that goes with nothing is taken for driven
-USUAL = 1.4826  # standard deviations in a median absolute deviation
 
 
 def standstill(record: Record, buried: bool = True) -> str | None:

@@ -214,6 +214,6 @@ def load_along(model: Model, path: Path) -> Array:
         if element.slot != "force" or element.kernel is None or element.family in DISSIPATIVE:
             continue
         if element.acts in ("leg", "body"):
-            values = {name: value.value for name, value in term.values.items()}
+            values = term.numbers
             total += effect_along(element, values, model, path)
     return total

@@ -40,7 +40,7 @@ def forcing_at(model: Model, times: Array) -> Array:
     total = np.zeros(len(times))
     for term in model.terms:
         if term.element.acts == "drive" and term.element.kernel is not None:
-            values = {name: value.value for name, value in term.values.items()}
+            values = term.numbers
             total += [term.element.kernel(float(t), **values) for t in times]
     return total
 

@@ -51,7 +51,7 @@ def start_states(
             borrowed = {
                 n: model.borrowed(source, default) for n, (source, default) in term.element.borrows.items()
             }
-            arguments = {n: v.value for n, v in term.values.items()} | borrowed
+            arguments = term.numbers | borrowed
             signal = command if term.element.slot == "command" else command + forcing
             for state, value in zip(
                 term.element.own, term.element.initial(position, velocity, signal, **arguments)
@@ -108,9 +108,7 @@ def simulate(
 def samplers(model: Model, seed: int) -> list:
     """What happens to sampled outputs, in order: one function (stamps, samples) -> samples for each noise or rounding."""
     return [
-        term.element.sampler(
-            np.random.default_rng([seed, index]), **{n: v.value for n, v in term.values.items()}
-        )
+        term.element.sampler(np.random.default_rng([seed, index]), **term.numbers)
         for index, term in enumerate(model.terms)
         if term.element.slot in MEASUREMENT and term.element.sampler is not None
     ]

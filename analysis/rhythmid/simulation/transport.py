@@ -27,7 +27,7 @@ def delays(model: Model, stamps: Array, *slots: str) -> Iterator[tuple[Term, Arr
 
 def _delay(term: Term, stamps: Array) -> Array:
     assert term.element.delay is not None
-    return term.element.delay(stamps, **{name: value.value for name, value in term.values.items()})
+    return term.element.delay(stamps, **term.numbers)
 
 
 def physical_times(model: Model, stamps: Array) -> Array:

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
+from rhythmid.record.clock_time import DAY
 from rhythmid.twin.score import Score, inverse
-from rhythmid.twin.settings import DAY
 
 Array = NDArray[np.float64]
 WINDOWS = (1.0, 5.0)  # s: the shorter for large changes, the longer for small ones and for telling them apart

@@ -7,7 +7,6 @@ from rhythmid.record.record import Record
 from rhythmid.simulation.generated_source import DRIVES, InputKind, OutputKind
 from rhythmid.simulation.signal import Hold
 
-DAY = 86_400.0  # s
 SHORTEST_HEALTHY = (
     20.0  # s; four of the longest window, below which the scatter of its statistic is not known
 )

@@ -1,7 +1,10 @@
 """An answer put together from what a free run, or windows, have shown."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rhythmid.diagnose.answer.next_experiment import next_experiment
 from rhythmid.diagnose.answer.result import (
@@ -22,18 +25,18 @@ from rhythmid.diagnose.case import EXPLAINED, Case
 from rhythmid.diagnose.delays import delays_of
 from rhythmid.diagnose.evidence import difference
 from rhythmid.diagnose.free_run import FreeRunResult
-from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.selection import Contest
 from rhythmid.diagnose.verdict import Decision
-from rhythmid.errors import InputError
 from rhythmid.identify.held_out_zeros import held_out_zero_notes
 from rhythmid.identify.noise import NoiseModel
-from rhythmid.identify.output_error import Fit, start_only
+from rhythmid.identify.output_error import Fit, rerun
 from rhythmid.identify.repeats import noise_from_repeats
 from rhythmid.identify.series import Series
 from rhythmid.identify.zero_estimates import zeros_told
 from rhythmid.model import Model
+from rhythmid.record.record import Record
 
+Array = NDArray[np.float64]
 SHOWN = 8  # alternatives listed
 ONE_CLOCK = "The clocks of command and measurement agree: an offset between them counts as delay."
 MORE_TIME = "none computed in the time given; a larger --budget tells which experiment separates best"
@@ -67,9 +70,8 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
     series = found.fit.run.series
     repeats = noise_from_repeats(list(series))
     best = found.best
-    missing = tuple(
-        _missing(found.fit, label, decision) for label in decision.named if best.model.term(label)
-    )
+    fit = found.fit
+    missing = missing_effects(fit.model, decision, lambda name: estimated(fit, name))
     plain = FitQuality(found.nominal.nrmse(), contest.nominal.heldout_nrmse)
     augmented = FitQuality(found.fit.nrmse(), result.selection.chosen.heldout_nrmse)
     rivals = [t for t in found.trials if len(t.added) == len(best.added) and t.bic() - best.bic() < RIVALS]
@@ -82,16 +84,18 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         )
         for t in [t for t in found.trials if set(t.added) != set(best.added)][:SHOWN]
     )
-    fit = found.fit
-    if case.holdout:
-        held = f"held out: {', '.join(dict.fromkeys(record.whole or record.name for record in case.holdout))}"
-    else:
-        held = (
-            f"held out: the last fifth of every {'record' if result.scoring.kind == 'free_run' else 'window'}"
-        )
+    part = "record" if result.scoring.kind == "free_run" else "window"
+    drawn = {one.quantity: (one.grid, one.force) for one in result.after}
     return Diagnosis(
         verdict=decision.verdict,
-        summary=summary_of(decision, missing, plain, augmented, "motion", _freed(case.nominal, result)),
+        summary=summary_of(
+            decision,
+            missing,
+            plain,
+            augmented,
+            "motion",
+            freed_value(case.nominal, fit.model, result.selection.chosen),
+        ),
         detection=Detection(
             found.rounds[0].p_value,
             _nominal_error(case.nominal, found.nominal, found.noise),
@@ -105,7 +109,7 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
         alternatives=alternatives,
         hypotheses=explanations(contest, decision),
         rejections=result.selection.rejections,
-        remainder=_remainder(decision, result.after),
+        remainder=remainder_of(decision, drawn),
         fit={"refitted_nominal": plain, "augmented": augmented},
         parameters={name: estimated(fit, name) for name in fit.model.parameters},
         delays=delays_of(fit),
@@ -121,10 +125,12 @@ def compose(case: Case, result: FreeRunResult, notes: Sequence[str]) -> Diagnosi
             *recalibrated(case.nominal, fit.model, {name: fit.std[name] for name in fit.names}),
         ),
         excluded=tuple(Untried(" + ".join(added), why) for added, why in found.excluded),
-        heldout=held,
+        heldout=held_out_words(case.holdout, f"the last fifth of every {part}"),
         notes=(
             *notes,
-            *held_out_zero_notes(fit, result.unseen if case.holdout and not case.budget.spent else ()),
+            *held_out_zero_notes(
+                fit, result.scoring.unseen if case.holdout and not case.budget.spent else ()
+            ),
         ),
         chosen=result.selection.chosen.elements,
         families=decision.families,
@@ -151,24 +157,27 @@ def _estimated(model: Model, name: str) -> bool:
     return any(t.element.name == name and not all(v.fixed for v in t.values.values()) for t in model.terms)
 
 
-def _freed(nominal: Model, result: FreeRunResult) -> str | None:
-    """A sentence about the fixed value that the chosen hypothesis frees; None where it frees none."""
-    chosen = result.selection.chosen
-    if chosen.kind != "freed_value":
-        return None
-    return freed_value(nominal, result.search.fit.model, chosen.elements)
+def held_out_words(records: Sequence[Record], otherwise: str) -> str:
+    """Which records were held out, or what of the others where there are none."""
+    names = dict.fromkeys(record.whole or record.name for record in records)
+    return f"held out: {', '.join(names) or otherwise}"
 
 
-def _missing(fit: Fit, label: str, decision: Decision) -> MissingEffect:
-    term = fit.model.term(label)
-    assert term is not None
-    return MissingEffect(
-        term.element.name,
-        term.element.slot,
-        term.element.equation,
-        decision.shares[label],
-        decision.probability[label],
-        {name: estimated(fit, f"{label}.{name}") for name in term.values},
+def missing_effects(
+    model: Model, decision: Decision, estimate: Callable[[str], Estimate]
+) -> tuple[MissingEffect, ...]:
+    """The named effects of a fitted model, with the `estimate` of each of their parameters by its name."""
+    return tuple(
+        MissingEffect(
+            term.element.name,
+            term.element.slot,
+            term.element.equation,
+            decision.shares[label],
+            decision.probability[label],
+            {name: estimate(f"{label}.{name}") for name in term.values},
+        )
+        for label in decision.named
+        if (term := model.term(label)) is not None
     )
 
 
@@ -181,12 +190,11 @@ def estimated(fit: Fit, name: str) -> Estimate:
     return Estimate(value.value, 0.0 if name not in fit.names else std, value.unit)
 
 
-def _remainder(decision: Decision, after: Sequence[Dependence]) -> Remainder:
+def remainder_of(decision: Decision, drawn: Mapping[str, tuple[Array, Array]]) -> Remainder:
+    """What is left, with the curve that is `drawn` over the quantity that it depends on: values of that, and what is left there."""
     left = decision.unexplained
-    found = next((one for one in after if one.quantity == left.goes_with), None)
-    curve = None
-    if found is not None and len(found.force):
-        curve = Curve(tuple(map(float, found.grid)), tuple(map(float, found.force)))
+    grid, force = drawn.get(left.goes_with or "", ((), ()))
+    curve = Curve(tuple(map(float, grid)), tuple(map(float, force))) if len(force) else None
     return Remainder(left.share, left.significant, left.goes_with, curve)
 
 
@@ -200,8 +208,5 @@ def _floor(series: Sequence[Series], noises: Sequence[NoiseModel]) -> float:
 def _nominal_error(nominal: Model, fit: Fit, noise: NoiseModel) -> float | None:
     """Error of the nominal model exactly as given, its initial states fitted; None where it diverges."""
     values = {name: value.value for name, value in nominal.parameters.items() if name in fit.model.parameters}
-    try:
-        again = start_only(fit.model.with_values(values), fit.run.series, noise, fit.run.max_step)
-    except InputError:
-        return None
-    return again.nrmse()
+    again = rerun(fit.model.with_values(values), fit.run.series, noise, fit.run.max_step)
+    return None if again is None else again.nrmse()

@@ -3,16 +3,13 @@
 import math
 from collections.abc import Sequence
 
-from rhythmid.diagnose.answer.compose import explanations
+from rhythmid.diagnose.answer.compose import explanations, held_out_words, missing_effects, remainder_of
 from rhythmid.diagnose.answer.result import (
-    Curve,
     Detection,
     Diagnosis,
     Estimate,
     FitQuality,
     Location,
-    MissingEffect,
-    Remainder,
     Scored,
     Untried,
     settled,
@@ -33,28 +30,26 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
     """The diagnosis."""
     decision, chosen, nominal = result.decision, result.chosen, result.nominal
     size = variation_of(result.search.balance)
-    missing = tuple(
-        _missing(chosen, label, result) for label in decision.named if chosen.fit.model.term(label)
-    )
+    missing = missing_effects(chosen.fit.model, decision, lambda name: _estimate(chosen, name))
     before, after = (
         FitQuality(one.fit.error / size, _error(result, one) / size) for one in (nominal, chosen)
     )
-    freed = None
-    if result.selection.chosen.kind == "freed_value":
-        freed = freed_value(case.nominal, chosen.fit.model, chosen.elements)
+    freed = freed_value(case.nominal, chosen.fit.model, result.selection.chosen)
     slots = list(dict.fromkeys(effect.slot for effect in missing))
     where = "; and ".join(SENTENCES[slot] for slot in slots) or (
         "nowhere: the refitted nominal model explains the effort"
         if decision.verdict == "consistent"
         else NOT_LOCATED
     )
-    remainder = _remainder(result)
+    remainder = remainder_of(decision, {one.quantity: (one.value, one.mean) for one in result.remainder})
     if not slots and decision.verdict == "unknown_physics":
         where = SENTENCES["force"]
         slots = ["force"]
         if remainder.goes_with is not None:
             where += f"; it depends on {remainder.goes_with}"
-    held = f"held out: {', '.join(dict.fromkeys(record.whole or record.name for record in case.holdout))}"
+    # held-out records without an effort judge nothing
+    unseen = result.heldout is not None
+    held = held_out_words(case.holdout, "") if unseen else "held out: every block of the records in its turn"
     return Diagnosis(
         verdict=decision.verdict,
         summary=summary_of(decision, missing, before, after, "effort", freed),
@@ -77,7 +72,7 @@ def compose_effort(case: Case, result: EffortResult, notes: Sequence[str]) -> Di
         assumptions=(FIXED_SCALE, NO_SENSOR),
         calibration=recalibrated(case.nominal, chosen.fit.model, chosen.std()),
         excluded=tuple(Untried(name, why) for name, why in result.search.not_tried.items()),
-        heldout=held if result.heldout is not None else "held out: every block of the records in its turn",
+        heldout=held,
         notes=(*notes, *elsewhere_notes((*case.records[:1], *case.holdout))),
     )
 
@@ -96,27 +91,6 @@ def _estimate(fitted: Fitted, name: str) -> Estimate:
 def effort_parameters(fitted: Fitted) -> dict[str, Estimate]:
     """All parameters of a fit, by name."""
     return {name: _estimate(fitted, name) for name in fitted.model.parameters}
-
-
-def _missing(fitted: Fitted, label: str, result: EffortResult) -> MissingEffect:
-    term = fitted.fit.model.term(label)
-    assert term is not None
-    return MissingEffect(
-        term.element.name,
-        term.element.slot,
-        term.element.equation,
-        result.decision.shares[label],
-        result.decision.probability[label],
-        {name: _estimate(fitted, f"{label}.{name}") for name in term.values},
-    )
-
-
-def _remainder(result: EffortResult) -> Remainder:
-    """What is left, as the decision has it, with the curve over the quantity that it names; effects that are granted no place have none."""
-    left = result.decision.unexplained
-    drawn = next((one for one in result.remainder.curves if one.quantity == left.goes_with), None)
-    curve = None if drawn is None else Curve(tuple(map(float, drawn.value)), tuple(map(float, drawn.mean)))
-    return Remainder(left.share, left.significant, left.goes_with, curve)
 
 
 def effort_delays(fitted: Fitted) -> dict:

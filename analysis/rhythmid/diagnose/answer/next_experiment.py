@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PPoly
 
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.search.refit import fine_enough
@@ -44,7 +43,6 @@ class Proposal:
 
     words: str
     chi2: float
-    duration: float
 
 
 def _menu(effort: float, frequency: float, length: float, highest: float) -> list[tuple[str, dict, float]]:
@@ -61,13 +59,8 @@ def _menu(effort: float, frequency: float, length: float, highest: float) -> lis
                   {"type": "multisine", "rms": effort, "period": length / 3, "periods": 3, "band": [frequency / 5, above]},
                   1.0))  # fmt: skip
     for scale in (0.3, 3.0):
-        found.append(
-            (
-                f"the cycle alone with the forcing scaled by {scale:g}",
-                {"type": "silence", "length": length},
-                scale,
-            )
-        )
+        words = f"the cycle alone with the forcing scaled by {scale:g}"
+        found.append((words, {"type": "silence", "length": length}, scale))
     return found
 
 
@@ -121,40 +114,22 @@ def _played_menu(sizes: Scales, longest: Series, frequency: float) -> list[_Expe
     for words, spec, factor in _menu(sizes.effort, frequency, length, HIGHEST / longest.period):
         if factor != 1.0 and longest.forcing is None:
             continue
-        found.append(_Experiment(words, _imagined(longest, build(spec), longest.forcing, factor)))
+        found.append(_Experiment(words, _imagined(longest, build(spec), factor)))
     return found
 
 
-def _imagined(series: Series, excitation: Excitation, forcing: PPoly | None, factor: float) -> Series:
-    n = int(excitation.duration / series.period)
-    time = np.arange(n, dtype=float) * series.period
-    value = np.resize(series.value, n)
-    scaled = None
+def _imagined(series: Series, excitation: Excitation, factor: float) -> Series:
+    """The series as it would be with another command and so much of its forcing, in free run, as far as that was recorded."""
+    time = np.arange(int(excitation.duration / series.period), dtype=float) * series.period
+    forcing = series.forcing
     if forcing is not None:
-        span = forcing.x[-1] - forcing.x[0]
-        if span < time[-1]:
-            return _imagined_shorter(series, excitation, forcing, factor, span)
-        scaled = spline(time, factor * np.asarray(forcing(forcing.x[0] + time)))
-    return _played(series, excitation, time, value, scaled)
-
-
-def _imagined_shorter(
-    series: Series, excitation: Excitation, forcing: PPoly, factor: float, span: float
-) -> Series:
-    time = np.arange(0.0, span, series.period, dtype=np.float64)
-    scaled = spline(time, factor * np.asarray(forcing(forcing.x[0] + time)))
-    return _played(series, excitation, time, np.resize(series.value, len(time)), scaled)
-
-
-def _played(
-    series: Series, excitation: Excitation, time: Array, value: Array, forcing: PPoly | None
-) -> Series:
-    """The series as it would be with another command, in free run."""
-    command = zero_order_hold(time, excitation(time))
-    used = np.ones(len(time) // series.block, bool)
+        first, last = forcing.x[0], forcing.x[-1]
+        if last - first < time[-1]:
+            time = np.arange(0.0, last - first, series.period, dtype=np.float64)
+        forcing = spline(time, factor * np.asarray(forcing(first + time)))
     return replace(
-        series, name="imagined", time=time, value=value, command=command, forcing=forcing, used=used,
-        ignored=None,
+        series, name="imagined", time=time, value=np.resize(series.value, len(time)), forcing=forcing,
+        command=zero_order_hold(time, excitation(time)), used=np.ones(len(time) // series.block, bool), ignored=None,
     )  # fmt: skip
 
 
@@ -181,7 +156,7 @@ def separation(a: Trial, b: Trial, series: Sequence[Series], variance: float, st
         difference = difference - difference.mean()
         chi2 = float(difference @ difference) / max(variance, 1e-300)
         if math.isfinite(chi2):
-            found.append(Proposal(one.words, chi2, float(one.series.time[-1])))
+            found.append(Proposal(one.words, chi2))
     return sorted(found, key=lambda p: -p.chi2)
 
 

@@ -116,7 +116,7 @@ def findings(
         result=diagnosis.to_dict(),
         source=f"{name} against {listed([r.name for r in records])}",
         slots=slots_of(nominal),
-        forced=any(one.forcing is not None for one in result.series),
+        forced=any(one.forcing is not None for one in result.calibration.series),
         compared=Compared("motion", nominal.units.position),
         runs=tuple(runs),
         chosen=chosen.names,
@@ -128,7 +128,10 @@ def findings(
         threshold=float(chi2_distribution.isf(LEVEL / count, 1)),
         functions=_functions(result.before, result.after if found.best.added else (), runs, nominal),
         transfer=_transfer(
-            found, [p for r in records if (p := pumpings[id(r)]) is not None], result.series, nominal
+            found,
+            [p for r in records if (p := pumpings[id(r)]) is not None],
+            result.calibration.series,
+            nominal,
         ),
         nominal=given_values(nominal),
         refitted=_estimates(found.nominal),

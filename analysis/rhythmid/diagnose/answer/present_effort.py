@@ -48,7 +48,7 @@ def effort_findings(
     final = after if changed else None
     runs = effort_runs(result.search.balance, before, final, size, labels)
     if result.heldout is not None:
-        runs += effort_runs(result.heldout.balance, before, final, size, labels, heldout=True)
+        runs += effort_runs(result.heldout, before, final, size, labels, heldout=True)
     models = {"Nominal model": nominal.to_yaml(), "Nominal model, refitted": before.model.to_yaml()}
     if changed:
         models["Augmented model"] = after.model.to_yaml()
@@ -144,7 +144,7 @@ def _named(balance: Balance, index: int) -> str:
 def _functions(result: EffortResult, nominal: Model, unit: str) -> tuple[FreeFunction, ...]:
     """Mean of what the nominal and the final model leave of the effort, over each quantity."""
     first = remainder_of(result.search.balance, result.nominal)
-    later = {curve.quantity: curve for curve in result.remainder.curves}
+    later = {curve.quantity: curve for curve in result.remainder}
     length = nominal.units.position
     units = {"velocity": f"{length}/s", "acceleration": f"{length}/s^2", "time": "s", "load": unit}
     return tuple(
@@ -159,5 +159,5 @@ def _functions(result: EffortResult, nominal: Model, unit: str) -> tuple[FreeFun
             later[one.quantity].value,
             later[one.quantity].mean,
         )
-        for one in first.curves
+        for one in first
     )

@@ -9,13 +9,12 @@ from rich.markup import escape
 from rhythmid.diagnose.answer.result import Diagnosis, Explanation, Remainder, Scored
 from rhythmid.diagnose.rejections import Rejection
 from rhythmid.report.hypotheses import grouped, interchangeable, most_weighed
-from rhythmid.report.quantity import number
+from rhythmid.report.quantity import NONE, number
 from rhythmid.report.terminal_table import print_estimates, print_table
 
 HYPOTHESES_SHOWN = 6
 REJECTIONS_SHOWN = 5
 NOMINAL = "nominal model"
-NONE = "—"
 LEAST_PROBABILITY = 1e-3  # probability, of itself or of the contrary, below which only that is told
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from rhythmid.body.body import BODY
 from rhythmid.diagnose.answer.result import FitQuality, Location, MissingEffect
 from rhythmid.diagnose.constants import CONTRADICTS, CONTRADICTS_LEAST, STATED
-from rhythmid.diagnose.hypothesis import Verdict
+from rhythmid.diagnose.hypothesis import Hypothesis, Verdict
 from rhythmid.diagnose.location import Dependence
 from rhythmid.diagnose.search.forward import Search
 from rhythmid.diagnose.verdict import Decision
@@ -147,10 +147,12 @@ def listed(names: Sequence[str], word: str = "and") -> str:
     return f" {word} ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
 
 
-def freed_value(nominal: Model, fitted: Model, elements: Sequence[str]) -> str:
-    """Sentences about the fixed values among the `elements`, which a hypothesis frees beside the others."""
-    effects = [label for label in elements if fitted.term(label) is not None]
-    freed = [name for name in elements if name not in effects]
+def freed_value(nominal: Model, fitted: Model, chosen: Hypothesis) -> str | None:
+    """Sentences about the fixed values that the chosen hypothesis frees beside its effects; None where it frees none."""
+    if chosen.kind != "freed_value":
+        return None
+    effects = [label for label in chosen.elements if fitted.term(label) is not None]
+    freed = [name for name in chosen.elements if name not in effects]
     beside = f" with {listed(effects)}" if effects else ""
     values = [
         f"{name} is held at {with_written_unit(f'{held.value:.4g}', held.unit)}. Freed it comes out at {fitted.value(name):.4g}"

@@ -39,7 +39,7 @@ def beyond_gain(model: Model, label: str, sizes: Scales, recorded: Array, requir
     term = model.term(label)
     if term is None:
         return math.inf
-    values = {name: value.value for name, value in term.values.items()}
+    values = term.numbers
     if law_of(term.element, values, model, sizes) is None:
         return math.inf
 

@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.diagnose.evidence import Linearised
-from rhythmid.diagnose.static_law import SAME
+from rhythmid.diagnose.static_law import INSTANTS, SAME
 from rhythmid.elements.element import Element
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.model import Model
 from rhythmid.simulation.effect import Path, effect_along
 
 Array = NDArray[np.float64]
-INSTANTS = 400  # at which it is looked whether an effect changes with time
 
 
 def beyond_motion(balance: Balance, model: Model, label: str, plain: Linearised, mapped: Linearised) -> float:
@@ -33,9 +32,7 @@ def beyond_motion(balance: Balance, model: Model, label: str, plain: Linearised,
         The nominal fit, and the same with a free map beside its parameters.
     """
     term = model.term(label)
-    if term is None or not changes_with_time(
-        term.element, {n: v.value for n, v in term.values.items()}, model
-    ):
+    if term is None or not changes_with_time(term.element, term.numbers, model):
         return math.inf
     effect = balance.predicted(model) - balance.predicted(model.pruned(label))
     rest, beyond = (_beyond(effect, one.jacobian) for one in (plain, mapped))

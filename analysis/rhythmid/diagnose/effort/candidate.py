@@ -150,7 +150,7 @@ def screen(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> list
             best[start.kind, start.name] = Screened(start, math.inf, 1.0)  # has its own scan
             continue
         column = _column(balance, parent, start, base)
-        if column is None or not np.isfinite(column).all() or not column.any():
+        if not _says_something(column):
             continue
         change = np.concatenate([column * root, np.zeros(len(parent.precision))])
         raw = float(change @ change)
@@ -172,12 +172,15 @@ def screen(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> list
 def columns_of(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> Array:
     """Changes (n, m) of the predicted effort that additions make, those that say nothing left out."""
     base = balance.predicted(parent.model, parent.alignment)
-    made = [_column(balance, parent, start, base) for start in starts]
-    seen = [column for column in made if column is not None and np.isfinite(column).all() and column.any()]
+    seen = list(filter(_says_something, (_column(balance, parent, start, base) for start in starts)))
     return np.column_stack(seen) if seen else np.zeros((len(base), 0))
 
 
-def _column(balance: Balance, parent: EffortFit, start: Start, base: Array) -> Array | None:
+def _says_something(column: Array) -> bool:
+    return bool(np.isfinite(column).all() and column.any())
+
+
+def _column(balance: Balance, parent: EffortFit, start: Start, base: Array) -> Array:
     """Change (n,) of the predicted effort that an addition makes."""
     if start.element is None:
         value = parent.model.value(start.name)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rhythmid.diagnose.evidence import Linearised
-from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction, family_of, names_of, richer_of
+from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit
 from rhythmid.model import Model
@@ -58,17 +58,9 @@ class Fitted:
     def claimed(self, prediction: Prediction, nrmse: float | None = None) -> Hypothesis:
         """The hypothesis with what it predicts, and its error on held-out data as a share of the effort's variation."""
         model = self.fit.model
-        return Hypothesis(
-            self.elements,
-            names_of(model, self.elements),
-            self.kind,
-            self.size,
-            prediction,
-            nrmse,
-            self.shape,
-            richer=richer_of(model, self.elements),
-            values={name: model.value(name) for name in self.fit.names},
-            family=family_of(model, self.elements),
+        values = {name: model.value(name) for name in self.fit.names}
+        return Hypothesis.of(
+            model, self.elements, self.kind, self.size, prediction, nrmse, self.shape, values
         )
 
     def std(self) -> dict[str, float]:

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import variation_of
 
 Array = NDArray[np.float64]
 BINS = 16  # of equal numbers of rows: enough for a curve, each with enough rows for a mean
@@ -15,55 +14,27 @@ BINS = 16  # of equal numbers of rows: enough for a curve, each with enough rows
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Mean residual effort (b,) with its standard error (b,) over values (b,) of a quantity; `share` of its power is explained
-    by the curve beyond what bins explain by chance. `joint` is the other one whose speed the quantity is."""
+    """Mean residual effort (b,) over values (b,) of a quantity; `share` of its power is explained by the curve beyond what bins
+    explain by chance. `joint` is the other one whose speed the quantity is."""
 
     quantity: str
     value: Array
     mean: Array
-    error: Array
     share: float
     joint: str | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Remainder:
-    """The residual of a fit: recorded less predicted effort.
-
-    `size` is its rms as a share of the effort's variation; `curves` are sorted, the quantity that it goes with first. `record`, `time` [s],
-    `measured`, `predicted` (n,) are of the rows.
-    """
-
-    size: float
-    curves: tuple[Curve, ...]
-    record: NDArray[np.int64]
-    time: Array
-    measured: Array
-    predicted: Array
-
-    @property
-    def goes_with(self) -> str:
-        """The quantity of which the remainder is most nearly a function."""
-        return self.curves[0].quantity
-
-    @property
-    def of_the_motion(self) -> str:
-        """The same among the joint's own motion, its load and time."""
-        return next(curve.quantity for curve in self.curves if curve.joint is None)
-
-
-def remainder_of(balance: Balance, fitted: Fitted) -> Remainder:
-    """What a hypothesis leaves of the recorded effort, over speed, position, acceleration, load and time, and over the speeds of other
-    joints."""
+def remainder_of(balance: Balance, fitted: Fitted) -> tuple[Curve, ...]:
+    """What a hypothesis leaves of the recorded effort, recorded less predicted, over speed, position, acceleration, load and time, and
+    over the speeds of other joints; the quantity of which it is most nearly a function first."""
     left = -fitted.fit.residual
     mechanical = balance.mechanical
     time = np.concatenate([m.time[p] for m, p in zip(balance.motions, balance.places, strict=True)])
-    predicted = balance.measured - left
     quantities = {
         "velocity": mechanical[:, 1],
         "position": mechanical[:, 0],
         "acceleration": mechanical[:, 2],
-        "load": predicted,
+        "load": balance.measured - left,
         "time": time,
     }
     curves = [_curve(name, value, left) for name, value in quantities.items()]
@@ -72,10 +43,7 @@ def remainder_of(balance: Balance, fitted: Fitted) -> Remainder:
             [m.others[joint][p] for m, p in zip(balance.motions, balance.places, strict=True)]
         )
         curves.append(replace(_curve(f"the velocity of {joint}", speed, left), joint=joint))
-    return Remainder(
-        float(np.sqrt(np.mean(left**2))) / variation_of(balance), tuple(sorted(curves, key=lambda one: -one.share)),
-        balance.record, time, balance.measured, predicted,
-    )  # fmt: skip
+    return tuple(sorted(curves, key=lambda one: -one.share))
 
 
 def _curve(quantity: str, value: Array, left: Array) -> Curve:
@@ -83,10 +51,9 @@ def _curve(quantity: str, value: Array, left: Array) -> Curve:
     groups = [group for group in np.array_split(order, BINS) if len(group)]
     centre = np.array([float(np.median(value[group])) for group in groups])
     mean = np.array([float(np.mean(left[group])) for group in groups])
-    error = np.array([float(np.std(left[group])) / np.sqrt(len(group)) for group in groups])
     counts = np.array([len(group) for group in groups], dtype=float)
     between = float(np.sum(counts * (mean - left.mean()) ** 2))
     total = float(np.sum((left - left.mean()) ** 2))
     within = (total - between) / max(len(left) - len(groups), 1)
     share = (between - (len(groups) - 1) * within) / total if total > 0.0 else 0.0
-    return Curve(quantity, centre, mean, error, max(share, 0.0))
+    return Curve(quantity, centre, mean, max(share, 0.0))

@@ -12,9 +12,8 @@ from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.discrepancy import mean_product
 from rhythmid.diagnose.effort.candidate import columns_of, screen, starts_of
 from rhythmid.diagnose.effort.fitted import Fitted
-from rhythmid.diagnose.effort.held_out import HeldOut
 from rhythmid.diagnose.effort.reference import HISTORY, Mapped, reference_of, residual_with_map
-from rhythmid.diagnose.effort.remainder import Remainder, remainder_of
+from rhythmid.diagnose.effort.remainder import Curve, remainder_of
 from rhythmid.diagnose.effort.scales import scales_at
 from rhythmid.diagnose.effort.search import GAP, MOST_EFFECTS, EffortSearch, search_effort
 from rhythmid.diagnose.evidence import (
@@ -24,6 +23,7 @@ from rhythmid.diagnose.evidence import (
     cross_validate,
     detectable,
     prediction,
+    time_of_best,
 )
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction
 from rhythmid.diagnose.model_uncertainty import covariance_between
@@ -36,7 +36,6 @@ from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import EffortFit, variation_of
 from rhythmid.identify.robust_covariance import root_weights, weighted, with_robust_std
-from rhythmid.identify.student import autocorrelation_time
 
 Array = NDArray[np.float64]
 
@@ -48,7 +47,7 @@ class EffortResult:
 
     applicability: Applicability
     search: EffortSearch
-    heldout: HeldOut | None
+    heldout: Balance | None
     contest: Contest
     selection: Selection
     decision: Decision
@@ -56,7 +55,7 @@ class EffortResult:
     size_errors: Mapping[str, float]
     chosen: Fitted
     nominal: Fitted
-    remainder: Remainder
+    remainder: tuple[Curve, ...]
     errors: dict[tuple[str, ...], float]
 
 
@@ -66,7 +65,7 @@ class _Rows:
 
     record: NDArray[np.int64]
     blocks: Blocks
-    heldout: HeldOut | None
+    heldout: Balance | None
 
     def predicted(
         self,
@@ -78,9 +77,10 @@ class _Rows:
         if self.heldout is None:
             return cross_validate(seen, self.blocks)
         if mapped is None:
-            other = self.heldout.residual(fitted)
+            fit = fitted.fit
+            other = self.heldout.predicted(fit.model, fit.alignment) - self.heldout.measured
         else:
-            other = residual_with_map(self.heldout.balance, fitted, mapped)
+            other = residual_with_map(self.heldout, fitted, mapped)
         residual = np.concatenate([seen.residual, other])
         jacobian = np.vstack([seen.jacobian, np.zeros((len(other), seen.jacobian.shape[1]))])
         return cross_validate(Linearised(residual, jacobian, seen.precision, seen.departure), self.blocks)
@@ -92,18 +92,17 @@ class _Rows:
         return held if held.any() else ~held
 
 
-def _rows(case: Case, found: EffortSearch, unseen: Balance | None) -> _Rows:
-    heldout = None if unseen is None else HeldOut(unseen)
+def _rows(case: Case, found: EffortSearch, heldout: Balance | None) -> _Rows:
     if case.holdout:
         try:
-            heldout = HeldOut.of(case.holdout, found.nominal.fit.model, found.balance)
+            heldout = Balance.of(case.holdout, found.nominal.fit.model, found.balance.bandwidth)
         except InputError:
             heldout = None  # too little motion, or no effort: they judge nothing
     record = found.balance.record
     if heldout is None:
         return _Rows(record, Blocks.of(record, GAP), None)
     first = int(record.max()) + 1
-    others = heldout.balance.record + first
+    others = heldout.record + first
     whole = np.concatenate([record, others])
     return _Rows(whole, Blocks.of(whole, GAP, np.unique(others)), heldout)
 
@@ -130,16 +129,15 @@ def effort_run(
     predicted = {one.elements: rows.predicted(one) for one in found.hypotheses}
     ruled_out = {one.elements: rows.predicted(one) for one in found.ruled_out}
     left = remainder_of(found.balance, found.chosen)
+    of_the_motion = next(curve.quantity for curve in left if curve.joint is None)
     mapped = {
-        left.of_the_motion: rows.predicted(found.chosen, found.beyond),
+        of_the_motion: rows.predicted(found.chosen, found.beyond),
         HISTORY: rows.predicted(found.chosen, found.history),
     }
-    if (beside := left.curves[0].joint) is not None:
+    if (beside := left[0].joint) is not None:
         coupled = reference_of(found.balance, found.chosen, found.blocks, beside)
-        mapped[left.goes_with] = rows.predicted(found.chosen, coupled)
-    every = [*predicted.values(), *mapped.values()]
-    best = min(every, key=lambda one: float(np.sum(one.error**2)))
-    time = autocorrelation_time(best.error, rows.record)
+        mapped[left[0].quantity] = rows.predicted(found.chosen, coupled)
+    time = time_of_best([*predicted.values(), *mapped.values()], rows.record)
 
     def made(one: CrossValidated) -> Prediction:
         return prediction(one, rows.blocks, time)

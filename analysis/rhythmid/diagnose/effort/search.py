@@ -41,7 +41,6 @@ from rhythmid.elements.element import Element
 from rhythmid.identify.inverse_dynamics.balance import Balance
 from rhythmid.identify.inverse_dynamics.estimate import (
     Alignment,
-    condition_of,
     fit_effort,
     linearise,
     priors_of,
@@ -70,7 +69,6 @@ class EffortSearch:
     reference, beyond : the nominal model, and the chosen one, with curves over the motion beside them.
     history : the chosen model with a free function of the motion and its past beside it.
     chosen : the hypothesis with which the search ended.
-    condition : of the nominal model's scaled columns.
     not_tried : why candidates of the catalogue took no part, by name; and what the budget cut off.
     candidates : number of effects that were tried.
     cut_short : whether the budget ended the search.
@@ -85,7 +83,6 @@ class EffortSearch:
     reference: Mapped
     beyond: Mapped
     history: Mapped
-    condition: float
     not_tried: Mapping[str, str]
     candidates: int
     cut_short: bool = False
@@ -136,7 +133,7 @@ def search_effort(
     beyond = reference_of(balance, chosen, search.blocks)
     history = history_of(balance, chosen, search.blocks)
     return EffortSearch(
-        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, history, condition_of(nominal.fit), not_tried(catalogue, model, scales_of(balance, model)) | search.cut, len(search.tried), bool(search.cut),
+        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, history, not_tried(catalogue, model, scales_of(balance, model)) | search.cut, len(search.tried), bool(search.cut),
     )  # fmt: skip
 
 
@@ -377,11 +374,9 @@ class _Search:
         return replace(made, shape={"within_bounds": min(ends, default=math.inf)})
 
     def _aligned(self, elements: Sequence[str]) -> Alignment:
-        usual = Alignment.of(self.balance)
         if INPUT_DELAY not in elements:
-            return usual
-        most = late_start(self.balance, self.nominal.fit)[0]
-        return most
+            return Alignment.of(self.balance)
+        return late_start(self.balance, self.nominal.fit)[0]
 
     def _known(self, fitted: Fitted) -> bool:
         return any(set(one.elements) == set(fitted.elements) for one in self.found)

@@ -64,7 +64,7 @@ def joint_catalogue(catalogue: Catalogue) -> Catalogue:
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
 def diagnose_joint(
     balances: JointBalances, unseen: JointBalances | None, joint: str, catalogue: Catalogue, tell: Tell,
-    budget: Budget, late: float = 0.0, most: int = MOST_EFFECTS,
+    budget: Budget, late: float = 0.0,
 ) -> JointResult:  # fmt: skip
     """Search for what one joint's path lacks; a reference acts there `late` [s] after its stamp. Raises InputError where the records hold too little of its motion."""
     model = balances.models[joint]
@@ -76,7 +76,9 @@ def diagnose_joint(
         except InputError:
             other = None  # too little motion: it judges nothing
     case = Case(model, (), (), joint_catalogue(catalogue), None, tell, budget)
-    found = effort_run(case, _applicable(balance, model), most, other, PROMISING, len(balances.models))
+    found = effort_run(
+        case, _applicable(balance, model), MOST_EFFECTS, other, PROMISING, len(balances.models)
+    )
     return JointResult(joint, case, late, found)
 
 

@@ -16,12 +16,12 @@ from rhythmid.model import INERTIA
 from rhythmid.report.quantity import in_words
 from rhythmid.simulation.transport import INPUT_DELAY
 
-EQUATIONS = {  # of what is no element: its slot and what it says
-    "armature": ("body", "M_jj → M_jj + ΔI"),
-    "link_mass": ("body", "m → m′, shape kept"),
-    "link_inertia": ("body", "J → J′ about the centre of mass, along the joint's axis"),
-    "payload": ("body", "point mass m at the end of the link"),
-    "actuator_delay": ("actuator", "f(t) → f(t − τ)"),
+EQUATIONS = {  # of what is no element: its slot, what it says, and the name of its one parameter
+    "armature": ("body", "M_jj → M_jj + ΔI", "inertia_error"),
+    "link_mass": ("body", "m → m′, shape kept", "mass"),
+    "link_inertia": ("body", "J → J′ about the centre of mass, along the joint's axis", "inertia"),
+    "payload": ("body", "point mass m at the end of the link", "mass"),
+    "actuator_delay": ("actuator", "f(t) → f(t − τ)", "delay"),
 }
 IN_CONTACT = (
     "What was recorded in contact with the ground, or near it, is left out: the contact's force is not known."
@@ -95,8 +95,8 @@ def _effect(one: JointResult, answer: Diagnosis, label: str) -> JointEffect:
         element, slot, equation = known.element.name, known.element.slot, known.element.equation
     else:
         element, _ = name_of(one.joint, label)
-        slot, equation = EQUATIONS[element]
-        parameters = {_own(element): _value(one, answer, label)}
+        slot, equation, own = EQUATIONS[element]
+        parameters = {own: _value(one, answer, label)}
     return JointEffect(
         one.joint,
         element,
@@ -107,17 +107,6 @@ def _effect(one: JointResult, answer: Diagnosis, label: str) -> JointEffect:
         parameters,
         gain,
     )
-
-
-def _own(element: str) -> str:
-    """Name of the one parameter of what is no element."""
-    return {
-        "armature": "inertia_error",
-        "link_mass": "mass",
-        "link_inertia": "inertia",
-        "payload": "mass",
-        "actuator_delay": "delay",
-    }[element]
 
 
 def _value(one: JointResult, answer: Diagnosis, label: str) -> Estimate:
@@ -144,7 +133,7 @@ def _link(machine: Machine, wrong: WrongLink) -> JointEffect:
     one, label = wrong.shown, f"{BODY}.{wrong.parameter}"
     decision = one.result.decision
     element, name = name_of(one.joint, label)
-    slot, equation = EQUATIONS[element]
+    slot, equation, _ = EQUATIONS[element]
     return JointEffect(
         machine.body.joint_of(name), element, slot, equation, decision.shares[label], decision.probability[label],
         dict(wrong.values), _gain(one), name,

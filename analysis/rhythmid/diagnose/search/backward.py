@@ -6,7 +6,6 @@ from rhythmid.diagnose.search.refit import reach_of, run_trials, under_noise
 from rhythmid.diagnose.search.round import Round, distinct
 from rhythmid.diagnose.search.trial import Origin, Proposal, Trial, propose
 from rhythmid.elements.catalogue import Catalogue
-from rhythmid.elements.element import Element
 from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series
@@ -96,7 +95,9 @@ def _swaps(
             starts = _starts_for(catalogue, name, series, slim, rounds, 8 if name in family else 1)
             beside: list[dict[str, float]] = []
             if starts and name in family:  # a special case of the best is at its best close to it
-                starts.insert(0, starts[0] | _shared(best, label, catalogue[name]))
+                own = {parameter.name for parameter in catalogue[name].parameters}
+                values = _values(best, label).items()
+                starts.insert(0, starts[0] | {key: value for key, value in values if key in own})
             elif tuple(sorted((*rest, name))) in trials:
                 continue
             elif name in alone:  # what it needs beside it the fit with it alone has found
@@ -120,16 +121,6 @@ def _values(trial: Trial, label: str) -> dict[str, float]:
 def _given(trial: Trial, model: Model) -> dict[str, float]:
     """A trial's values of the parameters that another model has free, too."""
     return {name: trial.model.value(name) for name in model.free if name in trial.model.parameters}
-
-
-def _shared(trial: Trial, label: str, element: Element) -> dict[str, float]:
-    """Values of the parameters that another element has by the same names as the one under the label."""
-    own = {parameter.name for parameter in element.parameters}
-    return {
-        p.name: trial.model.value(f"{label}.{p.name}")
-        for p in trial.element(label).parameters
-        if p.name in own
-    }
 
 
 def _rest(trial: Trial, slim: Model) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ from rhythmid.parallel import fork_map
 from rhythmid.progress import Tell, counted, silent
 
 Array = NDArray[np.float64]
-SKETCH, BRIEF, THOROUGH = 3, 6, 20  # iterations
+SKETCH, BRIEF, FULL, THOROUGH = 3, 6, 15, 20  # iterations
 STEEP = 0.8  # of chi2, below which as many iterations as in a sketch have to bring a descent that goes on
 CARRIED_ON = 0.3  # share of the spread of chi2 within which a model is carried to convergence
 # share of its ceiling, above which the best of a round has found so little that all minima of all trials are gone through
@@ -176,17 +176,8 @@ def _hopped(
             if not low < value < high:
                 continue
             moved = before.model.with_values({name: value})
-            again = descend(
-                moved,
-                run,
-                names,
-                noise,
-                before.starts,
-                BRIEF,
-                None,
-                TOLERANCE,
-                similar=_steps(before, run, [name]),
-            )
+            steps = _steps(before, run, [name])
+            again = descend(moved, run, names, noise, before.starts, BRIEF, None, TOLERANCE, similar=steps)
             best = min(best, again, key=lambda end: end.chi2)
         if best.chi2 > before.chi2 - 1.0:
             break
@@ -320,39 +311,16 @@ def whole_fit(
     series: Sequence[Series],
     noise: NoiseModel,
     max_step: float,
-    iterations: int = 15,
     pool: ThreadPoolExecutor | None = None,
     reach: float = math.inf,
 ) -> Fit:
     """The full fit of a trial under a noise model; one that has converged under it is only evaluated, one that would not come to
     `reach` is not carried to convergence."""
-    if _settled(trial, noise):
-        iterations = 1
     run = _run_of(trial, series, noise, max_step)
-    names = tuple(trial.model.free)
     return minimise(
-        trial.model,
-        run,
-        names,
-        noise,
-        trial.starts,
-        iterations,
-        pool,
-        differences=trial.differences,
-        reach=reach,
-    )
-
-
-def _again(
-    trial: Trial, series: Sequence[Series], noise: NoiseModel, max_step: float, iterations: int, reach: float
-) -> Outcome:
-    """Where a trial's descent under a noise model ends; without `iterations`, the trial as it is."""
-    run = _run_of(trial, series, noise, max_step)
-    names = tuple(trial.model.free)
-    end = descend(
-        trial.model, run, names, noise, trial.starts, iterations, None, TOLERANCE, trial.differences, reach
-    )
-    return outcome_of(end, run, noise)
+        trial.model, run, tuple(trial.model.free), noise, trial.starts, 1 if _settled(trial, noise) else FULL, pool,
+        differences=trial.differences, reach=reach,
+    )  # fmt: skip
 
 
 def under_noise(
@@ -360,16 +328,29 @@ def under_noise(
     series: Sequence[Series],
     noise: NoiseModel,
     max_step: float,
-    iterations: int = 15,
+    iterations: int = FULL,
     reach: float = math.inf,
 ) -> list[Trial]:
     """The trials, best first, all under one noise model: those that were fitted under another are fitted again, as far as they may
-    come to `reach`."""
+    come to `reach`; without `iterations` they stay as they are."""
     done = [trial for trial in trials if _settled(trial, noise)]
     others = [trial for trial in trials if not _settled(trial, noise)]
 
     def one(trial: Trial) -> Outcome:
-        return _again(trial, series, noise, max_step, iterations, reach)
+        run, names = _run_of(trial, series, noise, max_step), tuple(trial.model.free)
+        end = descend(
+            trial.model,
+            run,
+            names,
+            noise,
+            trial.starts,
+            iterations,
+            None,
+            TOLERANCE,
+            trial.differences,
+            reach,
+        )
+        return outcome_of(end, run, noise)
 
     again = [
         trial_of(others[index].added, others[index].model, result, noise)

@@ -28,7 +28,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.declared import own_model
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.free_run import DIVERGED, FreeRun, prepare_run, with_series
-from rhythmid.identify.noise import NoiseModel, runs
+from rhythmid.identify.noise import NoiseModel
 from rhythmid.identify.output_error import Fit, minimise
 from rhythmid.identify.record_scales import scales
 from rhythmid.model import Model
@@ -39,9 +39,8 @@ from rhythmid.simulation.signal import first_order_hold, is_held
 from rhythmid.simulation.transport import delayed_command, delays, physical_times
 
 Array = NDArray[np.float64]
-FULL_PRECISION_ROWS = (
-    200_000  # averages in all, beyond which changes are kept to seven digits: a score needs no more
-)
+# averages in all, beyond which changes are kept to seven digits: a score needs no more
+FULL_PRECISION_ROWS = 200_000
 
 
 @dataclass(frozen=True)
@@ -180,7 +179,7 @@ def _body_force(model: Model, time: Array, x: Array, v: Array, f: Array) -> Arra
             and element.kernel is not None
             and not element.own
         ):
-            values = {name: value.value for name, value in term.values.items()}
+            values = term.numbers
             total += effect_along(element, values, model, Path(time, x, v, f, total, x))
     return total
 
@@ -196,11 +195,9 @@ def change_of_output(
     changes: list[Array] = []
     if element.delay is not None or element.history:
         model = fit.model.with_element(element, values, fixed=True)
-        outputs = (
-            _with_history(fit, model).outputs(model, fit.starts)
-            if element.history
-            else fit.run.outputs(model, fit.starts)
-        )
+        # what keeps a history changes what a controller does ever after, and is simulated
+        kept = prepare_run(model, fit.run.series, fit.run.max_step) if element.history else fit.run
+        outputs = kept.outputs(model, fit.starts)
         if outputs is None:
             return None
         return [new - one.of_block(old) for new, one, old in zip(outputs, run.series, known.outputs)]
@@ -235,12 +232,6 @@ def change_of_output(
     return changes
 
 
-def _with_history(fit: Fit, model: Model) -> FreeRun:
-    """The fit's run for the model with one more element, which keeps a history: what that does is simulated, for it changes what
-    a controller does ever after."""
-    return prepare_run(model, fit.run.series, fit.run.max_step)
-
-
 def _change_of_reference(known: Trajectories, index: int, change: Array) -> Array | None:
     """Change of the block-averaged output when a controller's reference changes; None when the model diverges."""
     fit, run, one = known.fit, known.disturbed, known.disturbed.series[index]
@@ -261,12 +252,8 @@ def _change_of_reference(known: Trajectories, index: int, change: Array) -> Arra
 
 def whitened(fit: Fit, samples: Sequence[Array], noise: NoiseModel) -> list[Array]:
     """Used stretches of each series, whitened and joined."""
-    found = []
-    for one, given in zip(fit.run.series, samples):
-        stretches = [s for s in runs(one.used) if s.stop - s.start > noise.order + 1]
-        parts = [noise.whiten(one.levelled(given[s], s)) for s in stretches]
-        found.append(np.concatenate(parts) if parts else given[:0])
-    return found
+    series = fit.run.series
+    return [one.whitened(noise, given, one.stretches(noise)) for one, given in zip(series, samples)]
 
 
 def projected(fit: Fit, white: Sequence[Array]) -> Array:
@@ -390,9 +377,8 @@ def residual_line(fit: Fit) -> float:
     return float((place + (0.5 * (below - above) / bend if bend < 0.0 else 0.0)) / (length * period))
 
 
-def p_value(scores: Sequence[Score], inflation: float = 1.0) -> float:
+def p_value(scores: Sequence[Score]) -> float:
     """Probability of a best score as high as this where nothing is missing (Bonferroni over all guesses)."""
     if not scores:
         return 1.0
-    best = scores[0].statistic / max(inflation, 1.0)
-    return float(min(1.0, len(scores) * chi2_distribution.sf(best, 1)))
+    return float(min(1.0, len(scores) * chi2_distribution.sf(scores[0].statistic, 1)))

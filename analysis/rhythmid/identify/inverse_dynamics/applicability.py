@@ -111,5 +111,5 @@ def restores(balance: Balance, model: Model, measured: OutputKind = "position") 
     path = Path(np.linspace(0.0, 1.0, POINTS), position, velocity, zero, zero, zero)
     for term in model.terms:
         if term.element.slot == "force" and term.element.acts in ("leg", "body"):
-            total += effect_along(term.element, {n: v.value for n, v in term.values.items()}, model, path)
+            total += effect_along(term.element, term.numbers, model, path)
     return bool(total[0] - total[-1] > 1e-9 * max(float(np.abs(total).max()), 1e-300))

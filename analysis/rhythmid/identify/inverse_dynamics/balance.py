@@ -287,7 +287,7 @@ class Balance:
         self, motion: Motion, term: Term, model: Model, effort: Array, leg: Array, signal: Array,
         load: Array | None = None,
     ) -> Array:  # fmt: skip
-        values = {name: value.value for name, value in term.values.items()}
+        values = term.numbers
         of_leg = term.element.acts not in ("body", "drive")
         # a motion without anything fast moves an element's states smoothly; what has none takes the simulator's own step
         step = max(MAX_STEP, motion.period / SUBSTEPS) if term.element.states else MAX_STEP
@@ -319,7 +319,7 @@ class Balance:
         name = term.element.name
         if name not in self._sensitive:
             wave = np.sin(np.linspace(0.0, 20.0, TESTED))
-            values = {key: value.value for key, value in term.values.items()}
+            values = term.numbers
             if term.element.size and math.isfinite(term.element.absent):
                 values[term.element.size] = term.element.absent + 0.5  # an absent effect depends on nothing
             span = np.linspace(0.0, 1.0, TESTED)

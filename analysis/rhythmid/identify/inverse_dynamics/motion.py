@@ -281,7 +281,7 @@ def _before_sensor(stretch: Stretch, model: Model) -> Array:
         if term.element.slot == "sensor" and term.element.kernel is not None:
             zero = np.zeros(len(output))
             path = Path(stretch.time, output, zero, zero, zero, output)
-            values = {name: value.value for name, value in term.values.items()}
+            values = term.numbers
             output = output - effect_along(term.element, values, model, path)
     return output
 

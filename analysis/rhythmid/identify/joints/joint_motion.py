@@ -190,7 +190,7 @@ def controller_effort(model: Model, joint: str, motion: Motion, body: BodyMotion
     total = np.zeros(len(motion.time))
     for term in model.terms:
         if term.element.acts == "feedback" and term.element.kernel is not None:
-            values = {name: value.value for name, value in term.values.items()}
+            values = term.numbers
             total = term.element.kernel(asked, motion.position, motion.velocity, motion.time, **values)
     if joint in stretch.forward:
         total = total + stretch.forward[joint][:: body.every]
