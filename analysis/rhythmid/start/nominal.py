@@ -73,7 +73,16 @@ def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Ca
         law, kind = _restoring(records, rows, roles.rotary, inertial=True)
     except InputError as error:
         return _by_size(records, units, catalogue, str(error))
+    opposite, turned = "", None if rows.by_base else _reversed(records, rows, law, roles.rotary)
+    if turned is not None:
+        opposite = (
+            f"with scale: -1 for the {'effort' if 'effort' in roles.choices else 'input'} the balance of forces explains "
+            f"{1.0 - turned[0].left:.0%} of it, as recorded {max(0.0, 1.0 - law.left):.0%}: its sign seems to be opposite to the motion's, "
+            "and all values here are those of the reversed one"
+        )
+        rows, (law, kind) = rows.reversed, turned
     inertia, doubts = _shown(law, rows)
+    doubts |= {INERTIA: opposite} if opposite else {}
     if inertia <= 0.0:
         return _by_size(records, units, catalogue, "the balance of forces shows no inertia")
     if law.left > UNEXPLAINED:
@@ -112,6 +121,19 @@ def _shown(law: Law, rows: Rows) -> tuple[float, dict[str, str]]:
         )
     inertia = max(found["acceleration"], least)
     return inertia, {INERTIA: "; ".join(doubts)} if doubts else {}
+
+
+def _reversed(records: Sequence[Record], rows: Rows, law: Law, rotary: bool) -> tuple[Law, str] | None:
+    """The balance of what drives counted the other way, where that explains clearly more, and acts no later; None else.
+
+    The inertia itself has to explain a share: what a controller makes of position and speed is balanced by spring and damper that way.
+    The wrong sign of a periodic drive is half a period of delay, so that a later law tells nothing of the sign.
+    """
+    turned, kind = _restoring(records, rows.reversed, rotary, inertial=True)
+    if turned.left > UNEXPLAINED or turned.delay > law.delay or not turned.earns_place(law):
+        return None
+    rest = [name for name in turned.coefficients if name != "acceleration"]
+    return (turned, kind) if turned.earns_place(rows.reversed.fit(rest, turned.delay)) else None
 
 
 def _restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:
