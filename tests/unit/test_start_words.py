@@ -116,3 +116,32 @@ def test_a_letter_beside_a_word_that_is_not_known_is_doubted(tmp_path):
     (doubt,) = guess(table(tmp_path, xBlorf=X, u=FORCE)).roles.choices["output"].doubts
     assert "'x'" in doubt and "'blorf'" in doubt
     assert not guess(table(tmp_path, x=X, u=FORCE)).roles.choices["output"].doubts
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e3, 1e9])
+@pytest.mark.parametrize("name", ["clock_of_motor", "u", "t_cmd"])
+def test_a_number_that_runs_like_a_clock_is_no_effort(tmp_path, name, unit):
+    late = 0.02 * np.random.default_rng(0).random(len(TIME))
+    clock = unit * (18792.0 + np.maximum.accumulate(TIME - late))
+    assert roles_of(table(tmp_path, pos=X, force=FORCE, **{name: clock})) == {
+        "output": "pos",
+        "input": "force",
+    }
+
+
+def test_an_uptime_in_a_command_is_no_effort(tmp_path):
+    rows = range(0, 8000, 4)
+    topics = {
+        "/motor_command": [(NOW + TIME[k], foreign.array([4711.0 + TIME[k], 0.5 * X[k]])) for k in rows],
+        "/joint_states": [
+            (NOW + TIME[k], joint_state(NOW + TIME[k], ["knee"], position=[X[k]])) for k in rows
+        ],
+    }
+    found = roles_of(foreign.write(tmp_path / "bag", topics))
+    assert "/motor_command data[0]" not in found.values()
+
+
+def test_a_uniform_motion_and_an_effort_that_rises_are_no_clocks(tmp_path):
+    rising = 0.4 * TIME
+    found = roles_of(table(tmp_path, x=TIME + 0.001 * OTHER, torque=rising))
+    assert found == {"output": "x", "input": "torque"}

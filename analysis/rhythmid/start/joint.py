@@ -66,7 +66,7 @@ def joint_of(
     if not motion:
         motion = _motion_of_untold(known, still)
     if wanted is not None and wanted not in motion:
-        called = [name for name in motion if same_joint(name, wanted)] or _begin_with(wanted, motion)
+        called = [name for name in motion if same_joint(name, wanted)] or _with_words(wanted, motion)
         wanted = called[0] if len(called) == 1 else wanted
     if wanted is not None and motion.get(wanted) == 0.0:
         raise InputError(f"{place}: joint {wanted!r} stands still")
@@ -85,10 +85,12 @@ def joint_of(
     return Joint(close[number], motion, _further(close[number], known))
 
 
-def _begin_with(wanted: str, names: Iterable[str]) -> list[str]:
-    """The names that begin with the words of another one, as swing_sensor does with swing."""
+def _with_words(wanted: str, names: Iterable[str]) -> list[str]:
+    """The names that begin with the words of another one, as swing_sensor does with swing, else those that hold them, as arm_pitch
+    does pitch."""
     words = words_of(wanted)
-    return [name for name in names if words and words_of(name)[: len(words)] == words]
+    holding = [name for name in names if words and f" {' '.join(words)} " in f" {' '.join(words_of(name))} "]
+    return [name for name in holding if words_of(name)[: len(words)] == words] or holding
 
 
 def _further(name: str, known: Sequence[tuple[Recorded, Meaning]], asked: bool = False) -> frozenset[str]:

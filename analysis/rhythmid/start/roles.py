@@ -10,6 +10,7 @@ from rhythmid.record.inventory import Inventory, Recorded
 from rhythmid.record.output_copy import doubt_of_copy
 from rhythmid.record.signals import InputKind, OutputKind
 from rhythmid.record.standstill import FLICKER
+from rhythmid.record.table_clock import is_time
 from rhythmid.start.by_data import by_data, note_of_unknown, output_by_data
 from rhythmid.start.carried import carried_motion
 from rhythmid.start.copies import copies_output, note_of_copy, note_of_sensor
@@ -26,7 +27,7 @@ from rhythmid.start.meaning import (
     rotary_of,
     says_who_asks,
 )
-from rhythmid.start.relation import RATIO, coherent, derivative, goes_along
+from rhythmid.start.relation import RATIO, coherent, derivative, goes_along, runs_like_a_clock
 from rhythmid.start.step_before import BEFORE, duty_before, set_point_before, step_before
 from rhythmid.start.targets import with_targets
 from rhythmid.start.unnamed_joints import column_groups
@@ -58,7 +59,9 @@ def first_answer(question: str, answers: Sequence[str]) -> int:
 
 def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_answer) -> Roles:
     """Roles of what is in a source. Raises InputError where nothing can be the output, or no joint is called `joint`."""
-    known = [Known(one, meaning_of(one)) for one in found.recorded if not is_ignored(one)]
+    known = [
+        Known(one, meaning_of(one)) for one in found.recorded if not is_ignored(one) and not _is_clock(one)
+    ]
     known = _without_empty_letters(known)
     everything = [*known, *(Known(one, meaning_of(one)) for one in found.constant)]
     known, resting = (with_targets(part, everything) for part in (known, everything[len(known) :]))
@@ -136,6 +139,14 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     of_robot = bool(chosen.others)
     rotary, why = _rotary(choices if carried is None else {"output": output}, output.recorded, of_robot, ask)
     return Roles(choices, kind, _output_kind(measured), rotary, why, chosen, reference_of, tuple(notes))
+
+
+def _is_clock(one: Recorded) -> bool:
+    """Whether it is a time: a field that is called one and goes forward, or a number that runs like a clock where no word says a motion."""
+    meaning = meaning_of(one)
+    if meaning.certain or meaning.quantity in MEASURED:
+        return False
+    return is_time(one.said, one.value) or runs_like_a_clock(one)
 
 
 def _of_other_side(one: Recorded, output: Recorded) -> bool:
