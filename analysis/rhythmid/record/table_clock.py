@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 TIME = re.compile(
     r"(?:elapsed_?|time_?|wall_?|ros_?)*(?:t|time|timestamp|stamp|seconds|secs?|clock)", re.IGNORECASE
 )
+IN_BRACKETS = re.compile(
+    r"(?<=\w)\s*(?:\([^()]*\)|\[[^\[\]]*[^\[\]\d][^\[\]]*\])\s*$"
+)  # a unit; [3] is a place in an array
 KIND_OF_TIME = re.compile(r".*_(?:time|timestamp|stamp|clock)", re.IGNORECASE)  # pi_time, cpu_time
 COUNTER = re.compile(
     r"|index|idx|i|n|k|id|no|nr|frame|sample|step|row|count|counter|seq|unnamed: 0", re.IGNORECASE
@@ -53,7 +56,8 @@ def _is_coarse(value: Array) -> bool:
 
 
 def _called(name: str) -> str:
-    return re.split(r"[./]", heading_of(name).name)[-1].replace(" ", "_")
+    """The last part of a name, without brackets, whatever stands in them."""
+    return re.split(r"[./]", IN_BRACKETS.sub("", heading_of(name).name))[-1].replace(" ", "_")
 
 
 def _forward(value: Array) -> bool:
