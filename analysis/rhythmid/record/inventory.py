@@ -89,8 +89,8 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Inventory:
-    """All numbers of a source that change, how its times are told and why, what was left out, of that what never changes, and
-    what a user should know."""
+    """All numbers of a source that change, how its times are told and why, what was left out, of that what never changes,
+    what a user should know, and of a bag all numbers in the order of their messages."""
 
     path: Path
     recorded: tuple[Recorded, ...]
@@ -99,6 +99,7 @@ class Inventory:
     left_out: tuple[str, ...] = ()
     constant: tuple[Recorded, ...] = ()
     notes: tuple[str, ...] = ()
+    listed: tuple[Recorded, ...] = ()
 
     @property
     def is_bag(self) -> bool:
@@ -231,7 +232,7 @@ def _of_bag(bag: Bag, vehicle: bool) -> Inventory:
             f"{bag.path}: no topic holds a number that changes; topics: {', '.join(sorted(bag.topics)) or 'none'}"
         )
     still = tuple(one for one in constant if len(one.value) > 1)
-    return Inventory(bag.path, tuple(moving), Clock("receive"), "", tuple(left), still)
+    return Inventory(bag.path, tuple(moving), Clock("receive"), "", tuple(left), still, listed=tuple(found))
 
 
 def _filled(fields: list[Recorded], columns: Columns, begin: int) -> Iterator[Recorded]:

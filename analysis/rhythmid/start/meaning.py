@@ -37,8 +37,8 @@ LETTERS: dict[str, Quantity] = {  # what one letter stands for by custom, where 
     "u": "effort", "f": "effort", "i": "effort", "t": "effort",
 }  # fmt: skip
 COMMANDED = frozenset(
-    "des desired cmd cmds command commands commanded ref reference target targets goal setpoint sp set demand demanded excitation "
-    "request requested".split()
+    "des desired cmd cmds command commands commanded ref refs reference references target targets goal goals setpoint setpoints sp set "
+    "demand demands demanded excitation request requests requested".split()
 )
 COMMANDED_LETTERS = frozenset("u r".split())
 # a controller's output, of an effort; the short ones of a force are a contact's and a centre's
@@ -78,7 +78,7 @@ LINEAR = frozenset(
     " deflection elevator".split()
 )  # fmt: skip
 POSED = frozenset(
-    "des desired ref reference target targets goal setpoint sp".split()
+    "des desired ref refs reference references target targets goal goals setpoint setpoints sp".split()
 )  # of a motion, where nothing else is said
 ELECTRICAL = {"V": "voltage volt volts", "A": "current currents cur iq amp amps i", "1": "pwm duty"}
 IN_SI = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/", "tf2_msgs/", "trajectory_msgs/", "control_msgs/")

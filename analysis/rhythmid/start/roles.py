@@ -190,8 +190,9 @@ def _doubted(choice: Choice, copies: Mapping[int, float]) -> Choice:
 
 def _idle(rest: list[Known], output: Recorded, ask: Ask) -> tuple[dict[str, Choice], list[str]]:
     """What a user takes for the input where nothing is known to drive the machine; else what was left unused."""
-    along = [(coherent(one.one, output), one) for one in rest if goes_along(one.one, output)]
-    along.sort(key=lambda pair: -pair[0])
+    own = [one for one in rest if _is_elsewhere_of(one, output)]
+    along = [(coherent(one.one, output), one) for one in rest if one in own or goes_along(one.one, output)]
+    along.sort(key=lambda pair: (pair[1] not in own, -pair[0]))
     unknown = [one for one in rest if one.quantity is None and all(one is not each for _, each in along)]
     able = [*(one for _, one in along), *unknown]
     number = (
@@ -206,11 +207,19 @@ def _idle(rest: list[Known], output: Recorded, ask: Ask) -> tuple[dict[str, Choi
         for share, one in along
     )
     notes = (
-        [f"nothing is taken to drive the machine, though this goes with the output: {listed}"]
+        [
+            f"nothing is taken to drive the machine, though this {'is of its joint or ' if own else ''}goes with the output: {listed}"
+        ]
         if along
         else []
     )
     return {}, notes + ([note_of_unknown(unknown, output)] if unknown else [])
+
+
+def _is_elsewhere_of(one: Known, output: Recorded) -> bool:
+    """Whether it is of the output's joint by name, in another message."""
+    joint = meaning_of(output).joint
+    return bool(output.topic and joint) and one.meaning.joint == joint and one.one.topic != output.topic
 
 
 def _output_kind(quantity: Quantity) -> OutputKind:

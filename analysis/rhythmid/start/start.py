@@ -18,6 +18,7 @@ from rhythmid.record.signals import Clock, Signals
 from rhythmid.record.standstill import standstill
 from rhythmid.start.force_unit import MODELLED
 from rhythmid.start.known import Ask
+from rhythmid.start.listed_joints import with_listed_joints
 from rhythmid.start.meaning import driving_unit_of, meaning_of
 from rhythmid.start.named_joints import with_joints
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
@@ -72,7 +73,7 @@ def guess(
     source: str | Path, joint: str | None = None, rate: float | None = None, ask: Ask = first_answer
 ) -> Guess:
     """Look at one recording and guess which channel is what; parameters and errors as of `start`."""
-    found = with_joints(with_sides(_inventory(source, rate)))
+    found = with_joints(with_sides(with_listed_joints(_inventory(source, rate))))
     roles = guess_roles(found, joint, ask)
     units = _units(roles)
     clock, reason = clock_of(found, roles)
