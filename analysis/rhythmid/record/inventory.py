@@ -24,7 +24,7 @@ from rhythmid.record.message_types import typestore
 from rhythmid.record.other_lengths import length_notes, unequal_arrays
 from rhythmid.record.signals import Clock
 from rhythmid.record.table import SUFFIXES, WIDEST, Table, table_suffix
-from rhythmid.record.table_clock import COUNTER, is_even, is_time, table_clock
+from rhythmid.record.table_clock import COUNTER, is_even, is_further_time, is_time, table_clock
 from rhythmid.record.two_clocks import clock_notes, trusted_clock
 
 Array = NDArray[np.float64]
@@ -160,7 +160,9 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
         heading, time = heading_of(name), every
         if name in parts:
             continue
-        if clock.kind == "column" and (name == clock.column or is_time(name, value[~np.isnan(value)])):
+        if clock.kind == "column" and (
+            name == clock.column or is_further_time(name, value[~np.isnan(value)])
+        ):
             continue
         if clock.kind == "rate" and (is_time(name, value) or (name.isdigit() and is_even(value))):
             left.append(f"{name}: goes forward like a time")

@@ -14,7 +14,8 @@ from rhythmid.record.signals import Clock
 
 Array = NDArray[np.float64]
 TIME = re.compile(
-    r"(?:elapsed_?|time_?|wall_?|ros_?)*(?:t|time|timestamp|stamp|seconds|secs?|clock)", re.IGNORECASE
+    r"(?:elapsed_?|time_?|wall_?|ros_?)*(?:t|time|timestamp|stamp|seconds|secs?|clock|tiempo|tempo|temps|zeit)",
+    re.IGNORECASE,
 )
 IN_BRACKETS = re.compile(
     r"(?<=\w)\s*(?:\([^()]*\)|\[[^\[\]]*[^\[\]\d][^\[\]]*\])\s*$"
@@ -38,6 +39,12 @@ MOSTLY_FORWARD = 0.9  # the same of a time that begins anew with each of several
 def is_time(name: str, value: Array) -> bool:
     """Whether a column is called a time, or a kind of time, and goes forward as one."""
     return is_called_time(name) and _forward(value)
+
+
+def is_further_time(name: str, value: Array) -> bool:
+    """Whether a column beside the clock is a time, too: not what is counted in seconds only and mostly stands still, as a pulse's width."""
+    held = TIME.fullmatch(_called(name)) is None and KIND_OF_TIME.fullmatch(_called(name)) is None
+    return is_time(name, value) and not (held and _is_coarse(value))
 
 
 def is_called_time(name: str) -> bool:

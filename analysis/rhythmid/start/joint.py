@@ -7,6 +7,7 @@ import numpy as np
 
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Recorded
+from rhythmid.record.standstill import FLICKER
 from rhythmid.start.meaning import Meaning, Quantity, joint_of_column, same_joint, words_of
 
 CLOSE = 0.7  # of the motion of the joint that moves most, from which another one is worth a question
@@ -59,6 +60,8 @@ def joint_of(
     order: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
     for quantity in order:
         able = _measured(known, quantity)
+        if wanted is None:  # what shows a few values only is no motion where another one is
+            able = [(one, meaning) for one, meaning in able if shows_motion(one)] or able
         if able and not motion:
             motion = {meaning.joint: 0.0 for _, meaning in _measured(still, quantity)}
             for one, meaning in able:
@@ -124,6 +127,11 @@ def _motion_of_untold(
             continue
         motion[meaning.joint] = max(motion.get(meaning.joint, 0.0), float(np.nanstd(one.value)))
     return motion if len(motion) > 1 else {}
+
+
+def shows_motion(one: Recorded) -> bool:
+    """Whether it has more values than a sensor shows of a machine at rest."""
+    return len(np.unique(one.value[np.isfinite(one.value)])) > FLICKER
 
 
 def _measured(

@@ -9,14 +9,13 @@ from rhythmid.errors import InputError
 from rhythmid.record.inventory import Inventory, Recorded
 from rhythmid.record.output_copy import doubt_of_copy
 from rhythmid.record.signals import InputKind, OutputKind
-from rhythmid.record.standstill import FLICKER
 from rhythmid.record.table_clock import is_time
 from rhythmid.start.by_data import by_data, note_of_unknown, output_by_data
 from rhythmid.start.carried import carried_motion
 from rhythmid.start.copies import copies_output, note_of_copy, note_of_sensor
 from rhythmid.start.direction import by_direction, notes_of_other_joints
 from rhythmid.start.drivers import drivers
-from rhythmid.start.joint import Joint, joint_of
+from rhythmid.start.joint import Joint, joint_of, shows_motion
 from rhythmid.start.known import Ask, Choice, Known, pick, ranked_by_worth
 from rhythmid.start.meaning import (
     Quantity,
@@ -263,7 +262,7 @@ def _worth_as_output(one: Known) -> float:
     """How much it moves; what shows more than a few values counts before what does not, as do what is said to be measured, or is called by
     a word."""
     moved = float(np.nanstd(one.one.value))
-    moved *= 1e6 if len(np.unique(one.one.value[np.isfinite(one.one.value)])) > FLICKER else 1.0
+    moved *= 1e6 if shows_motion(one.one) else 1.0
     return moved * (1e3 if one.meaning.certain else 1.0) * (1e3 if one.meaning.commanded is False else 1.0)
 
 
