@@ -202,7 +202,7 @@ WRONG = {
     "no content": ("", "run.csv: is empty"),
     "four rows": (text(rows=list(zip(TIME, U, Y))[:4]), "has only 4 samples: too short"),
     "bytes": ("\0\1\2\3" * 50, "run.csv"),
-    "a motionless output": (text(rows=zip(TIME, U, 0 * Y)), "never changes"),
+    "a motionless output": (text(rows=zip(TIME, 0 * U, 0 * Y)), "never changes"),
 }  # fmt: skip
 
 
