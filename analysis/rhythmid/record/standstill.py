@@ -78,10 +78,11 @@ def _held(record: Record) -> str:
     """What a machine shows that never moves though it is driven: no motion, but what it takes to begin one."""
     role = _driver(record)
     channel = record.channels[role]
+    unit = "" if channel.unit == "1" else f" {channel.unit}"
+    size = f"{float(np.abs(channel.value).max()):.4g}{unit}"
     return (
-        f"the machine stands still: its {record.output_kind} never changes, though the {role} reaches {np.abs(channel.value).max():.4g} "
-        f"{channel.unit}: static friction, a dead band or a stop holds it, or its sensor failed; what the motion is like is told by records "
-        "in which it moves"
+        f"the machine stands still: its {record.output_kind} never changes, though the {role} reaches {size}: static friction, a dead band "
+        "or a stop holds it, or its sensor failed; what the motion is like is told by records in which it moves"
     )
 
 
