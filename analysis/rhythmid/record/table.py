@@ -1,5 +1,6 @@
 """Tables: columns of numbers in .mat, .h5, .npz, .parquet, .json, .csv and other text files, which may be compressed (.csv.gz)."""
 
+import math
 import re
 import warnings
 from collections.abc import Iterator
@@ -225,7 +226,7 @@ def _is_cell(value: Any) -> bool:
 def _rows_of_cells(cells: NDArray[Any]) -> NDArray[Any] | None:
     """A row of numbers for each cell, where there are more cells than an array has columns, and in each as few values as one has."""
     shapes = {np.shape(one) for one in cells} if len(cells) > WIDEST else set()
-    if len(shapes) != 1 or not 0 < np.prod(*shapes) <= WIDEST:
+    if len(shapes) != 1 or not 0 < math.prod(shapes.pop()) <= WIDEST:
         return None
     rows = np.stack(list(cells)).reshape(len(cells), -1)
     return rows if rows.dtype.kind in NUMBERS else None
