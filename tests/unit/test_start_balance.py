@@ -84,3 +84,56 @@ def test_where_the_balance_would_have_a_negative_damping_a_small_one_is_guessed_
     found = begun(tmp_path, force, position)
     assert found.nominal.model.value("viscous_damper.damping") > 1e-4
     assert "the balance shows no damping" in found.nominal.reasons["viscous_damper"]
+
+
+def doubt_of_sign(found: Start) -> bool:
+    return any("with scale: -1 for the" in line for line in found.lines())
+
+
+@pytest.mark.parametrize("stiffness, dry", [(0.0, 0.0), (6.0, 0.0), (6.0, 0.3)])
+def test_an_effort_of_the_opposite_sign_is_told_with_what_the_balance_explains(tmp_path, stiffness, dry):
+    x = moved(FORCE, 0.05, 0.3, stiffness, dry)[0]
+    right, wrong = begun(tmp_path, FORCE, x), begun(tmp_path, -FORCE, x)
+    assert doubt_of_sign(wrong) and not doubt_of_sign(right)
+    assert wrong.nominal.model.value("inertia.mass") == right.nominal.model.value("inertia.mass")
+
+
+def test_an_effort_of_the_opposite_sign_is_told_of_a_pendulum(tmp_path):
+    found = pendulum(tmp_path, "angle [rad]", sign=-1.0)
+    assert doubt_of_sign(found)
+    assert found.nominal.model.value("inertia.mass") == pytest.approx(0.25, rel=0.1)
+
+
+def test_the_effort_of_a_controller_is_not_taken_for_one_of_the_opposite_sign(tmp_path):
+    x, _, torque = foreign.servo(tones(2, TIME, 0.3, 0.2, 1.5))
+    pushed = torque + 0.2 * np.std(torque) * np.random.default_rng(0).standard_normal(len(TIME))
+    assert not doubt_of_sign(begun(tmp_path, pushed, x))
+
+
+def pendulum(folder: Path, heading: str, scale: float = 1.0, sign: float = 1.0) -> Start:
+    """A pendulum that swings widely and turns over, its angle in another unit where told to."""
+    angle, speed = np.zeros(len(TIME)), 0.0
+    torque = 6.0 * tones(3, TIME)
+    for k in range(len(TIME) - 1):
+        speed += foreign.STEP * (torque[k] - 0.3 * speed - 4.0 * np.sin(angle[k])) / 0.25
+        angle[k + 1] = angle[k] + foreign.STEP * speed
+    np.savez(folder / "run.npz", **{"t": TIME, "torque": sign * torque, heading: scale * angle})
+    return start([folder / "run.npz"])
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_angle_in_degrees_without_a_unit_is_told_where_gravity_shows_it(tmp_path, sign):
+    found = pendulum(tmp_path, "angle", 180.0 / np.pi, sign)
+    (line,) = [line for line in found.lines() if "with the output in degrees (scale: 0.0174532925)" in line]
+    assert line.startswith("CHECK ") and ("scale: -1 for the input" in line) == (sign < 0.0)
+    assert found.nominal.model.value("pendulum_gravity.moment") == pytest.approx(4.0, rel=0.1)
+
+
+def test_gravity_of_an_angle_without_a_unit_is_told_on_the_screen(tmp_path):
+    found = pendulum(tmp_path, "angle")
+    assert any("no unit of the angle is told, and gravity's law" in line for line in found.lines())
+
+
+@pytest.mark.parametrize(("heading", "scale"), [("angle [rad]", 1.0), ("angle [deg]", 180.0 / np.pi)])
+def test_nothing_is_said_of_degrees_where_a_heading_tells_the_unit(tmp_path, heading, scale):
+    assert not any("degrees" in line for line in pendulum(tmp_path, heading, scale).lines())

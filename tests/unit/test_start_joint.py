@@ -84,3 +84,45 @@ def test_a_command_that_no_name_calls_an_effort_and_that_hardly_goes_with_the_ou
     other = {"led_command": np.random.default_rng(0).standard_normal(len(TIME))}
     columns = {name: value for name, value in joint("x", 3, 1.0).items() if not name.startswith("torque")}
     assert roles_of(arm({**columns, **other}))["input"] == "command_x"
+
+
+def named(name: str, seed: int, size: float) -> dict[str, np.ndarray]:
+    """Position, velocity and torque of one joint, called by symbols."""
+    position, velocity, torque = servo(size * tones(seed, FINE, 0.3, 0.2, 1.5))
+    noise = 1e-4 * np.random.default_rng(seed).standard_normal(len(TIME))
+    columns = {"q": position, "qd": velocity, "tau": torque}
+    return {f"{what}_{name}": value[::20] + noise for what, value in columns.items()}
+
+
+@pytest.mark.parametrize("name", ["SP", "BASE", "SET", "CON"])
+def test_a_suffix_that_all_quantities_share_as_other_joints_do_is_a_joint_whatever_it_means_else(arm, name):
+    source = arm(named("ELBOW", 2, 1.0), named(name, 3, 0.5), named("WR", 4, 0.3), named("WP", 5, 0.2))
+    expected = {"output": "q_ELBOW", "velocity": "qd_ELBOW", "input": "tau_ELBOW"}
+    assert roles_of(source, joint="ELBOW") == expected
+    assert not any(
+        "base" in line for line in guess(source, joint="ELBOW").lines() if line.startswith("CHECK")
+    )
+    assert roles_of(source, joint=name)["input"] == f"tau_{name}"
+
+
+def test_a_word_of_a_command_beside_the_measured_quantity_of_the_same_name_is_none(arm):
+    columns = named("a", 3, 1.0)
+    asked = tones(3, FINE, 0.3, 0.2, 1.5)[::20]
+    source = arm({"q": columns["q_a"], "q_SP": asked, "tau": columns["tau_a"]})
+    assert roles_of(source) == {"output": "q", "effort": "tau", "reference": "q_SP"}
+
+
+@pytest.mark.parametrize("wanted", ["pitch", "Pitch", "arm pitch", "telemetry_pitch"])
+def test_a_joint_may_be_called_by_any_of_its_words_that_no_other_one_has(arm, wanted):
+    source = arm(joint("arm_telemetry_pitch", 2, 1.0), joint("leg_telemetry_roll", 3, 0.5))
+    if wanted == "arm pitch":
+        with pytest.raises(InputError, match="no joint is called 'arm pitch'"):
+            guess(source, joint=wanted)
+        return
+    assert guess(source, joint=wanted).roles.joint.name == "arm_telemetry_pitch"
+
+
+def test_words_that_several_joints_share_are_refused_with_their_names(arm):
+    source = arm(joint("arm_pitch", 2, 1.0), joint("arm_roll", 3, 0.5))
+    with pytest.raises(InputError, match="no joint is called 'arm'; it has arm_pitch, arm_roll"):
+        guess(source, joint="arm")

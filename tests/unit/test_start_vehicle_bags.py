@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from foreign import STORE, message, roles_of, write
+from foreign import STORE, joint_state, message, roles_of, write
 
 from rhythmid.errors import InputError
+from rhythmid.record.bag_report import quality_report
 from rhythmid.record.read import read_record
 from rhythmid.record.signals import Signals
 from rhythmid.start.start import guess
@@ -115,3 +116,12 @@ def test_constants_of_a_messages_type_are_no_numbers(tmp_path):
     told = [(t + 0.004, odometry(t, x, v)) for t, x, v in zip(TIME, PLACE, SPEED)]
     bag = write(tmp_path / "bag", {"/cmd_vel": COMMANDS, "/odom": told, "/event": odd})
     assert roles_of(bag)["input"] == "/cmd_vel linear.x"
+
+
+def test_stamps_that_are_all_zero_are_told_and_no_lateness_is_made_of_them(tmp_path):
+    rows = [(1.7e9 + 0.04 * k, joint_state(0.0, ["knee"], position=[np.sin(0.1 * k)])) for k in range(100)]
+    report = quality_report(write(tmp_path / "bag", {"/asked": rows}))
+    assert any("/asked: its stamps are all zero" in line for line in report.lines())
+    assert not any("after the stamp" in line or " duplicates, received" in line for line in report.lines())
+    (topic,) = report.topics
+    assert topic.to_dict()["clock"] == "receive" and topic.received.rate == pytest.approx(25.0, rel=0.01)

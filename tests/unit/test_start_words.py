@@ -8,7 +8,7 @@ import pytest
 from foreign import joint_state, moved, roles_of, servo, tones
 
 from rhythmid.errors import InputError
-from rhythmid.start.start import guess
+from rhythmid.start.start import guess, start
 
 TIME = np.arange(8000) * foreign.STEP
 FORCE, OTHER = tones(1, TIME), tones(9, TIME)
@@ -116,3 +116,94 @@ def test_a_letter_beside_a_word_that_is_not_known_is_doubted(tmp_path):
     (doubt,) = guess(table(tmp_path, xBlorf=X, u=FORCE)).roles.choices["output"].doubts
     assert "'x'" in doubt and "'blorf'" in doubt
     assert not guess(table(tmp_path, x=X, u=FORCE)).roles.choices["output"].doubts
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e3, 1e9])
+@pytest.mark.parametrize("name", ["clock_of_motor", "u", "t_cmd"])
+def test_a_number_that_runs_like_a_clock_is_no_effort(tmp_path, name, unit):
+    late = 0.02 * np.random.default_rng(0).random(len(TIME))
+    clock = unit * (18792.0 + np.maximum.accumulate(TIME - late))
+    assert roles_of(table(tmp_path, pos=X, force=FORCE, **{name: clock})) == {
+        "output": "pos",
+        "input": "force",
+    }
+
+
+def test_an_uptime_in_a_command_is_no_effort(tmp_path):
+    rows = range(0, 8000, 4)
+    topics = {
+        "/motor_command": [(NOW + TIME[k], foreign.array([4711.0 + TIME[k], 0.5 * X[k]])) for k in rows],
+        "/joint_states": [
+            (NOW + TIME[k], joint_state(NOW + TIME[k], ["knee"], position=[X[k]])) for k in rows
+        ],
+    }
+    found = roles_of(foreign.write(tmp_path / "bag", topics))
+    assert "/motor_command data[0]" not in found.values()
+
+
+def test_a_uniform_motion_and_an_effort_that_rises_are_no_clocks(tmp_path):
+    rising = 0.4 * TIME
+    found = roles_of(table(tmp_path, x=TIME + 0.001 * OTHER, torque=rising))
+    assert found == {"output": "x", "input": "torque"}
+
+
+@pytest.mark.parametrize(
+    ("position", "velocity", "effort", "asked"),
+    [
+        ("posición", "velocidad", "corriente", "consigna_posición"),
+        ("position", "vitesse", "couple", "consigne_position"),
+        ("Winkel", "Geschwindigkeit", "Drehmoment", "Winkel_Soll"),
+        ("posizione", "velocità", "coppia", "posizione_riferimento"),
+        ("posição", "velocidade", "força", "referência_posição"),
+    ],
+)
+def test_words_of_other_languages_mean_what_they_do(tmp_path, position, velocity, effort, asked):
+    wanted = tones(2, TIME, 0.3, 0.2, 1.5)
+    x, v, torque = servo(wanted)
+    path = table(tmp_path, **{position: x, velocity: v, effort: torque, asked: wanted})
+    assert roles_of(path) == {
+        "output": position, "velocity": velocity, "effort": effort, "reference": asked,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["tiempo", "temps", "Zeit", "tempo (ms)"])
+def test_a_time_is_known_in_other_languages(tmp_path, name):
+    uneven = np.cumsum(np.random.default_rng(0).integers(1, 4, len(TIME)))  # ms
+    np.savez(tmp_path / "run.npz", **{name: uneven, "pos": X, "force": FORCE})
+    assert guess(tmp_path / "run.npz").inventory.clock.column == name
+
+
+def staircase(rows: int = 2000) -> np.ndarray:
+    """The width of a pulse [us] that rises in steps, as a test stand plays it."""
+    return 1000.0 + 100.0 * (np.arange(rows) // (rows // 8))
+
+
+def test_the_width_of_a_pulse_drives_and_the_volts_of_a_load_cell_do_not(tmp_path):
+    time, width = 0.01 * np.arange(2000), staircase()
+    rate = np.zeros(len(time))
+    for k in range(len(time) - 1):
+        rate[k + 1] = rate[k] + 0.01 * (width[k] - 1000.0 - rate[k]) / 0.3
+    cell = 0.03 + 0.001 * np.random.default_rng(0).standard_normal(len(time))
+    columns = {
+        "Time (s)": time,
+        "ESC signal (µs)": width,
+        "Thrust Load Cell (mV)": cell,
+        "Motor Speed (RPM)": rate,
+    }
+    np.savez(tmp_path / "run.npz", **columns)
+    found = start([tmp_path / "run.npz"])
+    roles = found.guess.roles.choices
+    assert (
+        str(roles["input"].recorded) == "ESC signal (µs)"
+        and str(roles["output"].recorded) == "Motor Speed (RPM)"
+    )
+    assert "asked for" in roles["input"].reason
+
+
+def test_the_effort_that_goes_best_with_the_output_is_doubted_where_it_hardly_does(tmp_path):
+    noise = {
+        name: np.random.default_rng(k).standard_normal(len(TIME))
+        for k, name in enumerate(("torque_a", "torque_b"))
+    }
+    doubts = guess(table(tmp_path, pos=X, **noise)).roles.choices["input"].doubts
+    assert any("it hardly goes with the output (coherence 0.0" in doubt for doubt in doubts)

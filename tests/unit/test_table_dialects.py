@@ -316,3 +316,55 @@ def test_parquet_without_its_library_is_refused_with_what_to_install(tmp_path, m
 def test_names_that_do_not_belong_to_the_rows_are_refused_with_their_line():
     with pytest.raises(InputError, match="run.csv: line 2 has 2 columns, the rows have 3"):
         dialect_of(["# title\n", "t,q\n", "0,1,2\n", "1,2,3\n"], "run.csv")
+
+
+def test_columns_of_one_name_are_numbered_before_their_unit_and_told(tmp_path):
+    path = tmp_path / "run.csv"
+    rows = "\n".join(f"{0.01 * k},{k % 7},{k % 5},{k % 3}" for k in range(60))
+    path.write_text(f"t,tau (Nm),tau (Nm),tau (Nm)\n{rows}\n")
+    table = Table.load(path)
+    assert list(table.columns) == ["t", "tau (Nm)", "tau.1 (Nm)", "tau.2 (Nm)"]
+    assert np.array_equal(table.column("tau.2 (Nm)"), np.arange(60) % 3)
+    assert any("line 1 names several columns 'tau (Nm)'" in note for note in table.notes)
+    assert any("several columns 'tau (Nm)'" in note for note in inventory(path).notes)
+
+
+@pytest.mark.parametrize(
+    "name", ["time (millisec)", "Time [ticks of 1 ms]", "timestamp (msecs)", "time (millisecs)"]
+)
+def test_a_time_is_known_by_its_name_whatever_stands_in_brackets_behind_it(tmp_path, name):
+    step = np.random.default_rng(0).integers(1, 4, 200)  # of ms: too uneven to be known without its name
+    rows = "\n".join(f"{time},{np.sin(0.01 * time):.6f}" for time in np.cumsum(step))
+    (tmp_path / "run.csv").write_text(f"{name},position (degree)\n{rows}\n")
+    clock = inventory(tmp_path / "run.csv").clock
+    assert clock.column == name and clock.scale == 1e-3
+
+
+TRACE = "[key]; [value]\nVersion; 0x03050000\nName; Application.Trace\nEveryNCycles; 1\n"
+
+
+def trace(*variables: tuple[str, range]) -> str:
+    """A trace of CODESYS of variables with the times [ms] of their samples; the value is a hundredth of the time."""
+    parts = [
+        f"{number}.Variable; {name}\n{number}.GraphColor; 4282811060\n{number}.Data; \n" + "".join(f"; {t}; {0.01 * t}\n" for t in times)
+        for number, (name, times) in enumerate(variables)
+    ]  # fmt: skip
+    return TRACE + "".join(parts)
+
+
+@pytest.mark.parametrize("other", [range(0, 2000, 20), range(100, 1900, 20)])
+def test_a_trace_of_codesys_is_read_variable_by_variable(tmp_path, other):
+    (tmp_path / "run.csv").write_text(trace(("Main.Speed", range(0, 2000, 20)), ("Main.Torque", other)))
+    table = Table.load(tmp_path / "run.csv")
+    assert list(table.columns) == ["time", "Main.Speed", "Main.Torque"]
+    assert np.array_equal(table.column("time"), np.arange(0.0, 2000.0, 20.0))
+    told = np.isfinite(table.column("Main.Torque"))
+    assert np.array_equal(table.column("time")[told], np.array(other, dtype=float))
+    assert np.allclose(table.column("Main.Torque")[told], 0.01 * np.array(other))
+    assert inventory(tmp_path / "run.csv").clock.scale == 1e-3
+
+
+def test_a_damaged_sample_of_a_trace_is_refused_with_its_line(tmp_path):
+    (tmp_path / "run.csv").write_text(trace(("Main.Speed", range(0, 2000, 20))) + "; 2000; many\n")
+    with pytest.raises(InputError, match="line 108 of the trace holds no time and value"):
+        Table.load(tmp_path / "run.csv")

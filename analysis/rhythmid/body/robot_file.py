@@ -27,6 +27,7 @@ PACKAGE, FILE = "package://", "file://"
 # [kg, kg m^2] of a moving link that has no mass of its own, so that MuJoCo can divide by it
 LEAST_MASS, LEAST_INERTIA = 1e-12, 1e-14
 ROUNDING = 1e-9  # of a moment by which it stays within what is possible, so that MuJoCo's own rounding does not refuse it
+SEVERAL = frozenset({"visual", "collision"})  # of which a link of a URDF has as many as it likes
 ROUNDED = 1e-3  # share by which an inertia may be impossible through rounding in the file, about which nothing is said
 
 
@@ -68,7 +69,14 @@ def read_robot(
         try:
             spec = mj.MjSpec.from_file(str(path))
         except (ValueError, mj.FatalError) as error:
-            raise _without_links(path) or refused(path, error) from None
+            text, repeated = without_repetitions(path)
+            if not repeated:
+                raise _without_links(path) or refused(path, error) from None
+            told.extend(repeated)
+            try:
+                spec = mj.MjSpec.from_string(text)
+            except (ValueError, mj.FatalError) as further:
+                raise _without_links(path) or refused(path, further) from None
     if base == FIXED:
         floating = [one for one in spec.joints if one.type == mj.mjtJoint.mjJNT_FREE]
         for one in (*floating, *(spec.keys if floating else ())):  # key frames hold its positions, too
@@ -116,6 +124,30 @@ def quiet_data(model: Any) -> Any:
 def refused(path: Path, error: Exception) -> InputError:
     """What MuJoCo says of a file, in one line."""
     return InputError(f"{path}: MuJoCo refuses it: {' '.join(str(error).split())}")
+
+
+def without_repetitions(path: Path) -> tuple[str, list[str]]:
+    """The text of a URDF without elements that stand again where one is expected, and a note on each; no notes where there are none.
+
+    The first one is kept, as ROS's parser does (urdfdom, `FirstChildElement`).
+    """
+    try:
+        robot = tree.parse(path).getroot()
+    except tree.ParseError:
+        return "", []
+    notes: list[str] = []
+    for owner in (one for kind in ("joint", "link") for one in robot.findall(kind)):
+        for part in (owner, *owner) if owner.tag == "link" else (owner,):
+            seen = set[str]()
+            for child in list(part):
+                if child.tag in seen and child.tag not in SEVERAL:
+                    part.remove(child)
+                    where = "" if part is owner else f" in its {part.tag}"
+                    notes.append(
+                        f"{owner.tag} {owner.get('name')!r} has a further <{child.tag}>{where}; the first one is taken, as ROS does"
+                    )
+                seen.add(child.tag)
+    return tree.tostring(robot, encoding="unicode"), notes
 
 
 def _without_links(path: Path) -> InputError | None:

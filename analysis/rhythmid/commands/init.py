@@ -23,7 +23,8 @@ EXAMPLES = (
 
 def init(
     sources: Annotated[
-        list[Path], typer.Argument(help="Bags or tables of one layout; roles are guessed from the first.")
+        list[Path],
+        typer.Argument(help="Bags or tables of one layout; roles are guessed from the first one that moves."),
     ],
     out: Annotated[Path, typer.Option("--out", help="Folder for signals.yaml and model.yaml.")] = Path(),
     joint: Annotated[
@@ -72,7 +73,7 @@ def init(
         terminal.say(line)
     terminal.say(f"{signals}, {model}: every guess is a comment there; go on with")
     with_signals = ["--signals", str(signals)]
-    terminal.say(f"  {shlex.join(['rhythmid', 'check', str(sources[0]), *with_signals])}")
+    terminal.say(f"  {shlex.join(['rhythmid', 'check', *map(str, sources), *with_signals])}")
     diagnosis = ["rhythmid", "diagnose", *map(str, sources), *with_signals, "--model", str(model)]
     terminal.say(f"  {shlex.join(diagnosis)}")
 

@@ -232,6 +232,11 @@ def quality_report(
         duration = (
             max(int(log_ns.max()) for log_ns in times) - min(int(log_ns.min()) for log_ns in times)
         ) * 1e-9
+    zero = [name for name, one in stamped.items() if _is_without_times(one)]
+    notes += [
+        f"{name}: its stamps are all zero, so that only the times of receipt tell when it was sent"
+        for name in zero
+    ]
     topics = tuple(
         _topic_report(name, topic.type, received.get(name, np.empty(0, dtype=np.int64)), stamped.get(name))
         for name, topic in sorted(bag.topics.items())
@@ -276,12 +281,17 @@ def _only(bag: Bag, name: str) -> Iterator[Block]:
     return bag.blocks(lambda topic: topic.name == name)
 
 
+def _is_without_times(columns: Columns) -> bool:
+    """Whether all stamps of messages are zero, as where a node does not set them."""
+    return columns.stamp_ns is not None and len(columns.stamp_ns) > 0 and not columns.stamp_ns.any()
+
+
 def _topic_report(name: str, msgtype: str, log_ns: NDArray[np.int64], columns: Columns | None) -> TopicReport:
     def seconds(times: NDArray[np.int64]) -> NDArray[np.float64]:
         return (times - times.min()) * 1e-9 if len(times) else np.empty(0)
 
     received = Timing.of(seconds(log_ns))
-    if columns is None or columns.stamp_ns is None or not len(log_ns):
+    if columns is None or columns.stamp_ns is None or not len(log_ns) or _is_without_times(columns):
         return TopicReport(name, msgtype, received)
     lateness = (columns.log_ns - columns.stamp_ns) * 1e-9
     return TopicReport(

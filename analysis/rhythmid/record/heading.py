@@ -18,7 +18,8 @@ FURTHER = {
 SI = ("s", "m", "rad", "N", "N*m", "m/s", "rad/s", "m/s^2", "rad/s^2", "A", "V", "kg")
 SPELLINGS = {
     "°": "deg", "degree": "deg", "degrees": "deg", "degs": "deg", "dps": "deg/s", "sec": "s", "secs": "s", "seconds": "s",
-    "second": "s", "msec": "ms", "millis": "ms", "usec": "us", "micros": "us", "µs": "us", "nsec": "ns", "nanos": "ns",
+    "second": "s", "msec": "ms", "millis": "ms", "millisec": "ms", "millisecs": "ms", "usec": "us", "micros": "us",
+    "microsec": "us", "microsecs": "us", "nanosec": "ns", "nanosecs": "ns", "µs": "us", "nsec": "ns", "nanos": "ns",
     "nanoseconds": "ns", "milliseconds": "ms", "microseconds": "us", "radians": "rad", "radian": "rad", "newtons": "N", "newtonmeters": "Nm", "newtonmeter": "Nm", "meter": "m",
     "meters": "m", "metre": "m", "metres": "m", "newton": "N", "amp": "A", "amps": "A", "volt": "V", "volts": "V",
     "rads": "rad/s", "mps": "m/s", "radps": "rad/s", "degps": "deg/s", "r/min": "rpm", "1/min": "rpm", "rev/min": "rpm",

@@ -24,7 +24,7 @@ from rhythmid.record.message_types import typestore
 from rhythmid.record.other_lengths import length_notes, unequal_arrays
 from rhythmid.record.signals import Clock
 from rhythmid.record.table import SUFFIXES, WIDEST, Table, table_suffix
-from rhythmid.record.table_clock import COUNTER, is_even, is_time, table_clock
+from rhythmid.record.table_clock import COUNTER, is_even, is_further_time, is_time, table_clock
 from rhythmid.record.two_clocks import clock_notes, trusted_clock
 
 Array = NDArray[np.float64]
@@ -89,8 +89,8 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Inventory:
-    """All numbers of a source that change, how its times are told and why, what was left out, of that what never changes, and
-    what a user should know."""
+    """All numbers of a source that change, how its times are told and why, what was left out, of that what never changes,
+    what a user should know, and of a bag all numbers in the order of their messages."""
 
     path: Path
     recorded: tuple[Recorded, ...]
@@ -99,6 +99,7 @@ class Inventory:
     left_out: tuple[str, ...] = ()
     constant: tuple[Recorded, ...] = ()
     notes: tuple[str, ...] = ()
+    listed: tuple[Recorded, ...] = ()
 
     @property
     def is_bag(self) -> bool:
@@ -159,7 +160,9 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
         heading, time = heading_of(name), every
         if name in parts:
             continue
-        if clock.kind == "column" and (name == clock.column or is_time(name, value[~np.isnan(value)])):
+        if clock.kind == "column" and (
+            name == clock.column or is_further_time(name, value[~np.isnan(value)])
+        ):
             continue
         if clock.kind == "rate" and (is_time(name, value) or (name.isdigit() and is_even(value))):
             left.append(f"{name}: goes forward like a time")
@@ -231,7 +234,7 @@ def _of_bag(bag: Bag, vehicle: bool) -> Inventory:
             f"{bag.path}: no topic holds a number that changes; topics: {', '.join(sorted(bag.topics)) or 'none'}"
         )
     still = tuple(one for one in constant if len(one.value) > 1)
-    return Inventory(bag.path, tuple(moving), Clock("receive"), "", tuple(left), still)
+    return Inventory(bag.path, tuple(moving), Clock("receive"), "", tuple(left), still, listed=tuple(found))
 
 
 def _filled(fields: list[Recorded], columns: Columns, begin: int) -> Iterator[Recorded]:

@@ -18,9 +18,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic import TypeAdapter
 
 from rhythmid.document import Node, parse, read
+from rhythmid.errors import InputError
 from rhythmid.record.read import read_record, read_tables
 from rhythmid.record.record import Record
 from rhythmid.record.signals import Signals
@@ -105,7 +107,10 @@ def read_joint_record(source: str | Path, signals: JointSignals) -> JointRecord:
 
 def _read(source: str | Path, signals: Signals, path: Path) -> Record:
     same = Path(source).resolve() == path.resolve()
-    return read_tables(signals) if same else read_record(source, signals)
+    record = read_tables(signals) if same else read_record(source, signals)
+    if np.ptp(record.output.value) == 0.0:  # of one joint among others its efforts alone tell nothing
+        raise InputError(f"{record.name}: {record.output.source} never changes; nothing is learnt from it")
+    return record
 
 
 def _joint_signals(document: Node, path: Path) -> JointSignals:

@@ -24,6 +24,7 @@ from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality
 from rhythmid.record.record import SHORTEST, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
+from rhythmid.record.standstill import is_driven
 from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
 from rhythmid.record.time_origin import CALENDAR, counted_from, origin_of
 from rhythmid.record.timing import put_in_order
@@ -334,10 +335,8 @@ def _finish(record: Record, signals: Signals) -> Record:
         raise InputError(
             f"{record.name}: {record.output.source} has only {len(record.output)} samples: too short"
         )
-    if np.ptp(record.output.value) == 0.0:
-        raise InputError(
-            f"{record.name}: {record.output.source} never changes; nothing can be learnt from it"
-        )
+    if np.ptp(record.output.value) == 0.0 and not is_driven(record):
+        raise InputError(f"{record.name}: {record.output.source} never changes; nothing is learnt from it")
     _require_overlap(record)
     frequency = _pumping_frequency(record)
     if frequency > 0.0 and record.duration * frequency < 1.0:

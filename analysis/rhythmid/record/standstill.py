@@ -16,6 +16,7 @@ from rhythmid.record.record import Record
 from rhythmid.record.rounding import resolution
 
 Array = NDArray[np.float64]
+DRIVES = ("input", "effort", "forcing", "reference")  # roles of what drives a machine
 LEAST_SAMPLES = 200  # of fewer an autocorrelation of 0.2 is within what chance makes
 SHARE = 0.2  # of the variance, up to which what lasts is not worth the name of a motion: it is half the size of the noise
 FLICKER = 3  # values in all, up to which the sensor shows its own steps up and down and no motion
@@ -35,6 +36,8 @@ def standstill(record: Record, buried: bool = True) -> str | None:
     Outliers look like events: give it a `cleaned` record.
     """
     value = record.output.value
+    if np.ptp(value) == 0.0 and is_driven(record):
+        return _held(record)
     if len(value) < LEAST_SAMPLES or not np.all(np.isfinite(value)):
         return None
     span, step = float(np.ptp(value)), resolution(value)
@@ -43,11 +46,44 @@ def standstill(record: Record, buried: bool = True) -> str | None:
     if len(levels) <= FLICKER:
         return _sentence(_flicker(levels, count, record))
     small = step > 0.0 and span <= FEW_STEPS * step
-    if not (small or buried) or not _noise(value, step, AVERAGED if small else WHITE) or _driven(record):
+    if (
+        not (small or buried)
+        or not _noise(value, step, AVERAGED if small else WHITE)
+        or _goes_with_drive(record)
+    ):
         return None
     if small:
         return _sentence(f"{size}, {span / step:.0f} steps of its resolution, as noise does that is rounded")
     return _sentence(f"{size}, no different from white noise")
+
+
+def is_driven(record: Record) -> bool:
+    """Whether a force, or a change of what is asked for, drives the machine of a record."""
+    return _driver(record) != ""
+
+
+def _driver(record: Record) -> str:
+    """Role of what drives the machine; empty where nothing does."""
+    for role in DRIVES:
+        channel = record.channels.get(role)
+        if channel is None or not np.isfinite(channel.value).all():
+            continue
+        of_force = role in ("effort", "forcing") or (role == "input" and record.input_kind == "force")
+        if np.any(channel.value != 0.0) if of_force else np.ptp(channel.value) > 0.0:
+            return role
+    return ""
+
+
+def _held(record: Record) -> str:
+    """What a machine shows that never moves though it is driven: no motion, but what it takes to begin one."""
+    role = _driver(record)
+    channel = record.channels[role]
+    unit = "" if channel.unit == "1" else f" {channel.unit}"
+    size = f"{float(np.abs(channel.value).max()):.4g}{unit}"
+    return (
+        f"the machine stands still: its {record.output_kind} never changes, though the {role} reaches {size}: static friction, a dead band "
+        "or a stop holds it, or its sensor failed; what the motion is like is told by records in which it moves"
+    )
 
 
 def _flicker(levels: Array, count: NDArray[np.int64], record: Record) -> str:
@@ -76,7 +112,7 @@ def _noise(value: Array, step: float, memory: int) -> bool:
     return bool(np.abs(_correlation(value, value)[memory:]).max() <= SHARE)
 
 
-def _driven(record: Record) -> bool:
+def _goes_with_drive(record: Record) -> bool:
     """Whether the output goes with a channel that drives the machine, more than by chance."""
     time, value = record.output.time, record.output.value
     own = _correlation(value, value)

@@ -1,5 +1,6 @@
 """Tables: columns of numbers in .mat, .h5, .npz, .parquet, .json, .csv and other text files, which may be compressed (.csv.gz)."""
 
+import math
 import re
 import warnings
 from collections.abc import Iterator
@@ -208,6 +209,8 @@ def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
         elif isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
             for number, one in enumerate(value):
                 yield from _flat(one, f"{above}{name}[{number}].")
+        elif _is_cell(value) and (rows := _rows_of_cells(np.ravel(value))) is not None:
+            yield above + name, rows
         elif _is_cell(value):
             for number, one in enumerate(np.ravel(value)):
                 yield f"{above}{name}[{number}]", np.atleast_1d(np.asarray(one))
@@ -218,6 +221,15 @@ def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
 def _is_cell(value: Any) -> bool:
     """Whether it is a cell of MATLAB that holds arrays."""
     return isinstance(value, np.ndarray) and value.dtype.hasobject and any(np.ndim(one) for one in value.flat)
+
+
+def _rows_of_cells(cells: NDArray[Any]) -> NDArray[Any] | None:
+    """A row of numbers for each cell, where there are more cells than an array has columns, and in each as few values as one has."""
+    shapes = {np.shape(one) for one in cells} if len(cells) > WIDEST else set()
+    if len(shapes) != 1 or not 0 < math.prod(shapes.pop()) <= WIDEST:
+        return None
+    rows = np.stack(list(cells)).reshape(len(cells), -1)
+    return rows if rows.dtype.kind in NUMBERS else None
 
 
 def _npz(path: Path) -> dict[str, Any]:

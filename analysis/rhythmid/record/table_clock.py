@@ -14,8 +14,12 @@ from rhythmid.record.signals import Clock
 
 Array = NDArray[np.float64]
 TIME = re.compile(
-    r"(?:elapsed_?|time_?|wall_?|ros_?)*(?:t|time|timestamp|stamp|seconds|secs?|clock)", re.IGNORECASE
+    r"(?:elapsed_?|time_?|wall_?|ros_?)*(?:t|time|timestamp|stamp|seconds|secs?|clock|tiempo|tempo|temps|zeit)",
+    re.IGNORECASE,
 )
+IN_BRACKETS = re.compile(
+    r"(?<=\w)\s*(?:\([^()]*\)|\[[^\[\]]*[^\[\]\d][^\[\]]*\])\s*$"
+)  # a unit; [3] is a place in an array
 KIND_OF_TIME = re.compile(r".*_(?:time|timestamp|stamp|clock)", re.IGNORECASE)  # pi_time, cpu_time
 COUNTER = re.compile(
     r"|index|idx|i|n|k|id|no|nr|frame|sample|step|row|count|counter|seq|unnamed: 0", re.IGNORECASE
@@ -37,6 +41,12 @@ def is_time(name: str, value: Array) -> bool:
     return is_called_time(name) and _forward(value)
 
 
+def is_further_time(name: str, value: Array) -> bool:
+    """Whether a column beside the clock is a time, too: not what is counted in seconds only and mostly stands still, as a pulse's width."""
+    held = TIME.fullmatch(_called(name)) is None and KIND_OF_TIME.fullmatch(_called(name)) is None
+    return is_time(name, value) and not (held and _is_coarse(value))
+
+
 def is_called_time(name: str) -> bool:
     """Whether a column is called a time, or a kind of time."""
     return _is_plain_time(name) or KIND_OF_TIME.fullmatch(_called(name)) is not None
@@ -53,7 +63,8 @@ def _is_coarse(value: Array) -> bool:
 
 
 def _called(name: str) -> str:
-    return re.split(r"[./]", heading_of(name).name)[-1].replace(" ", "_")
+    """The last part of a name, without brackets, whatever stands in them."""
+    return re.split(r"[./]", IN_BRACKETS.sub("", heading_of(name).name))[-1].replace(" ", "_")
 
 
 def _forward(value: Array) -> bool:

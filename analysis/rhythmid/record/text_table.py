@@ -4,6 +4,7 @@ spaces between the columns; decimal points or commas; cells in quotes.
 Nothing has to be said of a file: the separator is the one by which most lines are rows of numbers of one length.
 """
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ import numpy as np
 from rhythmid.errors import InputError
 from rhythmid.record.broken_lines import unbroken
 from rhythmid.record.clock_time import seconds
+from rhythmid.record.codesys_trace import is_trace, read_trace
 from rhythmid.record.labelled_rows import labels_of, read_labelled
 from rhythmid.record.list_cells import list_of, lists_of
 from rhythmid.record.lvm_head import lvm_head
@@ -27,6 +29,7 @@ from rhythmid.record.text_rows import Rows, numbers_of, rows_in
 TEXT = (".csv", ".tsv", ".txt", ".dat", ".lvm", ".log")
 SEPARATORS = ("\t", ";", ",", None)  # None: any number of spaces; in this order where two do equally well
 LOOKED_AT = 200  # lines from which the dialect is told: more than any head has
+UNIT_OR_END = re.compile(r"(\s*[\[({<][^\[({<]*)?$")  # of a column's name
 ACROSS = 10  # times as many columns as rows, from which the lines of a table without names are its columns
 
 
@@ -42,6 +45,7 @@ class Dialect:
     names : of the columns, with their units where the file tells them.
     numeric : positions of the columns that hold numbers.
     head : cells of the line above the rows.
+    notes : what a user should know of the names, one line each.
     """
 
     separator: str | None
@@ -50,6 +54,7 @@ class Dialect:
     names: tuple[str, ...]
     numeric: tuple[int, ...]
     head: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def read_text(path: Path) -> dict[str, Any]:
@@ -61,8 +66,7 @@ def text_table(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Columns of a text table by name: float64[n] each, float64[n, k] where cells are lists, dates and times of day in seconds, text[n]
     where a column holds words; and what a user should know of the file, one line each.
 
-    Raises InputError where the file is empty, its names are not unique or do not belong to the rows; ValueError where a row
-    is damaged.
+    Raises InputError where the file is empty or its names do not belong to the rows; ValueError where a row is damaged.
     """
     with opened(path) as file:
         begin = list(islice(unbroken(file), LOOKED_AT))
@@ -70,6 +74,9 @@ def text_table(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
         with opened(path) as file:
             labelled = read_labelled(file, labels)
         return dict[str, Any](labelled.columns), labelled.notes
+    if is_trace(begin):
+        with opened(path) as file:
+            return dict[str, Any](read_trace(file)), ()
     dialect, lvm = dialect_of(begin, str(path)), lvm_head(begin)
     with opened(path) as file:
         lines = islice(unbroken(file), dialect.first, None)
@@ -88,7 +95,7 @@ def text_table(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
         found |= {dialect.names[place]: _words([row[place] for row in cells], rows, place) for place in words}
     if lvm is not None and lvm.step > 0.0:
         found[dialect.names[0]] = lvm.times(len(rows))
-    return {name: found[name] for name in dialect.names}, ()
+    return {name: found[name] for name in dialect.names}, dialect.notes
 
 
 def dialect_of(lines: list[str], name: str) -> Dialect:
@@ -126,15 +133,33 @@ def dialect_of(lines: list[str], name: str) -> Dialect:
     elif len(head) != len(cells):
         line = used[place - 1][0] + 1
         raise InputError(f"{name}: line {line} has {len(head)} columns, the rows have {len(cells)}")
-    if len(set(head)) < len(head):
-        twice = next(one for one, count in Counter(head).items() if count > 1)
-        line = used[place - 1][0] + 1 if place else 1
-        raise InputError(
-            f"{name}: two columns have the same name in line {line} ({twice!r}); rename one of them"
-        )
+    head, notes = _told_apart(head, used[place - 1][0] + 1 if place else 1)
     return Dialect(
-        separator, decimal, used[place][0], tuple(head), numeric, tuple(above[-1]) if above else ()
+        separator,
+        decimal,
+        used[place][0],
+        tuple(head),
+        numeric,
+        tuple(above[-1]) if above else (),
+        notes,
     )
+
+
+def _told_apart(head: list[str], line: int) -> tuple[list[str], tuple[str, ...]]:
+    """Names of columns of which each stands once: further ones are numbered before their unit, as pandas does, with a note on each name."""
+    found: list[str] = []
+    notes: list[str] = []
+    for name in head:
+        number, own = 0, name
+        while own in found or (number and own in head):
+            number += 1
+            own = UNIT_OR_END.sub(rf".{number}\1", name, count=1)
+        found.append(own)
+        if number:
+            notes.append(
+                f"line {line} names several columns {name!r}; of these, {own!r} is number {number + 1}"
+            )
+    return found, tuple(notes)
 
 
 def _first_told(rows: list[list[str]], place: int) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.record.signals import Clock, Signals
 from rhythmid.record.table import SUFFIXES, Table, table_suffix
-from rhythmid.record.table_clock import is_time, named_clock
+from rhythmid.record.table_clock import is_further_time, named_clock
 
 Array = NDArray[np.float64]
 SKEW = 1e-3  # by which clocks of one computer may run apart: quartz does by 1e-4, and clocks that a network sets by some more
@@ -37,7 +37,12 @@ def disagreeing(columns: Sequence[tuple[str, Array]], name: str, time: Array) ->
     """Other columns that are called times and tell another duration of these rows, with their times [s]."""
     found: list[tuple[str, Array]] = []
     for other, value in columns:
-        if other == name or len(value) != len(time) or not is_time(other, value) or OF_WORK.search(other):
+        if (
+            other == name
+            or len(value) != len(time)
+            or not is_further_time(other, value)
+            or OF_WORK.search(other)
+        ):
             continue
         told = value * named_clock(other, value)[0].scale
         first, second = float(time[-1] - time[0]), float(told[-1] - told[0])

@@ -2,7 +2,7 @@
 position and its sine. A first guess for a nominal model, no estimate: that is what `identify` is for."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +82,11 @@ class Rows:
         """Whether what drives never changes: then a constant balances it, and tells nothing of the machine."""
         every = np.concatenate(self.drives)
         return not self.by_base and bool(np.ptp(every) <= STEADY * np.abs(every).max())
+
+    @property
+    def reversed(self) -> "Rows":
+        """The same with what drives counted the other way."""
+        return replace(self, drives=tuple(-one for one in self.drives))
 
     @property
     def comes_back(self) -> bool:

@@ -108,11 +108,17 @@ def _driving(able: list[Known], output: Recorded, reason: str, ask: Ask) -> Choi
     best = ranked[pick("What drives the machine (input)?", ranked, ask)][1]
     picked = next(one for one in able if one.one is best)
     others = [one.one for one in sorted(able, key=lambda one: one not in read) if one is not picked]
-    along = f"of those it goes best with the output (coherence {coherent(best, output):.2f})"
+    share = coherent(best, output)
+    along = f"of those it goes best with the output (coherence {share:.2f})"
     along = along if len(read) > 1 else SAYS_READ
     choice = chosen(picked, f"{reason}: {picked.meaning.reason}; {along}", others)
     left = [str(one.one) for one in able if one not in read]
-    return replace(choice, doubts=(*choice.doubts, not_read(left))) if left else choice
+    doubts = [not_read(left)] if left else []
+    if len(read) > 1 and share < HARDLY:
+        doubts.append(
+            f"it hardly goes with the output (coherence {share:.2f}), and the others less: see that it drives the machine"
+        )
+    return replace(choice, doubts=(*choice.doubts, *doubts))
 
 
 def _commanded_and_measured(

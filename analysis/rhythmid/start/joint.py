@@ -7,6 +7,7 @@ import numpy as np
 
 from rhythmid.errors import InputError
 from rhythmid.record.inventory import Recorded
+from rhythmid.record.standstill import FLICKER
 from rhythmid.start.meaning import Meaning, Quantity, joint_of_column, same_joint, words_of
 
 CLOSE = 0.7  # of the motion of the joint that moves most, from which another one is worth a question
@@ -59,6 +60,8 @@ def joint_of(
     order: tuple[Quantity, ...] = ("position", "velocity", "acceleration")
     for quantity in order:
         able = _measured(known, quantity)
+        if wanted is None:  # what shows a few values only is no motion where another one is
+            able = [(one, meaning) for one, meaning in able if shows_motion(one)] or able
         if able and not motion:
             motion = {meaning.joint: 0.0 for _, meaning in _measured(still, quantity)}
             for one, meaning in able:
@@ -66,7 +69,7 @@ def joint_of(
     if not motion:
         motion = _motion_of_untold(known, still)
     if wanted is not None and wanted not in motion:
-        called = [name for name in motion if same_joint(name, wanted)] or _begin_with(wanted, motion)
+        called = [name for name in motion if same_joint(name, wanted)] or _with_words(wanted, motion)
         wanted = called[0] if len(called) == 1 else wanted
     if wanted is not None and motion.get(wanted) == 0.0:
         raise InputError(f"{place}: joint {wanted!r} stands still")
@@ -85,10 +88,12 @@ def joint_of(
     return Joint(close[number], motion, _further(close[number], known))
 
 
-def _begin_with(wanted: str, names: Iterable[str]) -> list[str]:
-    """The names that begin with the words of another one, as swing_sensor does with swing."""
+def _with_words(wanted: str, names: Iterable[str]) -> list[str]:
+    """The names that begin with the words of another one, as swing_sensor does with swing, else those that hold them, as arm_pitch
+    does pitch."""
     words = words_of(wanted)
-    return [name for name in names if words and words_of(name)[: len(words)] == words]
+    holding = [name for name in names if words and f" {' '.join(words)} " in f" {' '.join(words_of(name))} "]
+    return [name for name in holding if words_of(name)[: len(words)] == words] or holding
 
 
 def _further(name: str, known: Sequence[tuple[Recorded, Meaning]], asked: bool = False) -> frozenset[str]:
@@ -122,6 +127,11 @@ def _motion_of_untold(
             continue
         motion[meaning.joint] = max(motion.get(meaning.joint, 0.0), float(np.nanstd(one.value)))
     return motion if len(motion) > 1 else {}
+
+
+def shows_motion(one: Recorded) -> bool:
+    """Whether it has more values than a sensor shows of a machine at rest."""
+    return len(np.unique(one.value[np.isfinite(one.value)])) > FLICKER
 
 
 def _measured(

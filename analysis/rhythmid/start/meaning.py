@@ -1,6 +1,7 @@
 """What a recorded number means by its name, unit and message type: which quantity, and whether it was asked for or measured."""
 
 import re
+import unicodedata
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
@@ -15,15 +16,17 @@ BY_UNIT: dict[str, Quantity] = {
 WORDS: dict[Quantity, frozenset[str]] = {
     "position": frozenset(
         "position positions pos angle angles theta phi psi alpha pose height distance displacement disp deflection extension "
-        "length travel rotation translation".split()
+        "length travel rotation translation posicion posizione posicao angulo angolo winkel weg lage".split()
     ),
-    "velocity": frozenset("velocity velocities vel speed rate omega twist dq qd qdot thetadot dtheta xdot dx angvel gyro gyr gyroscope".split()),
+    "velocity": frozenset("velocity velocities vel speed rate omega twist dq qd qdot thetadot dtheta xdot dx angvel gyro gyr gyroscope "
+        "velocidad velocita velocidade vitesse geschwindigkeit drehzahl".split()),
     "acceleration": frozenset(
-        "acceleration accelerations accel accl acceler acc linacc ddq qdd xddot ddx accelerometer".split()
+        "acceleration accelerations accel accl acceler acc linacc ddq qdd xddot ddx accelerometer aceleracion "
+        "accelerazione aceleracao beschleunigung".split()
     ),
     "effort": frozenset(
         "effort efforts torque torques tor torq tau force forces wrench current currents cur voltage volt volts pwm duty trq "
-        "moment iq".split()
+        "moment iq drehmoment kraft strom spannung couple coppia fuerza forza forca corriente corrente courant tensione tensao".split()
     ),
 }  # fmt: skip
 DEVICES: dict[str, Quantity] = {
@@ -32,13 +35,17 @@ DEVICES: dict[str, Quantity] = {
     "enc": "position",
     "load": "effort",  # a load cell's; the angle of a load is no effort
 }  # what a device measures, where no word says what it is of
+GAUGES = frozenset(
+    "cell cells gauge gauges strain".split()
+)  # whose volts are a bridge's, which drives nothing
+PULSED = frozenset("servo servos esc throttle pulse pulses".split())  # what is sent as the width of a pulse
 LETTERS: dict[str, Quantity] = {  # what one letter stands for by custom, where nothing else is said
     "q": "position", "x": "position", "y": "position", "z": "position", "v": "velocity", "w": "velocity", "a": "acceleration",
     "u": "effort", "f": "effort", "i": "effort", "t": "effort",
 }  # fmt: skip
 COMMANDED = frozenset(
-    "des desired cmd cmds command commands commanded ref reference target targets goal setpoint sp set demand demanded excitation "
-    "request requested".split()
+    "des desired cmd cmds command commands commanded ref refs reference references target targets goal goals setpoint setpoints sp set "
+    "demand demands demanded excitation request requests requested soll sollwert consigne consigna referencia riferimento".split()
 )
 COMMANDED_LETTERS = frozenset("u r".split())
 # a controller's output, of an effort; the short ones of a force are a contact's and a centre's
@@ -49,7 +56,7 @@ COMMANDED_COLUMNS = frozenset(
 )  # what a policy asked for; of a topic it is a ROS action
 MEASURED = frozenset(
     "meas measured sensed act actual state states observation feedback fb est estimated present real raw filt filtered smoothed response "
-    "encoder encoders enc".split()
+    "encoder encoders enc ist istwert mesure medido medida misurato".split()
 )
 # a reading of a sensor, of several efforts the one of the machine: not one that was filtered, estimated or modelled
 READ = frozenset("meas measured act actual feedback fb present sensed".split())
@@ -71,16 +78,22 @@ GENERIC = frozenset(
 JOINT = frozenset("joint joints".split())  # what drivers add to a joint's name at will
 ROTARY = frozenset(
     "angle angles theta phi alpha torque torques tor torq tau q rotation rotary omega revolute hinge encoder moment trq dof joint joints "
-    "qpos qvel knee hip ankle thigh calf shoulder elbow wrist arm pan tilt roll pitch yaw pendulum".split()
+    "qpos qvel knee hip ankle thigh calf shoulder elbow wrist arm pan tilt roll pitch yaw pendulum winkel drehmoment drehzahl angulo "
+    "angolo couple coppia".split()
 )
 LINEAR = frozenset(
     "force forces height displacement disp x z slide slider prismatic linear leg lift rail cart piston travel extension length"
-    " deflection elevator".split()
+    " deflection elevator kraft weg fuerza forza forca".split()
 )  # fmt: skip
 POSED = frozenset(
-    "des desired ref reference target targets goal setpoint sp".split()
+    "des desired ref refs reference references target targets goal goals setpoint setpoints sp soll sollwert "
+    "consigne consigna referencia riferimento".split()
 )  # of a motion, where nothing else is said
-ELECTRICAL = {"V": "voltage volt volts", "A": "current currents cur iq amp amps i", "1": "pwm duty"}
+ELECTRICAL = {
+    "V": "voltage volt volts spannung tensione tensao",
+    "A": "current currents cur iq amp amps i strom corriente corrente courant",
+    "1": "pwm duty",
+}
 IN_SI = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/", "tf2_msgs/", "trajectory_msgs/", "control_msgs/")
 # what a computer counts or sets, which neither drives nor is followed
 COUNTED = frozenset(
@@ -107,8 +120,9 @@ class Meaning:
 
 
 def words_of(text: str) -> list[str]:
-    """Words of a name in lower case: parted at capitals, digits, dots, slashes and underscores."""
-    apart = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", text)
+    """Words of a name in lower case and without accents: parted at capitals, digits, dots, slashes and underscores."""
+    bare = "".join(one for one in unicodedata.normalize("NFKD", text) if not unicodedata.combining(one))
+    apart = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", bare)
     return re.findall(r"[a-z]+|\d+", apart.lower())
 
 
@@ -126,7 +140,8 @@ def meaning_of(one: Recorded) -> Meaning:
     of_column = set() if one.topic else set(near) & COMMANDED_COLUMNS
     letters = set() if one.topic or certain else set(near) & COMMANDED_LETTERS
     of_controller = _controlled(one, near) if quantity == "effort" and certain else set[str]()
-    if asked := (every & COMMANDED) | of_column | letters | of_controller:
+    pulsed = set(near) & PULSED if one.unit == "s" else set[str]()
+    if asked := (every & COMMANDED) | of_column | letters | of_controller | pulsed:
         commanded = True
         reason += f"; {_one(near + far, asked)!r} says that it was asked for"
     elif every & MEASURED or one.type in (
@@ -284,6 +299,18 @@ def _controlled(one: Recorded, near: list[str]) -> set[str]:
 def _quantity(one: Recorded, near: list[str], far: list[str]) -> tuple[Quantity | None, str, bool]:
     if one.unit in ELECTRICAL and (motion := _motion_word(near)):
         return motion[1], f"its name says {motion[0]!r}, and a sensor's volts or amperes are no effort", True
+    if one.unit in ELECTRICAL and (gauge := set(near) & GAUGES):
+        return (
+            "effort",
+            f"its name says {_one(near, gauge)!r}, of which the volts or amperes are in proportion to an effort",
+            False,
+        )
+    if one.unit == "s" and (pulsed := set(near) & PULSED):
+        return (
+            "effort",
+            f"its name says {_one(near, pulsed)!r}, and its heading the width of a pulse ({one.written_unit})",
+            True,
+        )
     if one.unit in BY_UNIT:
         return BY_UNIT[one.unit], f"its heading says {one.written_unit}", True
     for words, where in ((near, "name"), (far, "topic")):

@@ -1,15 +1,27 @@
-"""Columns of joints that are called by a word that also says a quantity: `velocity_Rotation` is a velocity, of the joint `rotation`."""
+"""Columns of joints that are called by a word that also says something else: `velocity_Rotation` is a velocity, of the joint `rotation`,
+and `tau_SP` beside `tau_ELBOW` a torque of the joint `sp`, not a set point."""
 
 from collections.abc import Iterable
 from dataclasses import replace
 
 from rhythmid.record.inventory import Inventory, Recorded
-from rhythmid.start.meaning import COMMANDED, LETTERS, WORDS, Quantity, joint_of_column, words_of
+from rhythmid.start.meaning import (
+    COMMANDED,
+    CONTROLLED_SHORT,
+    LETTERS,
+    PLACES,
+    WORDS,
+    Quantity,
+    is_word,
+    joint_of_column,
+    words_of,
+)
 
 NAMING: tuple[Quantity, ...] = (
     "position",
     "effort",
 )  # said beside a word of motion, they tell that it is a name
+PEERS = 2  # names of joints beside it, each with all of its quantities, from which a word is another one: a single one may be a sensor's
 
 
 def with_joints(found: Inventory) -> Inventory:
@@ -33,8 +45,39 @@ def _joints_among(headings: Iterable[str]) -> frozenset[str]:
     split = [words_of(one) for one in headings]
     known = {tuple(words) for words in split}
     return frozenset(
-        word for word in WORDS["position"] if _beside_several(word, split) or _in_place_of_name(word, known)
-    )
+        word for word in {one for words in known for one in words}
+        if _is_one_of_many(word, known)
+        or (word in WORDS["position"] and (_beside_several(word, split) or _in_place_of_name(word, known)))
+    )  # fmt: skip
+
+
+def _is_one_of_many(word: str, known: set[tuple[str, ...]]) -> bool:
+    """Whether a word stands where names do, beside the same quantities as each of several of them: SP as in q_SP, tau_SP, q_KNEE, tau_KNEE,
+    q_HIP and tau_HIP, with nothing that is called q or tau alone."""
+    if not (is_word(word) or word in CONTROLLED_SHORT) or word in LETTERS:
+        return False
+    frames = {
+        (words[:place], words[place + 1 :])
+        for words in known
+        for place, one in enumerate(words)
+        if one == word
+    }
+    quantities = {quantity for begin, end in frames if (quantity := _quantity_of((*begin, *end))) is not None}
+    if len(quantities) < 2 or any((*begin, *end) in known for begin, end in frames):
+        return False
+    within = [
+        {words[len(begin)] for words in known if len(words) == len(begin) + 1 + len(end) and words == (*begin, words[len(begin)], *end)}
+        for begin, end in frames
+    ]  # fmt: skip
+    peers = set.intersection(*within)
+    return sum(_is_name(one) and one not in PLACES for one in peers) >= PEERS
+
+
+def _quantity_of(words: Iterable[str]) -> Quantity | None:
+    """The quantity that words say, or one letter by custom."""
+    words = list(words)
+    said = sorted(_said(words, ""))
+    return said[0] if said else next((LETTERS[one] for one in words if one in LETTERS), None)
 
 
 def _beside_several(word: str, split: list[list[str]]) -> bool:
@@ -74,5 +117,6 @@ def _named(one: Recorded, names: frozenset[str]) -> Recorded:
         return one
     rest = [word for word in words if word not in own]
     joint = joint_of_column(one.said, one.side, own)
-    said = " ".join(rest) if _said(rest, "") else one.said
+    told = _said(rest, "") if own <= WORDS["position"] else _quantity_of(rest)
+    said = " ".join(rest) if told else one.said
     return replace(one, said=said, joint=joint)

@@ -14,6 +14,8 @@ from rhythmid.identify.series import prepare
 from rhythmid.model import INERTIA, MASS, Model
 from rhythmid.record.record import Channel, Record
 from rhythmid.start.balance import Law, Rows
+from rhythmid.start.balanced import UNEXPLAINED, balance_of, restoring
+from rhythmid.start.meaning import tells_unit
 from rhythmid.start.roles import Roles
 from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units, mass_unit
 from rhythmid.value import Value
@@ -21,7 +23,6 @@ from rhythmid.value import Value
 LAW_KEPT = (
     0.5  # share of an effort that the law of a controller may leave at most, to be taken for what made it
 )
-UNEXPLAINED = 0.8  # share of what drives that a balance may leave at most, for its values to be taken
 LEAST_DAMPING = 0.01  # of inertia times the motion's angular frequency, where the balance shows no damping
 
 
@@ -68,12 +69,16 @@ def _bare(units: Units, mass: float = 1.0, fixed: bool = False) -> Model:
 
 def _forced(records: Sequence[Record], roles: Roles, units: Units, catalogue: Catalogue) -> Nominal:
     """Force and motion were recorded: all by the balance of forces."""
+    driver = "effort" if "effort" in roles.choices else "input"
     try:
-        rows = Rows.of(records, _bare(units))
-        law, kind = _restoring(records, rows, roles.rotary, inertial=True)
+        found = balance_of(
+            records, _bare(units), roles.rotary, driver, tells_unit(roles.choices["output"].recorded)
+        )
     except InputError as error:
         return _by_size(records, units, catalogue, str(error))
+    law, kind, rows = found.law, found.kind, found.rows
     inertia, doubts = _shown(law, rows)
+    doubts |= {INERTIA: "; ".join(found.doubts)} if found.doubts else {}
     if inertia <= 0.0:
         return _by_size(records, units, catalogue, "the balance of forces shows no inertia")
     if law.left > UNEXPLAINED:
@@ -112,36 +117,6 @@ def _shown(law: Law, rows: Rows) -> tuple[float, dict[str, str]]:
         )
     inertia = max(found["acceleration"], least)
     return inertia, {INERTIA: "; ".join(doubts)} if doubts else {}
-
-
-def _restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:
-    """The balance with what brings the machine back, if anything does: a spring, gravity of a pendulum, or neither.
-
-    The integral of a speed drifts. Gravity goes with the angle itself, which it does not tell; a spring shows in it only where it comes back.
-    """
-    measured = all(record.output_kind == "position" for record in records)
-    moving = ["acceleration", "velocity"] if inertial else ["velocity"]
-    level = [] if rows.steady else ["constant"]  # a constant would balance what never changes
-    full = [*moving, "position", *level]
-    delay = rows.delay(full)
-    plain = rows.fit(moving, delay)
-    options: dict[str, Law] = {
-        "constant": rows.fit([*moving, *level], delay),
-        "spring": rows.fit(full, delay),
-    }
-    if rotary and measured and rows.span >= 2.0 * LEAST_SWING:
-        options["pendulum"] = rows.fit([*moving, "sine", *(["cosine"] if level else [])], delay)
-    if options["spring"].coefficients["position"] <= 0.0 or not (measured or rows.comes_back):
-        del options["spring"]
-    law, kind = plain, "free"
-    if options["constant"].earns_place(law):
-        law, kind = options["constant"], "constant"
-    back = [name for name in ("spring", "pendulum") if name in options]
-    if back:
-        best = min(back, key=lambda name: options[name].left)
-        if options[best].earns_place(law):
-            law, kind = options[best], best
-    return law, kind
 
 
 def _forces(
@@ -293,7 +268,7 @@ def _alone(records: Sequence[Record], units: Units, catalogue: Catalogue, why: s
     reasons = {INERTIA: f"{why}, so all is per unit of inertia"}
     try:
         rows = Rows.of([_as_driven(one) for one in records], model)
-        law, kind = _restoring(records, rows, units.position == "rad", inertial=False)
+        law, kind = restoring(records, rows, units.position == "rad", inertial=False)
     except InputError as error:
         return _by_size(records, units, catalogue, str(error), fixed=True)
     model, more = _forces(model, law, kind, rows, catalogue)

@@ -29,6 +29,8 @@ SURE_INTEGRAL = (
 )
 RATIO = 0.3  # by which the slope of a position may differ from the velocity, before their units are doubted
 NEARLY = 0.8  # of the greatest correlation of any sign and lag: what an answer has, too, where its clock is a little early
+TIME_UNITS = (1.0, 1e3, 1e6, 1e9)  # of a clock in a second: s, ms, us, ns
+PACE = 0.01  # by which a clock's pace may differ from that of the stamps: oscillators differ far less, hasty stamps of a short record do not
 SAME_SIZE = (0.5, 2.0)  # ratio within which an answer is of its command's size
 
 
@@ -66,6 +68,17 @@ def together(first: Recorded, second: Recorded) -> tuple[float, Array, Array]:
         return 1.0, np.empty(0), np.empty(0)
     grid = begin + np.arange(min(count, MOST_SAMPLES)) / rate
     return 1.0 / rate, np.interp(grid, *_finite(first)), np.interp(grid, *_finite(second))
+
+
+def runs_like_a_clock(one: Recorded) -> bool:
+    """Whether a number never goes back, and goes on with the times of its samples as a clock does that counts s, ms, us or ns."""
+    time, value = _finite(one)
+    if len(value) < 4 * LAGS or (np.diff(value) < 0.0).any() or np.ptp(time) == 0.0 or np.ptp(value) == 0.0:
+        return False
+    time, value = time - time.mean(), value - value.mean()
+    pace = float(time @ value / (time @ time))
+    straight = 1.0 - float(np.sum((value - pace * time) ** 2) / (value @ value)) >= (1.0 - PACE) ** 2
+    return straight and any(abs(pace / unit - 1.0) <= PACE for unit in TIME_UNITS)
 
 
 def _main_part(one: Recorded) -> tuple[float, float]:

@@ -9,13 +9,13 @@ from rhythmid.errors import InputError
 from rhythmid.record.inventory import Inventory, Recorded
 from rhythmid.record.output_copy import doubt_of_copy
 from rhythmid.record.signals import InputKind, OutputKind
-from rhythmid.record.standstill import FLICKER
+from rhythmid.record.table_clock import is_time
 from rhythmid.start.by_data import by_data, note_of_unknown, output_by_data
 from rhythmid.start.carried import carried_motion
 from rhythmid.start.copies import copies_output, note_of_copy, note_of_sensor
 from rhythmid.start.direction import by_direction, notes_of_other_joints
 from rhythmid.start.drivers import drivers
-from rhythmid.start.joint import Joint, joint_of
+from rhythmid.start.joint import Joint, joint_of, shows_motion
 from rhythmid.start.known import Ask, Choice, Known, pick, ranked_by_worth
 from rhythmid.start.meaning import (
     Quantity,
@@ -26,7 +26,7 @@ from rhythmid.start.meaning import (
     rotary_of,
     says_who_asks,
 )
-from rhythmid.start.relation import RATIO, coherent, derivative, goes_along
+from rhythmid.start.relation import RATIO, coherent, derivative, goes_along, runs_like_a_clock
 from rhythmid.start.step_before import BEFORE, duty_before, set_point_before, step_before
 from rhythmid.start.targets import with_targets
 from rhythmid.start.unnamed_joints import column_groups
@@ -58,7 +58,9 @@ def first_answer(question: str, answers: Sequence[str]) -> int:
 
 def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_answer) -> Roles:
     """Roles of what is in a source. Raises InputError where nothing can be the output, or no joint is called `joint`."""
-    known = [Known(one, meaning_of(one)) for one in found.recorded if not is_ignored(one)]
+    known = [
+        Known(one, meaning_of(one)) for one in found.recorded if not is_ignored(one) and not _is_clock(one)
+    ]
     known = _without_empty_letters(known)
     everything = [*known, *(Known(one, meaning_of(one)) for one in found.constant)]
     known, resting = (with_targets(part, everything) for part in (known, everything[len(known) :]))
@@ -138,6 +140,14 @@ def guess_roles(found: Inventory, joint: str | None = None, ask: Ask = first_ans
     return Roles(choices, kind, _output_kind(measured), rotary, why, chosen, reference_of, tuple(notes))
 
 
+def _is_clock(one: Recorded) -> bool:
+    """Whether it is a time: a field that is called one and goes forward, or a number that runs like a clock where no word says a motion."""
+    meaning = meaning_of(one)
+    if meaning.certain or meaning.quantity in MEASURED:
+        return False
+    return is_time(one.said, one.value) or runs_like_a_clock(one)
+
+
 def _of_other_side(one: Recorded, output: Recorded) -> bool:
     """Whether it is of the left one where the output is of the right one, or the other way about."""
     return one.side != output.side and "" not in (one.side, output.side)
@@ -179,8 +189,9 @@ def _doubted(choice: Choice, copies: Mapping[int, float]) -> Choice:
 
 def _idle(rest: list[Known], output: Recorded, ask: Ask) -> tuple[dict[str, Choice], list[str]]:
     """What a user takes for the input where nothing is known to drive the machine; else what was left unused."""
-    along = [(coherent(one.one, output), one) for one in rest if goes_along(one.one, output)]
-    along.sort(key=lambda pair: -pair[0])
+    own = [one for one in rest if _is_elsewhere_of(one, output)]
+    along = [(coherent(one.one, output), one) for one in rest if one in own or goes_along(one.one, output)]
+    along.sort(key=lambda pair: (pair[1] not in own, -pair[0]))
     unknown = [one for one in rest if one.quantity is None and all(one is not each for _, each in along)]
     able = [*(one for _, one in along), *unknown]
     number = (
@@ -195,11 +206,19 @@ def _idle(rest: list[Known], output: Recorded, ask: Ask) -> tuple[dict[str, Choi
         for share, one in along
     )
     notes = (
-        [f"nothing is taken to drive the machine, though this goes with the output: {listed}"]
+        [
+            f"nothing is taken to drive the machine, though this {'is of its joint or ' if own else ''}goes with the output: {listed}"
+        ]
         if along
         else []
     )
     return {}, notes + ([note_of_unknown(unknown, output)] if unknown else [])
+
+
+def _is_elsewhere_of(one: Known, output: Recorded) -> bool:
+    """Whether it is of the output's joint by name, in another message."""
+    joint = meaning_of(output).joint
+    return bool(output.topic and joint) and one.meaning.joint == joint and one.one.topic != output.topic
 
 
 def _output_kind(quantity: Quantity) -> OutputKind:
@@ -243,7 +262,7 @@ def _worth_as_output(one: Known) -> float:
     """How much it moves; what shows more than a few values counts before what does not, as do what is said to be measured, or is called by
     a word."""
     moved = float(np.nanstd(one.one.value))
-    moved *= 1e6 if len(np.unique(one.one.value[np.isfinite(one.one.value)])) > FLICKER else 1.0
+    moved *= 1e6 if shows_motion(one.one) else 1.0
     return moved * (1e3 if one.meaning.certain else 1.0) * (1e3 if one.meaning.commanded is False else 1.0)
 
 

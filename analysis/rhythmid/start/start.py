@@ -18,6 +18,7 @@ from rhythmid.record.signals import Clock, Signals
 from rhythmid.record.standstill import standstill
 from rhythmid.start.force_unit import MODELLED
 from rhythmid.start.known import Ask
+from rhythmid.start.listed_joints import with_listed_joints
 from rhythmid.start.meaning import driving_unit_of, meaning_of
 from rhythmid.start.named_joints import with_joints
 from rhythmid.start.nominal import Nominal, nominal_of, per_inertia, units_of
@@ -29,11 +30,12 @@ from rhythmid.units import ROTATIONAL, TRANSLATIONAL, Units
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """What a source holds, the roles that were guessed, and the text of signals.yaml."""
+    """What a source holds, the roles that were guessed, the text of signals.yaml, and whether the machine moves in the source."""
 
     inventory: Inventory
     roles: Roles
     signals: str
+    moves: bool = True
 
     def lines(self) -> list[str]:
         """The guesses in plain text, one line each."""
@@ -48,11 +50,12 @@ class Guess:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """The guess, the nominal model, and the text of model.yaml."""
+    """The guess, the nominal model, the text of model.yaml, and a line on each recording that is not used."""
 
     guess: Guess
     nominal: Nominal
     model: str
+    remarks: tuple[str, ...] = ()
 
     @property
     def signals(self) -> str:
@@ -63,7 +66,7 @@ class Start:
         """The guesses in plain text, one line each."""
         elements = ", ".join(term.label for term in self.nominal.model.terms)
         doubts = [f"CHECK {label}: {doubt}" for label, doubt in self.nominal.doubts.items()]
-        return [*self.guess.lines(), f"nominal model: inertia, {elements}", *doubts]
+        return [*self.remarks, *self.guess.lines(), f"nominal model: inertia, {elements}", *doubts]
 
 
 @threadpool_limits.wrap(limits=1)  # many small matrices: threads would wait for each other
@@ -72,7 +75,7 @@ def guess(
     source: str | Path, joint: str | None = None, rate: float | None = None, ask: Ask = first_answer
 ) -> Guess:
     """Look at one recording and guess which channel is what; parameters and errors as of `start`."""
-    found = with_joints(with_sides(_inventory(source, rate)))
+    found = with_joints(with_sides(with_listed_joints(_inventory(source, rate))))
     roles = guess_roles(found, joint, ask)
     units = _units(roles)
     clock, reason = clock_of(found, roles)
@@ -86,13 +89,28 @@ def guess(
         text = signals_yaml(found, roles, units, clock, reason)
         record = read_record(source, Signals.from_text(text, GUESSED))
     clean = cleaned(record).record
-    doubts = [one for one in (standstill(clean), wraps_of(record), *rests_of(clean)) if one is not None]
+    still = standstill(clean)
+    doubts = [one for one in (still, wraps_of(record), *rests_of(clean)) if one is not None]
     if doubts:
         output = roles.choices["output"]
         output = replace(output, doubts=(*output.doubts, *doubts))
         roles = replace(roles, choices={**roles.choices, "output": output})
         text = signals_yaml(found, roles, units, clock, reason, use_line(clean))
-    return Guess(found, roles, text)
+    return Guess(found, roles, text, still is None)
+
+
+def _guess_of_moving(
+    sources: Sequence[str | Path], joint: str | None, rate: float | None, ask: Ask
+) -> tuple[Guess, Sequence[str | Path]]:
+    """The guess of the first recording in which the machine moves, and those before it; of the first one, and none, where it moves in none."""
+    guesses = (guess(source, joint, rate, ask) for source in sources)
+    first = None
+    for number, found in enumerate(guesses):
+        if found.moves:
+            return found, sources[:number]
+        first = first or found
+    assert first is not None
+    return first, ()
 
 
 def _inventory(source: str | Path, rate: float | None) -> Inventory:
@@ -117,21 +135,24 @@ def start(
 
     Parameters
     ----------
-    sources : bags or tables; roles are guessed from the first, the nominal model from all.
+    sources : bags or tables; roles are guessed from the first in which the machine moves, the nominal model from all in which it does.
     joint : the joint to look at; by default the one that moves most.
     rate : of a table without a time [Hz].
     ask : answers where several candidates are close; takes the best by default.
 
     Raises InputError, one line, where a source cannot be read, or nothing in it can be a motion.
     """
-    guessed = guess(sources[0], joint, rate, ask)
-    records = load_records(sources, Signals.from_text(guessed.signals, GUESSED))
+    guessed, resting = _guess_of_moving(sources, joint, rate, ask)
+    remarks = tuple(f"{one}: the machine stands still, so that it is not used here" for one in resting)
+    moving = [one for one in sources if one not in resting]
+    records = load_records(moving, Signals.from_text(guessed.signals, GUESSED))
+    records = [one for one in records if standstill(cleaned(one).record) is None] or records
     catalogue = load_catalogue() if catalogue is None else catalogue
     units = _units(guessed.roles)
     nominal = nominal_of(records, guessed.roles, units, catalogue)
     text = model_yaml(nominal, guessed.roles, units, units not in (TRANSLATIONAL, ROTATIONAL))
     Model.from_text(text, "model.yaml", catalogue)
-    return Start(guessed, nominal, text)
+    return Start(guessed, nominal, text, remarks)
 
 
 def _units(roles: Roles) -> Units:

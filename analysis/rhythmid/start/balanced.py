@@ -1,0 +1,115 @@
+"""The balance of forces of records of which little is told: with what brings the machine back, and with the sign of what drives and the
+unit of an angle that it shows."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from rhythmid.elements.force.pendulum_gravity import LEAST_SWING
+from rhythmid.model import Model
+from rhythmid.record.record import Record
+from rhythmid.start.balance import Law, Rows
+
+UNEXPLAINED = 0.8  # share of what drives that a balance may leave at most, for its values to be taken
+DEGREE = math.pi / 180.0  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class Balanced:
+    """What drives and the columns, the law that balances them, what brings the machine back, and what is doubtful about the recording."""
+
+    rows: Rows
+    law: Law
+    kind: str
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def explained(self) -> str:
+        """Share of what drives that the law explains, in per cent."""
+        return f"{max(0.0, 1.0 - self.law.left):.0%}"
+
+
+def balance_of(
+    records: Sequence[Record], bare: Model, rotary: bool, driver: str, unit_told: bool
+) -> Balanced:
+    """The balance of records that the channel `driver` drives; `unit_told` says whether the unit of the position is known.
+
+    Raises InputError where the records are too short or nothing drives them.
+    """
+    found = _of_either_sign(records, bare, rotary, driver)
+    if unit_told or not rotary or any(one.output_kind != "position" for one in records):
+        return found
+    other = _of_either_sign([_scaled(one, DEGREE) for one in records], bare, rotary, driver)
+    if other.kind == "pendulum" and other.law.left <= UNEXPLAINED and other.law.earns_place(found.law):
+        doubt = (
+            f"with the output in degrees (scale: {DEGREE:.9g}) the balance of forces explains {other.explained} of the {driver}, in rad "
+            f"{found.explained}: no unit of it is told, and all values here are those in degrees"
+        )
+        return replace(other, doubts=(doubt, *other.doubts))
+    if found.kind == "pendulum":
+        doubt = f"no unit of the angle is told, and gravity's law of it takes rad: where it is in degrees, give the output  scale: {DEGREE:.9g}"
+        return replace(found, doubts=(*found.doubts, doubt))
+    return found
+
+
+def _scaled(record: Record, scale: float) -> Record:
+    """The record with its output in another unit; a velocity beside it is left out."""
+    return replace(record, output=replace(record.output, value=record.output.value * scale), velocity=None)
+
+
+def _of_either_sign(records: Sequence[Record], bare: Model, rotary: bool, driver: str) -> Balanced:
+    """The balance, of what drives counted the other way where that alone shows how the machine moves."""
+    rows = Rows.of(records, bare)
+    plain = Balanced(rows, *restoring(records, rows, rotary, inertial=True))
+    turned = None if rows.by_base else _reversed(records, rows, plain.law, rotary)
+    if turned is None:
+        return plain
+    found = Balanced(rows.reversed, *turned)
+    doubt = (
+        f"with scale: -1 for the {driver} the balance of forces explains {found.explained} of it, as recorded {plain.explained}: its sign "
+        "seems to be opposite to the motion's, and all values here are those of the reversed one"
+    )
+    return replace(found, doubts=(doubt,))
+
+
+def _reversed(records: Sequence[Record], rows: Rows, law: Law, rotary: bool) -> tuple[Law, str] | None:
+    """The balance of what drives counted the other way, where that explains clearly more, and acts no later; None else.
+
+    The inertia itself has to explain a share: what a controller makes of position and speed is balanced by spring and damper that way.
+    The wrong sign of a periodic drive is half a period of delay, so that a later law tells nothing of the sign.
+    """
+    turned, kind = restoring(records, rows.reversed, rotary, inertial=True)
+    if turned.left > UNEXPLAINED or turned.delay > law.delay or not turned.earns_place(law):
+        return None
+    rest = [name for name in turned.coefficients if name != "acceleration"]
+    return (turned, kind) if turned.earns_place(rows.reversed.fit(rest, turned.delay)) else None
+
+
+def restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: bool) -> tuple[Law, str]:
+    """The balance with what brings the machine back, if anything does: a spring, gravity of a pendulum, or neither.
+
+    The integral of a speed drifts. Gravity goes with the angle itself, which it does not tell; a spring shows in it only where it comes back.
+    """
+    measured = all(record.output_kind == "position" for record in records)
+    moving = ["acceleration", "velocity"] if inertial else ["velocity"]
+    level = [] if rows.steady else ["constant"]  # a constant would balance what never changes
+    full = [*moving, "position", *level]
+    delay = rows.delay(full)
+    plain = rows.fit(moving, delay)
+    options: dict[str, Law] = {
+        "constant": rows.fit([*moving, *level], delay),
+        "spring": rows.fit(full, delay),
+    }
+    if rotary and measured and rows.span >= 2.0 * LEAST_SWING:
+        options["pendulum"] = rows.fit([*moving, "sine", *(["cosine"] if level else [])], delay)
+    if options["spring"].coefficients["position"] <= 0.0 or not (measured or rows.comes_back):
+        del options["spring"]
+    law, kind = plain, "free"
+    if options["constant"].earns_place(law):
+        law, kind = options["constant"], "constant"
+    back = [name for name in ("spring", "pendulum") if name in options]
+    if back:
+        best = min(back, key=lambda name: options[name].left)
+        if options[best].earns_place(law):
+            law, kind = options[best], best
+    return law, kind
