@@ -93,10 +93,11 @@ def test_stiffness_elements_follow_the_rest_length_of_the_spring(rig):
     assert np.ptp(run[0.0]) > 0.09
 
 
-def test_a_pendulum_that_goes_round_is_sought_hanging_any_way(catalogue, scales):
+def test_gravity_is_sought_hanging_any_way_wherever_the_motion_is(catalogue, scales):
     starts = catalogue["pendulum_gravity"].starts
     around = replace(scales, low=-20.0, high=1.0, centre=-8.0)
     found = {start["reference"] for start in starts(around)}
     assert len(found) == 4 and max(found) - min(found) == pytest.approx(1.5 * math.pi)
     swinging = replace(scales, low=scales.centre - 0.3, high=scales.centre + 0.3)
-    assert [start["reference"] for start in starts(swinging)] == [scales.centre]
+    found = [start["reference"] for start in starts(swinging)]
+    assert len(found) == 4 and found[0] == scales.centre  # an arm's link may hang outside of its travel

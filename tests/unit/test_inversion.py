@@ -85,6 +85,8 @@ def test_friction_under_load_is_under_the_effort_that_makes_up_for_it(name, coef
         f"  - pendulum_gravity: {{moment: {{value: {weight}, unit: N*m}}, reference: {{value: 0.0, unit: rad}}}}\n"
         f"  - {name}: {{coefficient: {{value: {coefficient}, unit: '1'}}, transition: {{value: {turn}, unit: rad/s}}{more}}}\n"
     )
-    balance = Balance.of([Record("run", Channel(TIME, WAVE, "rad"), Channel(TIME, effort, "N*m"))], model)
+    balance = Balance.of(
+        [Record("run", Channel(TIME, WAVE, "rad"), Channel(TIME, effort, "N*m"), hold="linear")], model
+    )
     error = balance.predicted(model) - balance.measured
     assert np.std(error) < 0.005 * np.std(balance.measured)

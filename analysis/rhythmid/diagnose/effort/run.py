@@ -12,7 +12,7 @@ from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.discrepancy import mean_product
 from rhythmid.diagnose.effort.candidate import columns_of, screen, starts_of
 from rhythmid.diagnose.effort.fitted import Fitted
-from rhythmid.diagnose.effort.reference import HISTORY, Mapped, reference_of, residual_with_map
+from rhythmid.diagnose.effort.reference import HISTORY, Mapped, history_of, reference_of, residual_with_map
 from rhythmid.diagnose.effort.remainder import Curve, remainder_of
 from rhythmid.diagnose.effort.scales import scales_at
 from rhythmid.diagnose.effort.search import GAP, MOST_EFFECTS, EffortSearch, search_effort
@@ -130,10 +130,10 @@ def effort_run(
     ruled_out = {one.elements: rows.predicted(one) for one in found.ruled_out}
     left = remainder_of(found.balance, found.chosen)
     of_the_motion = next(curve.quantity for curve in left if curve.joint is None)
-    mapped = {
-        of_the_motion: rows.predicted(found.chosen, found.beyond),
-        HISTORY: rows.predicted(found.chosen, found.history),
-    }
+    mapped = {of_the_motion: rows.predicted(found.chosen, found.beyond)}
+    if places == 1:  # of several joints the motion of one is not all that its effort depends on
+        history = history_of(found.balance, found.chosen, found.blocks)
+        mapped[HISTORY] = rows.predicted(found.chosen, history)
     if (beside := left[0].joint) is not None:
         coupled = reference_of(found.balance, found.chosen, found.blocks, beside)
         mapped[left[0].quantity] = rows.predicted(found.chosen, coupled)

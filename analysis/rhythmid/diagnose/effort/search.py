@@ -30,7 +30,7 @@ from rhythmid.diagnose.effort.candidate import (
 )
 from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.kin import at_values_of, contained, kin, shortlist
-from rhythmid.diagnose.effort.reference import Mapped, history_of, reference_of
+from rhythmid.diagnose.effort.reference import Mapped, reference_of
 from rhythmid.diagnose.effort.scales import scales_at, scales_of
 from rhythmid.diagnose.evidence import Blocks, predict
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, special_case
@@ -67,7 +67,6 @@ class EffortSearch:
     hypotheses : all that were fitted, the nominal among them.
     ruled_out : what was fitted, too, and explains no motion.
     reference, beyond : the nominal model, and the chosen one, with curves over the motion beside them.
-    history : the chosen model with a free function of the motion and its past beside it.
     chosen : the hypothesis with which the search ended.
     not_tried : why candidates of the catalogue took no part, by name; and what the budget cut off.
     candidates : number of effects that were tried.
@@ -82,7 +81,6 @@ class EffortSearch:
     chosen: Fitted
     reference: Mapped
     beyond: Mapped
-    history: Mapped
     not_tried: Mapping[str, str]
     candidates: int
     cut_short: bool = False
@@ -131,9 +129,8 @@ def search_effort(
     for one in (chosen, best) if best is not chosen else (chosen,):
         search.reduce(one)
     beyond = reference_of(balance, chosen, search.blocks)
-    history = history_of(balance, chosen, search.blocks)
     return EffortSearch(
-        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, history, not_tried(catalogue, model, scales_of(balance, model)) | search.cut, len(search.tried), bool(search.cut),
+        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, not_tried(catalogue, model, scales_of(balance, model)) | search.cut, len(search.tried), bool(search.cut),
     )  # fmt: skip
 
 
