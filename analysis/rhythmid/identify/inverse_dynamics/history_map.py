@@ -17,13 +17,10 @@ from scipy.spatial.distance import cdist
 from rhythmid.identify.inverse_dynamics.motion import Motion
 
 Array = NDArray[np.float64]
-WIDTHS = (
-    0.02,
-    0.1,
-    0.4,
-)  # of the stops, in standard deviations of the position: presliding, play, a soft transmission
-CENTRES = 80  # with 40 a hysteresis is drawn coarsely, with 160 nothing is gained
-LENGTH = 2.0  # of the function, in standard deviations of each quantity: 1.5 to 3 predict alike
+# of the stops, in standard deviations of the position: presliding, play, a soft transmission
+WIDTHS = (0.02, 0.1, 0.4)
+CENTRES = 80  # a record has some hundred rows: about as many as its columns tell apart
+LENGTH = 2.0  # of the function, in standard deviations of each quantity: between 1.5 and 3, which were best for large and small remainders
 JITTER = 1e-6  # added to the kernel of the centres, so that near ones do no harm
 FAR = 4.0  # standard deviations beyond which a quantity of other records is taken to be there
 
