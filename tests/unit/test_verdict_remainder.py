@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from contests import NAMED, NOMINAL, NOTHING, SIZE, contest, decided, friction, predicted, supposed, verdict
 
-from rhythmid.diagnose.verdict import significance
+from rhythmid.diagnose.verdict import lost_share, significance
 
 
 @pytest.mark.parametrize(
@@ -112,3 +112,19 @@ def test_a_mismatch_that_is_no_noise_is_not_called_consistent_though_nothing_exp
 
 def test_records_that_would_not_show_a_small_effect_still_show_a_large_one():
     assert verdict(contest(NOMINAL, friction()), 0.8) == NAMED
+
+
+@pytest.mark.parametrize(
+    ("share", "expected"), [(0.0, "missing_physics"), (0.5, "missing_physics"), (1.0, "undecided")]
+)
+def test_a_name_is_not_stated_where_much_is_left_that_follows_from_its_own_past_though_nothing_explains_it(
+    share, expected
+):
+    # of the mismatch 30 % of the motion, 15 % are left
+    made = contest(supposed("", predicted((0.3 * SIZE) ** 2)), friction((0.15 * SIZE) ** 2))
+    assert verdict(replace(made, structured_after=share))[0] == expected
+
+
+def test_what_models_of_real_machines_leave_says_nothing_against_a_name():
+    made = contest(supposed("", predicted((0.3 * SIZE) ** 2)), friction((0.049 * SIZE) ** 2))
+    assert lost_share(replace(made, structured_after=1.0), made.hypotheses[1]) == 0.0

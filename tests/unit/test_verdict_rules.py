@@ -24,6 +24,9 @@ def test_the_first_row_of_the_table_of_verdicts_that_applies_decides(rule):
         "unnamed_remainder": contest(NOMINAL, maps={"velocity": predicted(0.1)}),
         "missed": contest(supposed("", predicted((0.5 * SIZE) ** 2))),
         "structured": replace(contest(NOMINAL), structured=1.0),
+        "lost": replace(
+            contest(supposed("", predicted(SIZE**2)), friction((0.8 * SIZE) ** 2)), structured_after=0.9
+        ),
         "nothing_missing": contest(NOMINAL),
         "freed_value": contest(NOMINAL, mass),
         "longer_delay": contest(NOMINAL, late),

@@ -207,6 +207,8 @@ def contend(
         if time_is_up() and not needed:
             raise InputError(SPENT)
         fit = whole_fit(trial, series, rows.noise, step, reach=math.inf if needed else reach)
+        if kind == "freed_value":
+            check_determined(fit, trial.added[-1])
         found = cross_validate(linearised(fit, rows), rows.blocks)
         state_steps = fit.linearisation.state_steps
         free = start_freedom(
@@ -220,6 +222,14 @@ def contend(
     results = counted(fork_map(one, list(trials)), len(trials), "hypotheses", tell)
     done = {i: r for i, r in results if not isinstance(r, Exception) and np.isfinite(r[0].error).all()}
     return [Contender(*trials[i], *done[i]) for i in sorted(done)]
+
+
+def check_determined(fit: Fit, name: str) -> None:
+    """Raise InputError where the records do not determine a value that was set free: what the fit gains then is the other parameters', which
+    may go anywhere along with it."""
+    value, std = fit.model.value(name), fit.std.get(name, math.inf)
+    if not std < abs(value):
+        raise InputError(f"the records do not determine {name} beside the other parameters")
 
 
 def _by_size(trials: Sequence[tuple[Trial, Kind]]) -> dict[int, list[Trial]]:

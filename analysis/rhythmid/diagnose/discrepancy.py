@@ -2,26 +2,21 @@
 
 No model is whole. Small effects that are not named, because they are too small or because the catalogue has no name for them, move
 the parameters that are estimated without them, and no scatter of the residual shows it. So the model's discrepancy is taken for
-a random sum of what the catalogue's candidates would do (a discrepancy in the sense of M. C. Kennedy, A. O'Hagan, J. R. Stat. Soc. B
-63 (2001) 425, with causes that a machine may have): each with a size of its own, normal about nothing, of a common scale.
-The scale is that which makes the residual likeliest. Where the residual is noise it is nothing, and nothing is added.
+a random sum of what the catalogue's candidates and free functions of the motion would do (a discrepancy in the sense of M. C. Kennedy,
+A. O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, with causes that a machine may have): each with a size of its own, normal about nothing, of a
+common scale. The residual tells of that scale and does not fix it: a cause that it hardly shows may be there all the same. So the scale is
+integrated over, with a half-Cauchy prior whose median is one standard deviation of the noise (A. Gelman, Bayesian Analysis 1 (2006) 515).
 """
-
-import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
-from scipy.stats import chi2
 
 from rhythmid.identify.least_squares import orthonormal, reduced
 
 Array = NDArray[np.float64]
-# chance that noise alone makes a scale other than nothing as likely as that: below it nothing is added
-CHANCE = 0.05
-# decades of the candidates' common scale that are looked through, about the one at which they are as large as the residual
-DECADES = 4.0
+# common scales of the candidates' sizes that are integrated over, in standard deviations of the noise: from a hundredth of what noise
+# itself is worth in one direction to far beyond what any residual holds, six a decade
+SCALES = np.logspace(-2.0, 6.0, 49)
 ROWS = 20_000  # that are taken at once
 ROUNDING = 1e-6  # of a candidate, below which what the parameters leave of it is rounding
 
@@ -54,30 +49,22 @@ def mean_product(jacobian: Array, residual: Array, candidates: Array, inverse: A
     shown, strengths = -(directions[:, seen].T @ rest), strengths[seen]
     # what is left may be more than the noise was taken for, and neighbouring rows may repeat one another, so that all are less
     noise = max((float(rest @ rest) - float(shown @ shown)) / free, 1.0)
-    scale = _scale(shown, strengths, noise)
-    if scale == 0.0:
-        return np.zeros_like(inverse)
-    share = scale**2 * strengths / (noise + scale**2 * strengths**2)
-    mean = mixing[seen].T @ (share * shown)
-    spread = scale**2 * (np.eye(len(mean)) - (mixing[seen].T * (share * strengths)) @ mixing[seen])
     moved = inverse @ (jacobian.T @ columns)
-    return moved @ (spread + np.outer(mean, mean)) @ moved.T
+    scales = np.sqrt(noise) * SCALES
+    found = np.zeros_like(inverse)
+    for scale, weight in zip(scales, _weights(shown, strengths, noise), strict=True):
+        share = scale**2 * strengths / (noise + scale**2 * strengths**2)
+        mean = mixing[seen].T @ (share * shown)
+        # a direction that the parameters absorb whole is theirs
+        spread = (mixing[seen].T * (scale**2 * (1.0 - share * strengths))) @ mixing[seen]
+        found += weight * (moved @ (spread + np.outer(mean, mean)) @ moved.T)
+    return found
 
 
-def _scale(shown: Array, strengths: Array, noise: float) -> float:
-    """Common scale of the candidates' sizes that makes `shown` likeliest, 0 where noise of this variance does nearly as well."""
-
-    def cost(logarithm: float) -> float:
-        variance = noise + math.exp(2.0 * logarithm) * strengths**2
-        return 0.5 * float(np.sum(np.log(variance) + shown**2 / variance))
-
-    if not len(shown):
-        return 0.0
-    about = math.log(math.sqrt(float(shown @ shown)) or 1e-300)
-    reach = DECADES * math.log(10.0)
-    found: Any = minimize_scalar(cost, bounds=(about - reach, about + reach), method="bounded")
-    without = 0.5 * float(np.sum(np.log(noise) + shown**2 / noise))
-    # a scale cannot be negative, so half of the chance lies at nothing (S. G. Self, K.-Y. Liang, J. Am. Stat. Assoc. 82 (1987) 605)
-    if 2.0 * (without - float(found.fun)) < chi2.isf(2.0 * CHANCE, 1):
-        return 0.0
-    return math.exp(float(found.x))
+def _weights(shown: Array, strengths: Array, noise: float) -> Array:
+    """Posterior probabilities (s,) of the common scales `SCALES`, each for its equal part of the logarithm."""
+    variance = noise * (1.0 + SCALES[:, None] ** 2 * strengths**2)
+    log_density = -0.5 * np.sum(np.log(variance) + shown**2 / variance, axis=1)
+    log_density += np.log(SCALES / (1.0 + SCALES**2))
+    weights = np.exp(log_density - log_density.max())
+    return np.asarray(weights / weights.sum())

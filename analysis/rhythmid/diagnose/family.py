@@ -61,7 +61,7 @@ def families_of(
         others = [label for label in open_ if label not in mine]
         laws, held = _laws(contest, family, weights)
         vague = size_errors.get(max(mine, key=lambda label: shares[label]), 0.0)
-        chance = chance_of_law(share, left + removed_by(others, chosen, contest), vague) * held
+        chance = chance_of_law(share, left + removed_by(others, chosen, contest), vague, family) * held
         own = [
             name for name in chosen.names if chosen.family.get(name) == family
         ]  # as good as those with more weight

@@ -133,22 +133,19 @@ def values_of(known: Trajectories, name: str) -> list[Array]:
 def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:
     """The free functions beside a fitted model, each made when it is asked for: over long records each is large."""
     fit = known.fit
-    quantities: dict[str, list[Array]] = {
-        "position": values_of(known, "position"),
-        "velocity": values_of(known, "velocity"),
-        "time": [p.time - p.time[0] for p in known.paths],
-    }
+    yield from motion_maps(known, pool)
+    quantities: dict[str, list[Array]] = {"time": [p.time - p.time[0] for p in known.paths]}
     if _driven(known):
         quantities["actuator force"] = values_of(known, "effort")
     for name, values in quantities.items():
         functions, grid, basis = _splines(values, SPLINES)
         if functions:
             yield FreeMap(name, _simulated(known, functions, pool), grid, basis)
-    both = [_splines(quantities[name], SPLINES_OF_TWO)[0] for name in ("position", "velocity")]
+    both = [_splines(values_of(known, name), SPLINES_OF_TWO)[0] for name in ("position", "velocity")]
     if all(both):
         products = ([a * b for a, b in zip(x, v)] for x in both[0] for v in both[1])
         yield FreeMap("position and velocity", _simulated(known, products, pool))
-    yield FreeMap("past position", _simulated(known, _slipped(quantities["position"]), pool))
+    yield FreeMap("past position", _simulated(known, _slipped(values_of(known, "position")), pool))
     yield from filtered(known, pool)
     line = residual_line(fit)
     if line > 0.0:
@@ -159,6 +156,14 @@ def free_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> It
     if functions:
         columns = tuple(tuple(s.of_block(f) for s, f in zip(fit.run.series, one)) for one in functions)
         yield FreeMap("measured position (sensor error)", columns, grid, basis)
+
+
+def motion_maps(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:
+    """Forces that are any function of the position, and of the velocity."""
+    for name in ("position", "velocity"):
+        functions, grid, basis = _splines(values_of(known, name), SPLINES)
+        if functions:
+            yield FreeMap(name, _simulated(known, functions, pool), grid, basis)
 
 
 def filtered(known: Trajectories, pool: ThreadPoolExecutor | None = None) -> Iterator[FreeMap]:

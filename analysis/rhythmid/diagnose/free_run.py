@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from rhythmid.diagnose.contenders import (
 from rhythmid.diagnose.discrepancy import mean_product
 from rhythmid.diagnose.evidence import detectable, prediction
 from rhythmid.diagnose.fine_steps import finely_stepped
+from rhythmid.diagnose.free_functions import motion_maps
 from rhythmid.diagnose.hypothesis import Hypothesis, Kind, Prediction
 from rhythmid.diagnose.intervals import profiled
 from rhythmid.diagnose.location import Dependence, dependences
@@ -232,7 +234,7 @@ def _unconverged(nominal: Fit, found: Search) -> list[tuple[tuple[str, ...], str
 
 def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.float64]:
     """Mean product (p, p) of the errors of the fit's parameters that come from small effects which it lacks: of each element
-    that the model could still lack the guess which the last round scored best."""
+    that the model could still lack the guess which the last round scored best, and forces that are any function of position or velocity."""
     fit = found.fit
     made = np.zeros((len(fit.names), len(fit.names)))
     lacking = candidates(catalogue, fit.model.setting, scales(fit.run.series, fit.model)).tried
@@ -241,15 +243,16 @@ def _unnamed(found: Search, catalogue: Catalogue, case: Case) -> NDArray[np.floa
     tried = [(one.element, dict(one.values)) for one, _ in scored if one.element.name in names]
     std = np.array([fit.std[name] for name in fit.names])
     known = np.isfinite(std) & (std > 0.0)
-    if not tried or not known.any():
+    if not known.any():
         return made
-    line, count = fit.linearisation, 0
+    line, run = fit.linearisation, trajectories(fit)
+    maps = [column for one in motion_maps(run, case.pool) for column in one.columns]
     # filled one by one: of long records all of them twice would be large
-    columns = np.empty((len(line.residual), len(tried)), order="F")
-    for count, one in enumerate(changes_of(trajectories(fit), tried, case.pool), start=1):
-        columns[:, count - 1] = projected(fit, whitened(fit, one.outputs, fit.noise))
-    if not count:
-        return made
+    columns = np.empty((len(line.residual), len(tried) + len(maps)), order="F")
+    count = 0
+    for outputs in chain((one.outputs for one in changes_of(run, tried, case.pool)), maps):
+        columns[:, count] = projected(fit, whitened(fit, outputs, fit.noise))
+        count += 1
     columns = columns[:, :count]
     priors = [fit.model.parameters[name].prior for name, one in zip(fit.names, known) if one]
     inverse = covariance_of(line.jacobian[:, known], priors)
@@ -307,6 +310,7 @@ def _contest(
         follows=FOLLOWS,
         cut_short=found.cut_short,
         structured=structured,
+        structured_after=found.noise.predictable,
     )
 
 

@@ -11,7 +11,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rhythmid.diagnose.constants import ADEQUATE, HOLDS, OPEN, STEEPNESS, VAGUE, VAGUENESS
+from rhythmid.diagnose.constants import (
+    ADEQUATE,
+    HOLDS,
+    OPEN,
+    PRIOR_ODDS,
+    PRIOR_ODDS_OF_OTHERS,
+    STEEPNESS,
+    VAGUE,
+    VAGUENESS,
+)
 from rhythmid.diagnose.evidence import probabilities
 from rhythmid.diagnose.hypothesis import Hypothesis
 from rhythmid.diagnose.rejections import keeps_shape
@@ -59,11 +68,18 @@ def joint_probability(
     return float(np.clip(sum(held), 0.0, 1.0))
 
 
-def chance_of_law(share: float, left: float, size_error: float = 0.0) -> float:
+def prior_odds(family: str) -> float:
+    """Prior odds of a family on real machines, over those with which the proof draws it; those of an element without a family are one."""
+    return PRIOR_ODDS.get(family, PRIOR_ODDS_OF_OTHERS) if family else 1.0
+
+
+def chance_of_law(share: float, left: float, size_error: float = 0.0, family: str = "") -> float:
     """Chance that an effect with this share of the mismatch is the law that its name says, where this much is left: of the part of the mismatch
-    that it is to explain, what is left may be a part."""
+    that it is to explain, what is left may be a part. The odds of that are those of the proof times the prior odds of its family."""
     own = share / (share + left) if share + left > 0.0 else 0.0
-    return adequacy(own) * resolved(size_error)
+    chance = adequacy(own) * resolved(size_error)
+    odds = prior_odds(family)
+    return odds * chance / (1.0 - chance + odds * chance)
 
 
 def removed_by(some: Sequence[str], chosen: Hypothesis, contest: Contest) -> float:

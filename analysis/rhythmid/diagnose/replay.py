@@ -42,6 +42,7 @@ def ledger(contest: Contest, detectable: float, size_errors: Mapping[str, float]
         "follows": contest.follows if math.isfinite(contest.follows) else None,
         "cut_short": contest.cut_short,
         "structured": contest.structured,
+        "structured_after": contest.structured_after,
         "detectable": detectable,
         "size_errors": {
             label: error if math.isfinite(error) else None for label, error in size_errors.items()
@@ -90,6 +91,7 @@ def contest_of(data: dict[str, Any]) -> Contest:
         data.get("follows") or math.inf,
         data.get("cut_short", False),
         float(data.get("structured", 0.0)),
+        float(data.get("structured_after", 0.0)),
     )
 
 

@@ -42,6 +42,7 @@ class Contest:
     cut_short : whether the budget ended the search before all effects that scored well were tried.
     structured : share of the error of the nominal model that follows from its own past, so that it is no noise; 0 of an effort, whose noise
         the filter of the balance colours.
+    structured_after : the same of the model with which the search ended; of an effort what lasts longer than the filter mixes neighbours.
     """
 
     hypotheses: tuple[Hypothesis, ...]
@@ -53,6 +54,7 @@ class Contest:
     follows: float = math.inf
     cut_short: bool = False
     structured: float = 0.0
+    structured_after: float = 0.0
 
     @property
     def nominal(self) -> Hypothesis:

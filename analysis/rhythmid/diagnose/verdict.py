@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from scipy.stats import t as student
 
-from rhythmid.diagnose.constants import EQUIVALENT, FALSE_ALARM, STATED
+from rhythmid.diagnose.constants import EQUIVALENT, FALSE_ALARM, LEFT, STATED
 from rhythmid.diagnose.evidence import chance_better, difference, gain_ahead, removed
 from rhythmid.diagnose.family import MissingFamily, families_of
 from rhythmid.diagnose.hypothesis import Hypothesis, Prediction, Verdict
@@ -119,9 +119,10 @@ def _further(other: Hypothesis, chosen: Hypothesis) -> tuple[str, ...]:
 
 
 def shares_of(contest: Contest, chosen: Hypothesis) -> dict[str, float]:
-    """Share of the explainable mismatch that each effect of a hypothesis removes, by label: the mean of what it removes as the last of them
-    and as the first, for two effects the Shapley value. Effects may stand in for one another, so that neither removes much as
-    the last (L. S. Shapley, Contributions to the Theory of Games 2 (1953) 307)."""
+    """Share of the explainable mismatch that each effect of a hypothesis removes, by label: what it removes as the last of them or, where
+    that is more, the mean of this and of what it removes as the first, for two effects the Shapley value (L. S. Shapley, Contributions to the
+    Theory of Games 2 (1953) 307). Effects may stand in for one another, so that neither removes much as the last; or mask one another, so
+    that neither does as the first."""
     nominal, after = contest.nominal.prediction.mean_square, chosen.prediction.mean_square
     whole = nominal - contest.floor
     squares = {one.key: one.prediction.mean_square for one in contest.hypotheses}
@@ -130,12 +131,20 @@ def shares_of(contest: Contest, chosen: Hypothesis) -> dict[str, float]:
         rest = set(chosen.elements) - {label}
         # the best of the fitted models without it
         without = min(square for key, square in squares.items() if set(key) <= rest)
-        taken = [without - after]
-        if rest and (label,) in squares:
-            taken.append(nominal - squares[label,])
-        share = sum(taken) / len(taken) / whole if whole > 0.0 else 0.0
+        last = without - after
+        first = nominal - squares[label,] if rest and (label,) in squares else last
+        share = max(last, 0.5 * (last + first)) / whole if whole > 0.0 else 0.0
         found[label] = float(min(max(share, 0.0), 1.0))
     return found
+
+
+def lost_share(contest: Contest, chosen: Hypothesis) -> float:
+    """Share of the mismatch that a hypothesis leaves in a way which follows from its own past, beyond what models of real machines leave: it is
+    no noise, and no more explained than what a free map predicts of it, although nothing that was tried does."""
+    whole = contest.nominal.prediction.mean_square - contest.floor
+    structured = contest.structured_after**2 * chosen.prediction.mean_square
+    beyond = structured - (LEFT * contest.size) ** 2
+    return float(min(max(beyond, 0.0) / whole, 1.0)) if whole > 0.0 else 0.0
 
 
 def _groups(contest: Contest, selection: Selection) -> tuple[tuple[str, ...], ...]:
@@ -180,15 +189,19 @@ def decide(
         labels = tuple(label for label in labels if label != chosen.elements[-1])
     if chosen.kind == "delay" and chosen.effects:  # a delay beside effects is told with the delays
         labels = tuple(label for label in labels if label != INPUT_DELAY)
+    lost = left.expected + lost_share(contest, chosen)
+    family = {label: chosen.family.get(names[label], "") for label in labels}
     alone = {
-        label: chance_of_law(shares[label], left.expected, size_errors.get(label, 0.0)) for label in labels
+        label: chance_of_law(shares[label], lost, size_errors.get(label, 0.0), family[label])
+        for label in labels
     }
     open_ = [label for label in labels if alone[label] < STATED]
     sure = {
         label: chance_of_law(
             shares[label],
-            left.expected + removed_by([one for one in open_ if one != label], chosen, contest),
+            lost + removed_by([one for one in open_ if one != label], chosen, contest),
             size_errors.get(label, 0.0),
+            family[label],
         )
         for label in labels
     }
@@ -216,6 +229,7 @@ def decide(
         math.sqrt(left.least) / max(contest.practical * contest.size, 1e-300),
         missed,
         contest.structured * missed,
+        contest.structured_after * missed,
         (chosen.heldout_nrmse or 0.0) / contest.follows,
         detectable,
         size_errors.get(labels[0], 0.0) if labels else 0.0,
@@ -238,9 +252,7 @@ def decide(
         tuple(group for group in groups if group[0] in told),
         left,
         tuple(names[label] for label in labels if label not in named and label in chosen.effects),
-        families_of(contest, chosen, shares, weights, left.expected, open_, size_errors)
-        if rule.tells_family
-        else (),
+        families_of(contest, chosen, shares, weights, lost, open_, size_errors) if rule.tells_family else (),
     )
 
 

@@ -7,7 +7,7 @@ as Markdown.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rhythmid.diagnose.constants import BLIND, EXPLAINED, LEFT, MAINLY, STATED, VAGUE
+from rhythmid.diagnose.constants import BLIND, EXPLAINED, LEFT, MAINLY, MISSES_MOST, STATED, VAGUE
 from rhythmid.diagnose.hypothesis import Kind, Verdict
 
 
@@ -26,6 +26,7 @@ class Outcome:
     remainder : rms of what it leaves and something else predicts by more than chance, at least, over the smallest of practical importance.
     missed : rms error of the chosen hypothesis, as a share of what was measured.
     structured : the part of it that follows from its own past, so that it is no noise.
+    lost : the same of the model with which the search ended.
     astray : its error on held-out data, over that up to which a model follows the machine.
     detectable : smallest effect that the records would show, the same.
     vague : standard deviation of the size of its effect with the largest share, relative to the size.
@@ -43,6 +44,7 @@ class Outcome:
     remainder: float
     missed: float
     structured: float
+    lost: float
     astray: float
     detectable: float
     vague: float
@@ -73,6 +75,7 @@ class VerdictRule:
             left=100.0 * found.left,
             missed=100.0 * found.missed,
             structured=100.0 * found.structured,
+            lost=100.0 * found.lost,
             detectable=100.0 * found.detectable,
         )
 
@@ -92,6 +95,15 @@ def _of_search(statistic: Callable[[Outcome], float], cut_short: bool) -> Callab
 
 
 VERDICT_RULES: tuple[VerdictRule, ...] = (
+    VerdictRule(
+        "lost",
+        "the part of the error of the chosen hypothesis that follows from its own past, as a share of what was measured",
+        MISSES_MOST,
+        "undecided",
+        "with all that was tried the model misses {missed:.0f} % of what was measured, {lost:.0f} % in a way that follows from its own past and so is no "
+        "noise: something that was not recorded may act, or units, signs or the structure of the model are wrong",
+        lambda found: found.lost,
+    ),
     VerdictRule(
         "none_yet",
         "no effect is accepted, and the budget ended the search: the statistic of `unnamed_remainder`",
@@ -259,7 +271,14 @@ def table() -> str:
 
 def _words(reason: str) -> str:
     """A reason as it is told, with an ellipsis for each figure."""
-    figures = {"goes_with": "…", "left": "…", "missed": "…", "structured": "…", "detectable": "…"}
+    figures = {
+        "goes_with": "…",
+        "left": "…",
+        "missed": "…",
+        "structured": "…",
+        "lost": "…",
+        "detectable": "…",
+    }
     return reason.replace(":.0f", "").format(**figures)
 
 

@@ -43,7 +43,7 @@ class Mapped:
     linearised: Linearised
 
 
-def _columns(balance: Balance, fitted: Fitted, free: Map) -> Array:
+def map_columns(balance: Balance, fitted: Fitted, free: Map) -> Array:
     """Columns (n, q) of a free map at the rows of a balance."""
     loads = balance.required(fitted.fit.model)
     made = (free.columns(motion, load) for motion, load in zip(balance.motions, loads, strict=True))
@@ -78,7 +78,7 @@ def residual_with_map(heldout: Balance, fitted: Fitted, found: Mapped) -> Array:
     own = jacobian[:, ~fitted.fit.at_limit]
     values = found.linearised.departure
     step = values[: own.shape[1]] - fitted.linearised.departure
-    return residual + own @ step + _columns(heldout, fitted, found.map) @ values[own.shape[1] :]
+    return residual + own @ step + map_columns(heldout, fitted, found.map) @ values[own.shape[1] :]
 
 
 def reference_of(balance: Balance, fitted: Fitted, blocks: Blocks, beside: str | None = None) -> Mapped:
@@ -94,7 +94,7 @@ def history_of(balance: Balance, fitted: Fitted, blocks: Blocks) -> Mapped:
 
 def _best(balance: Balance, fitted: Fitted, blocks: Blocks, free: Map) -> Mapped:
     """The map with the ridge that predicts best what it has not seen."""
-    columns = _columns(balance, fitted, free)
+    columns = map_columns(balance, fitted, free)
     made = [_with_map(balance, fitted, ridge, free, columns) for ridge in RIDGES]
     found = predict([one.linearised for one in made], blocks, balance.record)
     return made[int(np.argmax([one.score for one in found]))]

@@ -12,7 +12,15 @@ from rhythmid.diagnose.constants import PRACTICAL_EFFORT
 from rhythmid.diagnose.discrepancy import mean_product
 from rhythmid.diagnose.effort.candidate import columns_of, screen, starts_of
 from rhythmid.diagnose.effort.fitted import Fitted
-from rhythmid.diagnose.effort.reference import HISTORY, Mapped, history_of, reference_of, residual_with_map
+from rhythmid.diagnose.effort.lasting_error import lasting_share
+from rhythmid.diagnose.effort.reference import (
+    HISTORY,
+    Mapped,
+    history_of,
+    map_columns,
+    reference_of,
+    residual_with_map,
+)
 from rhythmid.diagnose.effort.remainder import Curve, remainder_of
 from rhythmid.diagnose.effort.scales import scales_at
 from rhythmid.diagnose.effort.search import GAP, MOST_EFFECTS, EffortSearch, search_effort
@@ -34,7 +42,8 @@ from rhythmid.elements.catalogue import Catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.applicability import Applicability
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import EffortFit, variation_of
+from rhythmid.identify.inverse_dynamics.estimate import size_of, variation_of
+from rhythmid.identify.inverse_dynamics.free_map import FreeMap
 from rhythmid.identify.robust_covariance import root_weights, weighted, with_robust_std
 
 Array = NDArray[np.float64]
@@ -151,6 +160,8 @@ def effort_run(
         return one.claimed(made(errors_of), errors[tuple(sorted(one.elements))] / size)
 
     maps = {quantity: made(one) for quantity, one in mapped.items()}
+    # of several joints an error of one may be another one's
+    lasting = lasting_share(predicted[found.chosen.elements].error, rows.record, GAP) if places == 1 else 0.0
     contest = Contest(
         tuple(claimed(one, predicted[one.elements]) for one in found.hypotheses),
         maps,
@@ -159,6 +170,7 @@ def effort_run(
         PRACTICAL_EFFORT,
         tuple(claimed(one, ruled_out[one.elements]) for one in found.ruled_out),
         cut_short=found.cut_short,
+        structured_after=lasting,
     )
     selection = select(contest)
     chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)
@@ -189,16 +201,19 @@ def _among_models(
     fit = chosen.fit
     std = fit.std.copy()  # of the alignment first, which belongs to no model
     std[1:] = np.hypot(std[1:], np.sqrt(np.diag(between)))
-    return replace(chosen, fit=replace(fit, std=np.hypot(std, _unnamed(balance, chosen.fit, catalogue))))
+    return replace(chosen, fit=replace(fit, std=np.hypot(std, _unnamed(balance, chosen, catalogue))))
 
 
-def _unnamed(balance: Balance, fit: EffortFit, catalogue: Catalogue) -> Array:
-    """Standard deviations (p,) of the fit's parameters that come from small effects which it lacks."""
+def _unnamed(balance: Balance, chosen: Fitted, catalogue: Catalogue) -> Array:
+    """Standard deviations (p,) of the fit's parameters that come from small effects which it lacks: those of the catalogue, and any function
+    of the motion."""
+    fit = chosen.fit
     sizes = scales_at(balance, fit)
     starts = [one for one in starts_of(catalogue, fit.model, sizes, balance) if one.kind == "effects"]
     changes = columns_of(balance, fit, [one.start for one in screen(balance, fit, starts)])
     rows = weighted(fit, fit.correlation)
-    changes = changes * root_weights(fit, fit.correlation)[:, None]
+    free = map_columns(balance, chosen, FreeMap(list(balance.motions), size_of(balance)))
+    changes = np.hstack([changes, free]) * root_weights(fit, fit.correlation)[:, None]
     std = np.zeros(len(fit.std))
     std[rows.inside] = np.sqrt(np.diag(mean_product(rows.columns, rows.residual, changes, rows.inverse)))
     return std
