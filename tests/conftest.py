@@ -35,7 +35,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def rhythmid(tmp_path: Path) -> Command:
     """The command line, run in `tmp_path`: rhythmid("check", bag) -> completed process with its output as text."""
 
-    def run(*arguments: object, timeout: float = 120.0, **options) -> subprocess.CompletedProcess[str]:
+    def run(*arguments: object, timeout: float = 400.0, **options) -> subprocess.CompletedProcess[str]:
         options.setdefault("cwd", tmp_path)
         return subprocess.run(
             [sys.executable, "-m", "rhythmid.cli", *map(str, arguments)],

@@ -14,7 +14,7 @@ FOLDER = Path(__file__).parents[2] / "ros_ws" / "src" / "rhythmid_bringup" / "co
 def run_node(executable, *arguments):
     return subprocess.run(
         [sys.executable, "-m", f"rhythmid_nodes.{executable}", "--ros-args", *arguments],
-        capture_output=True, text=True, timeout=60, check=False, cwd=FOLDER,
+        capture_output=True, text=True, timeout=240, check=False, cwd=FOLDER,
     )  # fmt: skip
 
 

@@ -137,3 +137,13 @@ def test_gravity_of_an_angle_without_a_unit_is_told_on_the_screen(tmp_path):
 @pytest.mark.parametrize(("heading", "scale"), [("angle [rad]", 1.0), ("angle [deg]", 180.0 / np.pi)])
 def test_nothing_is_said_of_degrees_where_a_heading_tells_the_unit(tmp_path, heading, scale):
     assert not any("degrees" in line for line in pendulum(tmp_path, heading, scale).lines())
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 6.0])
+def test_a_spring_is_guessed_only_where_dry_friction_does_not_explain_it(tmp_path, stiffness):
+    # driven against friction, the machine lingers where it arrives: high after it rose, low after it fell, as if a spring held it there
+    force = moved(np.where(TIME % 3.0 < 1.5, 1.0, -1.0), 0.02, 0.3, 0.0)[1]
+    position, speed = np.cumsum(force) * foreign.STEP, force
+    acceleration = np.gradient(speed, foreign.STEP)
+    drive = 0.05 * acceleration + 0.1 * speed + stiffness * position + 1.0 * np.sign(speed)
+    assert ("linear_spring" in labels(begun(tmp_path, drive, position))) is bool(stiffness)

@@ -1,5 +1,5 @@
-"""The balance of forces of a machine of which nothing is known yet, by least squares: what goes with the acceleration, the speed, the
-position and its sine. A first guess for a nominal model, no estimate: that is what `identify` is for."""
+"""The balance of forces of a machine of which nothing is known yet, by least squares: what goes with the acceleration, the speed and its
+direction, the position and its sine. A first guess for a nominal model, no estimate: that is what `identify` is for."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,8 +23,9 @@ EARNS_PLACE = (
 # Of a delay of half a radian, inertia, damper and spring leave (ω τ)²/2 of the size, which is as much; of a shorter one less
 OF_THE_DRIVE = 0.015
 STEADY = 1e-9  # of its size, within which what drives never changes: the rounding of the filters
-COLUMNS = ("acceleration", "velocity", "position", "sine", "cosine", "constant")
-POSITIVE = frozenset({"acceleration", "velocity", "position"})
+COLUMNS = ("acceleration", "velocity", "position", "sine", "cosine", "constant", "friction")
+POSITIVE = frozenset({"acceleration", "velocity", "position", "friction"})
+SLOW = 0.03  # of the fast speed (its 95 % quantile), within which dry friction changes its sign: as for the balance of effort
 MOST_ROWS = 4000  # of the balance: more would not make a first guess better
 FED_BACK = 1e-3  # share of what drives that a multiple of the position leaves, below which a controller made it of the position
 THERE_AND_BACK = 2.0  # of its travel, that a machine goes at least that comes back to where it began
@@ -48,7 +49,7 @@ class Law:
 class Rows:
     """What drives, and the columns of the balance, of all stretches, low-pass filtered.
 
-    `drives` (n,) and `columns` (n, 6) of each stretch, in the order of COLUMNS; `period` [s] of each, as the filtered motion is sampled; `margin` samples at either end
+    `drives` (n,) and `columns` (n, 7) of each stretch, in the order of COLUMNS; `period` [s] of each, as the filtered motion is sampled; `margin` samples at either end
     that the filter spoils. `span` is the travel of the position, relative to the base where that moves; where the base drives
     (`by_base`), what drives is −a.
     """
@@ -70,7 +71,8 @@ class Rows:
         motions = [one for one in motions if len(one.time) >= LEAST_ROWS]
         if not motions:
             raise InputError("the records are too short for a balance of forces")
-        made = [_filtered(one, chosen) for one in motions]
+        fast = float(np.quantile(np.abs(np.concatenate([one.leg_velocity for one in motions])), 0.95))
+        made = [_filtered(one, chosen, SLOW * fast) for one in motions]
         return cls(
             tuple(both[:, 0] for both in made), tuple(both[:, 1:] for both in made), tuple(one.period for one in motions),
             tuple(min(int(1.0 / (chosen.effort * one.period)), len(one.time) // 8) for one in motions),
@@ -151,11 +153,13 @@ class Rows:
         )
 
 
-def _filtered(one: Motion, bandwidth: Bandwidth) -> Array:
-    """What drives and all columns (n, 7), without what is above the effort's bandwidth."""
+def _filtered(one: Motion, bandwidth: Bandwidth, slow: float) -> Array:
+    """What drives and all columns (n, 8), without what is above the effort's bandwidth; friction changes its sign within the speed `slow`."""
     x, v = one.leg_position, one.leg_velocity
-    both = np.column_stack([one.effort, one.acceleration, v, x, np.sin(x), np.cos(x), np.ones(len(x))])
+    friction = np.tanh(v / slow) if slow > 0.0 else np.zeros(len(v))
+    level = np.ones(len(x))
+    both = np.column_stack([one.effort, one.acceleration, v, x, np.sin(x), np.cos(x), level, friction])
     both = high_pass(low_pass(both, one.period, bandwidth.effort), one.period, bandwidth.low)
     if bandwidth.low > 0.0:
-        both[:, -1] = 0.0  # what the filter leaves of a constant tells nothing
+        both[:, 1 + COLUMNS.index("constant")] = 0.0  # what the filter leaves of a constant tells nothing
     return both

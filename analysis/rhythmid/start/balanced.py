@@ -89,6 +89,7 @@ def restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: boo
     """The balance with what brings the machine back, if anything does: a spring, gravity of a pendulum, or neither.
 
     The integral of a speed drifts. Gravity goes with the angle itself, which it does not tell; a spring shows in it only where it comes back.
+    Either has to explain clearly more beside dry friction, too, which every machine may have and which a spring takes up in part.
     """
     measured = all(record.output_kind == "position" for record in records)
     moving = ["acceleration", "velocity"] if inertial else ["velocity"]
@@ -110,6 +111,7 @@ def restoring(records: Sequence[Record], rows: Rows, rotary: bool, inertial: boo
     back = [name for name in ("spring", "pendulum") if name in options]
     if back:
         best = min(back, key=lambda name: options[name].left)
-        if options[best].earns_place(law):
+        dry = [rows.fit([*one.coefficients, "friction"], delay) for one in (options[best], law)]
+        if options[best].earns_place(law) and dry[0].earns_place(dry[1]):
             law, kind = options[best], best
     return law, kind
