@@ -35,7 +35,7 @@ def made(folder, rhythmid):
             "--json",
             "out/plan.json",
             cwd=folder,
-            timeout=280.0,
+            timeout=600.0,
         )
         assert (done.returncode, done.stderr) == (0, ""), done.stderr
         (folder / "said").write_text(done.stdout, encoding="utf-8")
@@ -82,7 +82,7 @@ def test_the_example_in_the_documents_gives_what_they_show(rhythmid, tmp_path):
     shown = re.search(r"    rhythmid (design .*?)\n\n((?:    [┃│][^\n]*\n)+)", text, re.DOTALL)
     assert shown is not None
     (tmp_path / "paper_hopper.yaml").write_bytes(PAPER.read_bytes())
-    done = rhythmid(*shown[1].replace("\\\n", " ").split(), timeout=280.0)
+    done = rhythmid(*shown[1].replace("\\\n", " ").split(), timeout=600.0)
     assert done.returncode == 0, done.stderr
     for line in shown[2].splitlines():
         assert line.strip() in done.stdout

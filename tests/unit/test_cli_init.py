@@ -74,7 +74,7 @@ def test_three_commands_lead_from_a_foreign_recording_to_a_verdict(recording, re
     checked = rhythmid(*commands[0])
     assert checked.returncode == 0
     assert all("clocks" in line for line in checked.stdout.splitlines() if "note" in line)
-    done = rhythmid(*commands[1], "--json", "answer.json", timeout=250.0)
+    done = rhythmid(*commands[1], "--json", "answer.json", timeout=600.0)
     assert done.returncode == 0, done.stderr
     answer = json.loads((source.parent / "answer.json").read_text())
     assert answer["verdict"] == "missing_physics" and answer["missing"][0]["element"] == "coulomb_friction"
@@ -111,7 +111,7 @@ def test_on_a_terminal_close_candidates_are_asked_for(tmp_path):
     terminal, end = os.openpty()
     os.write(terminal, b"7\n2\n")
     done = subprocess.run(
-        [sys.executable, "-m", "rhythmid.cli", "init", "run.npz"], stdin=end, capture_output=True, text=True, timeout=60, cwd=tmp_path
+        [sys.executable, "-m", "rhythmid.cli", "init", "run.npz"], stdin=end, capture_output=True, text=True, timeout=600, cwd=tmp_path
     )  # fmt: skip
     os.close(terminal)
     os.close(end)

@@ -31,7 +31,7 @@ ROSDEP = {
 
 def run(*command: object, cwd: Path, **variables: str) -> str:
     done = subprocess.run(
-        list(map(str, command)), cwd=cwd, capture_output=True, text=True, timeout=200.0, check=False,
+        list(map(str, command)), cwd=cwd, capture_output=True, text=True, timeout=600.0, check=False,
         env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"} | variables,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]

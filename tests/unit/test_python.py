@@ -74,7 +74,7 @@ def test_the_import_is_fast_and_brings_nothing_with_it():
         "print(t, any(name in sys.modules for name in ('numpy', 'yaml', 'numba', 'rich')))"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60.0, check=True
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=600.0, check=True
     )
     seconds, heavy = done.stdout.split()
     assert float(seconds) < IMPORT and heavy == "False"
