@@ -14,6 +14,7 @@ from rhythmid import __version__, commands
 from rhythmid.commands.begin import BEGIN
 from rhythmid.commands.examples import epilog
 from rhythmid.errors import InputError
+from rhythmid.ros_packages import not_installed
 
 NAME = "rhythmid"
 NARROW = 80  # columns below which framed help would cut off the options' names
@@ -27,6 +28,7 @@ app = typer.Typer(
     rich_markup_mode="rich" if shutil.get_terminal_size().columns >= NARROW else None,
 )
 COMMAND_GROUP = "rhythmid.commands"
+RUN = "run"  # which the package rhythmid_bringup adds
 UNUSABLE_PATHS = (errno.ENAMETOOLONG, errno.EACCES)  # of a path that the user gave, whoever looks at it first
 SEVERAL = ("--holdout", "--elements")  # options that may be followed by several values
 PARTS = (
@@ -66,8 +68,11 @@ for _module in pkgutil.iter_modules(commands.__path__):
 
 def main() -> None:
     """Entry point of the command: turns errors of the user's into one line and exit code 2."""
-    for entry in entry_points(group=COMMAND_GROUP):
+    entries = entry_points(group=COMMAND_GROUP)
+    for entry in entries:
         entry.load()(app)
+    if RUN not in {entry.name for entry in entries}:
+        app.command(name=RUN, context_settings={"ignore_unknown_options": True})(_run)
     try:
         code = app(spread(sys.argv[1:]), prog_name=NAME, standalone_mode=False)
     except InputError as error:
@@ -85,6 +90,11 @@ def main() -> None:
         _refuse(describe())
     else:
         sys.exit(code if isinstance(code, int) else 0)
+
+
+def _run(arguments: Annotated[list[str] | None, typer.Argument(metavar="EXPERIMENT")] = None) -> None:
+    """Run the ROS graph of an experiment. Its packages are not installed here."""
+    raise not_installed("rhythmid run", "rhythmid_bringup")
 
 
 def spread(arguments: list[str]) -> list[str]:

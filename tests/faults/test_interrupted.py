@@ -26,7 +26,8 @@ force:
   - linear_spring: {stiffness: {value: 220.0, unit: N/m}, rest_length: {value: 0.0, unit: m}}
   - viscous_damper: {damping: {value: 2.5, unit: N*s/m}}
 """
-PATIENCE = 120.0  # s
+PATIENCE = 300.0  # s
+RUNS = 24  # of a batch that is interrupted after the first answer: more than are answered before a busy machine sees it
 
 
 @pytest.fixture
@@ -107,7 +108,7 @@ def nobody_left(group: int) -> bool:
 
 def test_ctrl_c_ends_a_batch_with_130_and_its_finished_answers_are_kept(tmp_path):
     write_files(tmp_path)
-    for number in range(4):
+    for number in range(RUNS):
         write_run(tmp_path / "runs" / f"{number}.csv", number)
     (tmp_path / "batch.yaml").write_text(
         "command: identify\nmodel: model.yaml\nsignals: signals.yaml\nentries: [{bags: 'runs/*.csv'}]\n"
@@ -125,7 +126,7 @@ def test_ctrl_c_ends_a_batch_with_130_and_its_finished_answers_are_kept(tmp_path
     assert process.returncode == 130 and "Traceback" not in said
     assert "the same command goes on" in said
     kept = [json.loads(path.read_text())["answer"]["verdict"] for path in answers.glob("*.json")]
-    assert 1 <= len(kept) < 4 and set(kept) == {"identified"}
+    assert 1 <= len(kept) < RUNS and set(kept) == {"identified"}
     assert nobody_left(process.pid)
     assert not (tmp_path / "out" / "index.html").exists()
 
@@ -144,6 +145,9 @@ def test_a_campaign_that_is_ended_by_a_signal_leaves_no_worker(tmp_path):
     )  # fmt: skip
     assert process.stderr is not None
     assert any("sealed" in line for line in process.stderr)
+    deadline = time.monotonic() + PATIENCE
+    while len(children(process.pid)) < 2 and time.monotonic() < deadline:
+        time.sleep(0.02)
     assert len(children(process.pid)) > 1
     process.terminate()
     process.wait(PATIENCE)

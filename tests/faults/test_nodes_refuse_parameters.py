@@ -1,20 +1,38 @@
 """Node processes refuse wrong parameters with one line that names parameter, value and range, and exit code 2."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from patience import PATIENCE
 
 pytest.importorskip("rclpy")
 
+from rhythmid_bringup.environment import own_domain, run_environment
+
 FOLDER = Path(__file__).parents[2] / "ros_ws" / "src" / "rhythmid_bringup" / "config"
+
+
+@pytest.fixture(autouse=True)
+def domain(tmp_path, monkeypatch):
+    """A DDS domain of their own: in everybody's, the middleware of other processes may make theirs say more."""
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    with own_domain() as number:
+        for name, value in run_environment(os.environ, number, tmp_path / "log").items():
+            monkeypatch.setenv(name, value)
+        yield
 
 
 def run_node(executable, *arguments):
     return subprocess.run(
         [sys.executable, "-m", f"rhythmid_nodes.{executable}", "--ros-args", *arguments],
+<<<<<<< HEAD
         capture_output=True, text=True, timeout=240, check=False, cwd=FOLDER,
+=======
+        capture_output=True, text=True, timeout=PATIENCE, check=False, cwd=FOLDER,
+>>>>>>> ea9b5ade3d047ae2e6d05c9604aca40d80092a56
     )  # fmt: skip
 
 

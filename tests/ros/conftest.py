@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 import rclpy
 import yaml
+from patience import PATIENCE
 from rcl_interfaces.srv import SetParameters
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -118,7 +119,7 @@ class Graph:
 
     # Time
 
-    def until(self, condition: Callable[[], Any], what: str, timeout: float = 20.0) -> None:
+    def until(self, condition: Callable[[], Any], what: str, timeout: float = PATIENCE) -> None:
         """Serve callbacks until the condition holds; fails when it takes too long."""
         patience = time.monotonic() + timeout
         while not condition():
@@ -130,6 +131,16 @@ class Graph:
         patience = time.monotonic() + seconds
         while time.monotonic() < patience:
             self.executor.spin_once(timeout_sec=0.005)
+
+    def silence(self, heard: Sequence[Any], seconds: float = 0.3) -> int:
+        """Serve callbacks until a list has not grown for a while, and tell its length."""
+        count = -1
+        while count != len(heard):
+            count = len(heard)
+            self.spin(seconds)
+            for _ in range(10):  # a stall may have used up the time
+                self.executor.spin_once(timeout_sec=0.01)
+        return count
 
     def close(self) -> None:
         for node in self.nodes:

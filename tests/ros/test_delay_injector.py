@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from patience import LONG
 from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import String
 
@@ -17,6 +18,7 @@ from rhythmid_nodes.qos import latched, stream
 
 MS = 1_000_000
 REMAP = {"input": "here", "output": "there"}
+pytestmark = pytest.mark.timeout(LONG)
 
 
 def stamp_ns(message):
@@ -120,7 +122,7 @@ def test_a_best_effort_sensor_is_heard(graph):
 
 
 def test_messages_beyond_the_queue_are_dropped_and_counted(graph):
-    node = graph.add(DelayInjector, REMAP, delay=0.5, queue_size=5)
+    node = graph.add(DelayInjector, REMAP, delay=3.0, queue_size=5)
     heard = graph.listen("there")
     send = graph.talk("here")
     for k in range(8):
@@ -147,7 +149,7 @@ def test_what_cannot_work_is_refused(graph, parameters, said):
 
 def test_a_profile_counts_from_the_start_of_the_run(graph, tmp_path: Path):
     table = tmp_path / "profile.csv"
-    table.write_text("0.0,0.2\n1.0,0.0\n")
+    table.write_text("0.0,10.0\n1.0,0.0\n")
     node = graph.add(DelayInjector, REMAP, profile=str(table))
     heard = graph.listen("there")
     start_ns = time.time_ns() - 2_000_000_000
@@ -157,7 +159,7 @@ def test_a_profile_counts_from_the_start_of_the_run(graph, tmp_path: Path):
     sent = time.time_ns()
     send(graph.joint_state(sent, effort=1.0))
     graph.until(lambda: heard, "the message")
-    assert stamp_ns(heard[0]) - sent < 150 * MS  # 200 ms before the start, nothing two seconds after it
+    assert stamp_ns(heard[0]) - sent < 9000 * MS  # 10 s before the start, nothing two seconds after it
 
 
 def test_bursts_that_overflow_the_queues_do_not_stop_it_and_what_is_lost_is_told(graph):
@@ -180,5 +182,6 @@ def test_bursts_that_overflow_the_queues_do_not_stop_it_and_what_is_lost_is_told
     def figures():
         return {pair.key: int(pair.value) for pair in told[-1].status[0].values if pair.value.isdigit()}
 
+    graph.until(lambda: told, "figures")
     graph.until(lambda: figures()["relayed"] + figures()["lost"] == sent + 1, "figures that account for all")
     assert process.returncode is None and figures()["dropped"] == 0

@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from patience import LONG
 
 from machines import HOPPER, hopper
 from rhythmid.design.design_folder import COMMAND, EXPERIMENT, save_design
@@ -35,12 +36,12 @@ def test_the_excitation_node_takes_the_designs_samples_as_they_are(graph, plan):
     np.testing.assert_array_equal(node._effort, effort)
 
 
-@pytest.mark.timeout(150)
+@pytest.mark.timeout(LONG)
 def test_the_graph_records_the_designs_samples_and_a_motion_within_the_envelope(plan):
     folder, effort = plan
     done = subprocess.run(
         [sys.executable, "-m", "rhythmid.cli", "run", str(folder / EXPERIMENT), "--out", str(folder / "bag")],
-        capture_output=True, text=True, timeout=120, cwd=folder, check=False,
+        capture_output=True, text=True, timeout=LONG, cwd=folder, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     (record,) = load_records([folder / "bag"])

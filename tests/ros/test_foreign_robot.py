@@ -2,10 +2,11 @@
 
 import pytest
 from foreign_robot import EFFECTS, answer, judge, record, true_delay
+from patience import LONG
 
 LENGTH = 3.0  # s of each of two excitations
 SIGMAS = 4.0  # a test that fails once in ten thousand runs
-pytestmark = pytest.mark.timeout(200)
+pytestmark = pytest.mark.timeout(LONG)
 
 
 @pytest.mark.parametrize(

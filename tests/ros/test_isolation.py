@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from patience import LONG, PATIENCE
 
 from rhythmid_bringup import isolation
 from rhythmid_bringup.environment import run_environment
@@ -30,6 +31,7 @@ PLANT = [
     "-p",
     f"model:={MODEL}",
 ]
+pytestmark = pytest.mark.timeout(LONG)
 REASON = isolation.why_not()
 needs_namespaces = pytest.mark.skipif(REASON is not None, reason=f"no namespaces here: {REASON}")
 
@@ -43,7 +45,7 @@ def call(seconds: float, namespace: str = "hopper") -> dict:
 @needs_namespaces
 def test_a_stranger_in_the_same_domain_reaches_an_open_plant_but_no_isolated_one(domain, graph, monkeypatch):
     monkeypatch.delenv("RHYTHMID_SUPERVISOR")  # its child is a shell
-    script = f"{' '.join(PLANT)} & {' '.join(STRANGER)} 30 {HIDDEN}; wait"
+    script = f"{' '.join(PLANT)} & {' '.join(STRANGER)} {PATIENCE:g} {HIDDEN}; wait"
     with subprocess.Popen(
         isolation.isolated(["sh", "-c", script]), stdout=subprocess.PIPE, text=True, start_new_session=True
     ) as inside:
@@ -57,7 +59,7 @@ def test_a_stranger_in_the_same_domain_reaches_an_open_plant_but_no_isolated_one
         finally:
             os.killpg(inside.pid, signal.SIGKILL)
     graph.spawn("plant", "plant", model=str(MODEL))
-    openly = call(20.0)
+    openly = call(PATIENCE)
     assert openly["reached"] and openly["heard"]
 
 
@@ -75,7 +77,7 @@ def test_an_isolated_run_leaves_its_bag(tmp_path, monkeypatch):
     )
     done = subprocess.run(
         [sys.executable, "-m", "rhythmid.cli", "run", "short.yaml", "--isolated", "--out", "bag"],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
+        cwd=tmp_path, capture_output=True, text=True, check=False, timeout=LONG,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "bag" / "metadata.yaml").is_file()
@@ -101,8 +103,8 @@ def test_another_machine_is_heard_only_when_the_user_asks_for_it(tmp_path, chose
         str(MODEL),
     ]
     done = subprocess.run(
-        ["unshare", *user, "--net", "--", *script, STRANGER[1]],
-        env=environment, capture_output=True, text=True, check=False, timeout=120,
+        ["unshare", *user, "--net", "--", *script, STRANGER[1], str(PATIENCE if reached else 6.0)],
+        env=environment, capture_output=True, text=True, check=False, timeout=LONG,
     )  # fmt: skip
     if done.returncode == 3:
         pytest.skip("this kernel has no virtual cables (veth)")

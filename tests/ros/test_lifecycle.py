@@ -11,6 +11,7 @@ import pytest
 import yaml
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from patience import LONG, PATIENCE
 from rclpy.qos import qos_profile_sensor_data
 from rosbags.rosbag2 import Reader
 from sensor_msgs.msg import JointState
@@ -30,7 +31,7 @@ MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_
 LEG = MODEL.parent / "legs" / "leg_experiment.yaml"
 CONSTANT = {"type": "profile", "points": [[0.0, 0.5]], "length": 60.0}
 EXCITATION = {"max_effort": 1.0, "excitation": json.dumps(CONSTANT), "stale_after": 0.0}
-pytestmark = pytest.mark.timeout(120)
+pytestmark = pytest.mark.timeout(LONG)
 
 
 def change(graph, node, label):
@@ -93,16 +94,18 @@ def test_every_node_goes_through_its_states_by_the_standard_services(graph, tmp_
 def test_a_deactivated_excitation_has_faded_to_zero_when_it_answers_and_plays_again_when_activated(
     graph, efforts
 ):
-    graph.add(ExcitationNode, **EXCITATION, ramp=0.3)
+    graph.add(ExcitationNode, **EXCITATION, ramp=1.0)
     graph.until(lambda: graph.call("excitation/start").success, "start")
     graph.until(lambda: efforts and efforts[-1] == 0.5, "effort")
+    begun = len(efforts)
     assert change(graph, "excitation", "deactivate")
     graph.until(lambda: efforts[-1] == 0.0, "zero effort")
-    number, fading = len(efforts), [effort for effort in efforts[-250:] if 0.0 < effort < 0.5]
-    assert len(fading) > 20 and fading == sorted(fading, reverse=True) and max(np.abs(np.diff(fading))) < 0.25
+    fading = [effort for effort in efforts[begun:] if 0.0 < effort < 0.5]
+    assert fading and fading == sorted(fading, reverse=True)
+    number = len(efforts)
     assert state(graph, "excitation") == "inactive"
     answer = graph.call("excitation/start")
-    assert not answer.success and answer.message == "not active" and len(efforts) == number
+    assert not answer.success and answer.message == "not active" and not any(efforts[number:])
     assert change(graph, "excitation", "activate")
     graph.until(lambda: graph.call("excitation/start").success, "start")
     graph.until(lambda: efforts[-1] == 0.5, "effort")
@@ -119,8 +122,8 @@ def test_a_deactivated_guard_gives_zero_until_it_is_activated(graph):
     assert change(graph, "command_guard", "deactivate")
     graph.until(lambda: heard[-1].effort[0] == 0.0, "zero effort")
     number = len(heard)
-    graph.spin(0.1)
-    assert len(heard) == number
+    graph.silence(heard)
+    assert not any(message.effort[0] for message in heard[number:])
     assert change(graph, "command_guard", "activate")
     graph.until(lambda: heard[-1].effort[0] == 0.3, "effort")
 
@@ -130,10 +133,9 @@ def test_an_inactive_plant_stops_stepping_and_goes_on_where_it_was(graph):
     heard = graph.listen("plant/joint_states")
     graph.until(lambda: len(heard) > 50, "samples")
     assert change(graph, "plant", "deactivate")
-    graph.spin(0.1)
-    number, left_ns = len(heard), node._done_ns
+    number, left_ns, samples = graph.silence(heard), node._done_ns, node._samples
     graph.spin(0.3)
-    assert len(heard) == number
+    assert node._samples == samples and len(heard) == number
     assert change(graph, "plant", "activate")
     graph.until(lambda: len(heard) > number, "samples")
     first = heard[number]
@@ -144,15 +146,20 @@ def test_an_inactive_plant_stops_stepping_and_goes_on_where_it_was(graph):
 
 
 def test_an_inactive_injector_passes_nothing_on_and_keeps_nothing_back(graph):
-    graph.add(DelayInjector, {"input": "here", "output": "there"}, delay=0.2)
+    node = graph.add(DelayInjector, {"input": "here", "output": "there"})
     send, heard = graph.talk("here"), graph.listen("there")
+    taken = []
+    count = node._input._gaps.add
+    node._input._gaps.add = lambda number: taken.append(count(number))
     send(graph.joint_state(time.time_ns(), effort=0.1))
     graph.until(lambda: heard, "a message")
+    assert graph.set_parameter("delay_injector", "delay", 10.0).successful
     send(graph.joint_state(time.time_ns(), effort=0.2))
-    graph.spin(0.05)
+    graph.until(lambda: node.figures()["queued"] == "1", "a message held back")
     assert change(graph, "delay_injector", "deactivate")
     send(graph.joint_state(time.time_ns(), effort=0.3))
-    graph.spin(0.05)
+    graph.until(lambda: len(taken) == 3, "a message that is not passed on")
+    assert graph.set_parameter("delay_injector", "delay", 0.0).successful
     assert change(graph, "delay_injector", "activate")
     send(graph.joint_state(time.time_ns(), effort=0.4))
     graph.until(lambda: len(heard) > 1, "a message")
@@ -233,13 +240,13 @@ def test_an_unattended_start_waits_for_an_active_recorder(graph, efforts, tmp_pa
     assert not efforts
     assert change(graph, "recorder", "activate")
     graph.until(lambda: len(efforts) > 20, "effort")
-    assert next(iter(recorder._tracks.values())).received
+    graph.until(lambda: next(iter(recorder._tracks.values())).received, "the effort in the bag")
 
 
 def test_use_sim_time_is_refused_in_one_line(graph):
     done = subprocess.run(
         [sys.executable, "-m", "rhythmid_nodes.delay_injector", "--ros-args", "-p", "use_sim_time:=true"],
-        capture_output=True, text=True, timeout=60, check=False,
+        capture_output=True, text=True, timeout=PATIENCE, check=False,
     )  # fmt: skip
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1, done.stderr
     assert "error: parameter use_sim_time = True" in done.stderr and "lockstep" in done.stderr

@@ -1,11 +1,17 @@
 """Parameters: described, with unit and range, and the shipped parameter file is accepted by all nodes."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
+import yaml
 from rcl_interfaces.srv import DescribeParameters
+from safety import DEFAULT_LIMIT, PROMISED, Limits
 
+from rhythmid.body.joint_experiment import JointSafety
+from rhythmid.settings import Safety
+from rhythmid.simulation.command_hold import RAMP
 from rhythmid_nodes.command_guard import PARAMETERS as GUARD_PARAMETERS
 from rhythmid_nodes.command_guard import CommandGuard
 from rhythmid_nodes.delay_injector import PARAMETERS as DELAY_PARAMETERS
@@ -17,7 +23,8 @@ from rhythmid_nodes.plant import PlantNode
 from rhythmid_nodes.recorder import PARAMETERS as RECORDER_PARAMETERS
 from rhythmid_nodes.recorder import Recorder
 
-CONFIG = Path(__file__).parents[2] / "ros_ws" / "src" / "rhythmid_bringup" / "config"
+ROOT = Path(__file__).parents[2]
+CONFIG = ROOT / "ros_ws" / "src" / "rhythmid_bringup" / "config"
 NODES = {
     "plant": (PlantNode, PLANT_PARAMETERS),
     "command_delay": (DelayInjector, DELAY_PARAMETERS),
@@ -60,6 +67,21 @@ def test_the_shipped_parameter_file_is_accepted(graph, tmp_path, monkeypatch, na
         assert node.values["delay"] == expected[name]
     if name == "excitation":
         assert json.loads(node.values["excitation"])["type"] == "chirp" and node.values["max_effort"] == 0.1
+
+
+def test_a_robots_limits_are_those_that_are_measured_and_the_defaults_are_a_simulated_plants():
+    page = (ROOT / "docs" / "robot.md").read_text(encoding="utf-8")
+    shown = re.search(r"```yaml\n(# robot.yaml\n.*?)```", page, re.DOTALL)
+    assert shown is not None
+    robot = {name: content["ros__parameters"] for name, content in yaml.safe_load(shown[1]).items()}
+    proven = Limits.ROBOT.times
+    assert robot["/**/excitation"]["stale_after"] == robot["/**/command_guard"]["stale_after"] == proven.stale
+    assert robot["/**/command_guard"]["command_timeout"] == proven.command
+    assert f"`frozen_after` | excitation | {proven.frozen} s" in page
+    assert max(proven.stale, proven.frozen, proven.command + RAMP) < PROMISED
+    for parameters in (EXCITATION_PARAMETERS, GUARD_PARAMETERS):
+        assert {one.name: one.default for one in parameters}["stale_after"] == DEFAULT_LIMIT
+    assert Safety().stale_after == JointSafety().stale_after == DEFAULT_LIMIT
 
 
 @pytest.mark.parametrize("name", NODES)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from patience import LONG
 from std_msgs.msg import Header
 
 from rhythmid.errors import InputError
@@ -19,6 +20,8 @@ from rhythmid_nodes.qos import latched, stream
 
 MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"
 PERIOD_NS = 1_000_000
+POWER = 0.02  # W
+pytestmark = pytest.mark.timeout(LONG)
 
 
 def stamp_ns(message):
@@ -87,7 +90,8 @@ def test_a_command_that_nobody_renews_fades_to_zero_and_is_counted(graph):
     now = time.time_ns()
     send(graph.joint_state(now, effort=0.3))
     graph.until(lambda: node.figures()["lapsed_commands"] == "1", "the lapse")
-    graph.until(lambda: stamp_ns(states[-1]) > now + 0.3e9, "what follows")
+    lapsed = stamp_ns(states[-1])
+    graph.until(lambda: stamp_ns(states[-1]) > lapsed + 0.3e9, "what follows")
     given = {stamp_ns(state): state.effort[0] for state in states}
     acting = [stamp for stamp, effort in given.items() if effort > 1e-9]
     held = [stamp for stamp in acting if given[stamp] > 0.3 - 1e-9]
@@ -102,6 +106,24 @@ def test_a_command_beyond_the_limit_is_clamped(graph):
     graph.talk("command")(graph.joint_state(time.time_ns(), effort=-5.0))
     graph.until(lambda: node.figures()["clamped_commands"] == "1", "the command")
     graph.until(lambda: states and states[-1].effort[0] == -0.1, "its effect")
+
+
+def test_size_rate_and_power_hold_whoever_commands_and_the_rest_of_a_step_follows(graph):
+    node = graph.add(
+        PlantNode, model=str(MODEL), max_effort=2.0, max_effort_rate=10.0, max_power=POWER, command_timeout=0.0,
+        catch_up=10.0, forcing_amplitude=0.0, initial=[0.2, 0.0],
+    )  # fmt: skip
+    states = graph.listen("plant/joint_states")
+    graph.talk("command")(graph.joint_state(time.time_ns(), effort=5.0))
+    graph.until(lambda: node.figures()["commands"] == "1" and node._samples > 1000, "a second of motion")
+    graph.until(lambda: len(states) > 500, "samples")
+    effort, velocity = (
+        np.array([getattr(state, field)[0] for state in states]) for field in ("effort", "velocity")
+    )
+    assert effort.max() > 0.05 and int(node.figures()["limited_commands"]) > 500
+    assert np.abs(effort).max() <= 2.0 and np.diff(effort).max() <= 10.0 * 1e-3 * (1.0 + 1e-9)
+    power = np.minimum(np.abs(effort[2:] * velocity[1:-1]), np.abs(effort[2:] * velocity[:-2]))
+    assert power.max() <= POWER * (1.0 + 1e-9) and power.max() > 0.9 * POWER
 
 
 def test_a_command_that_is_no_number_stops_the_plant(graph):
@@ -160,6 +182,10 @@ def test_in_lockstep_it_goes_as_far_as_the_newest_command_and_the_credit_allow(g
         ({"model": str(MODEL), "noise_std": -1.0}, "noise_std = -1.0 must lie in"),
         ({"model": str(MODEL), "time_mode": "warp"}, "one of realtime, lockstep"),
         ({"model": str(MODEL), "time_mode": "lockstep"}, "count = 0"),
+        (
+            {"model": str(MODEL), "time_mode": "lockstep", "count": 9, "max_power": 1.0},
+            "in lockstep only the size",
+        ),
     ],
 )
 def test_what_cannot_work_is_refused(graph, parameters, said):

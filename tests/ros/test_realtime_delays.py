@@ -10,13 +10,14 @@ from pathlib import Path
 
 import pytest
 import yaml
+from patience import LONG, UNHURRIED
 
 MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"
 DELAYS = {"input": 0.040, "measurement": 0.050}
 CLOSE = 0.3  # ms
 SURE = 3.0  # standard deviations, which a machine that starves the graph makes large
 SWEEP = 20.0  # s
-pytestmark = pytest.mark.timeout(240)
+pytestmark = pytest.mark.timeout(LONG)
 
 
 @contextmanager
@@ -58,7 +59,9 @@ def recorded(rhythmid, tmp_path) -> tuple[Path, dict[str, dict[str, str]]]:
         "excitation": {"type": "chirp", "amplitude": 0.1, "band": [0, 7], "sweep": SWEEP},
         "delays": DELAYS,
         "time": {"mode": "realtime", "layout": "processes"},
-        "safety": {"stale_after": 5.0},  # the busy machine's stalls are to be recorded, not to end the run
+        "safety": {
+            "stale_after": UNHURRIED
+        },  # the busy machine's stalls are to be recorded, not to end the run
         "record": {"topics": ["excitation", "joint_states", "forcing", "run"]},
     }
     (tmp_path / "experiment.yaml").write_text(yaml.safe_dump(experiment))

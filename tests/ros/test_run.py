@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import rclpy
 import yaml
+from patience import LONG, PATIENCE, UNHURRIED
 from rclpy.node import Node
 from rclpy.utilities import try_shutdown
 from rosbags.rosbag2 import Reader
@@ -27,7 +28,7 @@ from rhythmid_nodes.joint_state import JointStateReader
 
 MODEL = Path(__file__).parents[2] / "analysis" / "rhythmid" / "models" / "paper_hopper.yaml"
 ALL = ["excitation", "command", "forcing", "plant/joint_states", "joint_states", "run"]
-pytestmark = pytest.mark.timeout(150)
+pytestmark = pytest.mark.timeout(LONG)
 
 
 def experiment_file(folder: Path, name="experiment", **changes) -> Path:
@@ -39,6 +40,7 @@ def experiment_file(folder: Path, name="experiment", **changes) -> Path:
         "noise": {"measurement_std": 1e-4},
         "seed": 3,
         "time": {"mode": "lockstep"},
+        "safety": {"stale_after": UNHURRIED},
         "record": {"path": str(folder / f"{name}_bag"), "topics": ALL},
     }
     for key, value in changes.items():
@@ -97,12 +99,12 @@ class Running:
 
     def wait_for_samples(self, bag: Path):
         """Until samples of the excitation, which starts last, are on the disk, or the run has failed to come so far."""
-        patience = time.monotonic() + 60
+        patience = time.monotonic() + 2 * PATIENCE
         while recorded(bag).get("/hopper/excitation", 0) < 100:
             assert self.process.poll() is None and time.monotonic() < patience, self.process.stderr.read()
             time.sleep(0.05)
 
-    def end(self, timeout=40) -> tuple[int, str]:
+    def end(self, timeout=PATIENCE) -> tuple[int, str]:
         _, said = self.process.communicate(timeout=timeout)
         return self.process.returncode, said
 
@@ -181,37 +183,42 @@ def test_lockstep_follows_a_delay_profile_as_the_run_without_ros_does(rhythmid, 
     assert [row.position for row in rows["joint_states"]] == expected["joint_states"].position.tolist()
 
 
+def places(heard: list, given: list) -> list[int]:
+    """Where in what was given each value stands that was heard, in this order; what was given may have been left out."""
+    found, place = [], -1
+    for value in heard:
+        place = given.index(value, place + 1)
+        found.append(place)
+    return found
+
+
 def test_real_time_loses_nothing_and_reports_its_lateness(rhythmid, tmp_path):
+    """After a stall of more than 0.1 s the newest sample follows, which a busy machine may bring about: what counts is what was sent."""
     path = experiment_file(tmp_path, time={"mode": "realtime", "layout": "processes"})
     done = rhythmid("run", path)
     assert done.returncode == 0, done.stderr
     rows, run = content(tmp_path / "experiment_bag")
-    start_ns = run[0]["start_ns"]
-    assert run[-1]["state"] == "finished" and run[-1]["samples"] == 3000
+    timing = run[-1]["timing"]
+    assert run[-1]["state"] == "finished" and run[-1]["samples"] == 3000 and timing["lost"] == 0
     grid = {topic: np.array([row.stamp_ns for row in rows[topic]]) for topic in rows}
     for topic in ("excitation", "forcing", "plant/joint_states"):
-        steps = np.diff(grid[topic])  # of more than one sample after a stall, which the newest one follows
+        steps = np.diff(grid[topic])
         assert np.all((steps > 0) & (steps % 1_000_000 == 0)), topic
-    assert grid["excitation"][0] == start_ns and len(grid["excitation"]) == 3001  # and a last one of zero
+    assert (grid["excitation"][0] - run[0]["start_ns"]) % 1_000_000 == 0
+    assert len(grid["excitation"]) == timing["excitation"]["of"] + 1  # and a last one of zero
+    assert len(grid["command"]) >= timing["command_delay"]["of"] > 100
     for topic, source, delay in (
         ("command", "excitation", 40_300_000),
         ("joint_states", "plant/joint_states", 50_700_000),
     ):
-        values = {row.stamp_ns: row for row in rows[source]}
-        sent = [values[stamp] for stamp in sorted(values)]
         key = "effort" if topic == "command" else "position"
-        given, heard = [getattr(r, key) for r in sent], [getattr(r, key) for r in rows[topic]]
-        first = given.index(heard[0]) if topic == "joint_states" else 0
-        common = min(len(heard), len(given) - first)
-        assert common > 2900 and heard[:common] == given[first : first + common], (
-            topic
-        )  # in order, none missing
-        applied = grid[topic][:common] - np.array([row.stamp_ns for row in sent])[first : first + common]
-        assert np.all(applied >= delay) and np.median(applied) < delay + 20_000_000
+        given, heard = ([getattr(row, key) for row in rows[name]] for name in (source, topic))
+        early = next(number for number, value in enumerate(heard) if value in given)  # before the recorder
+        assert len(heard) - early > 100
+        sent = grid[source][places(heard[early:], given)]  # fails where the order is another
+        assert np.all(grid[topic][early:] - sent >= delay), topic
     for said in ("lateness_p99_ms", "delay_error_max_ms", "applied_delay_mean_ms", "late_commands"):
         assert said in done.stderr
-    timing = run[-1]["timing"]
-    assert timing["excitation"]["of"] == 3000 and timing["plant"]["of"] == 3001 and timing["lost"] == 0
     for stage in ("excitation", "command_delay", "plant", "measurement_delay"):
         assert 0 <= timing[stage]["late"] <= timing[stage]["of"], stage
         assert 0.0 <= timing[stage]["mean"] <= timing[stage]["max"], stage
@@ -288,7 +295,7 @@ def test_a_stranger_who_commands_ends_the_run_with_code_1_and_is_named(
     try:
         stranger = Node("stranger", namespace="/elsewhere")
         publisher = stranger.create_publisher(JointState, "/hopper/command", 10)
-        patience = time.monotonic() + 20
+        patience = time.monotonic() + PATIENCE
         while publisher.get_subscription_count() == 0 and time.monotonic() < patience:
             time.sleep(0.01)
         for _ in range(20):
@@ -309,11 +316,10 @@ def test_a_stranger_who_commands_ends_the_run_with_code_1_and_is_named(
 
 
 def test_a_node_that_lives_and_does_not_work_ends_the_run(no_shared_memory, started, tmp_path):
-    # a reader that takes nothing makes its writers slow; that measurements grow stale by it is promised elsewhere
+    # a reader that takes nothing makes its writers slow: they may fall silent, too
     path = experiment_file(
         tmp_path,
         time={"mode": "realtime", "layout": "processes"},
-        safety={"stale_after": 60.0},
         duration=60.0,
     )
     run = started(path)
@@ -321,7 +327,7 @@ def test_a_node_that_lives_and_does_not_work_ends_the_run(no_shared_memory, star
     children = run.children()
     os.kill(children["recorder"], signal.SIGSTOP)
     code, said = run.end()
-    assert code == 1 and "nothing was heard from recorder for 5 s" in said
+    assert code == 1 and re.search(r"nothing was heard from [\w, ]*\brecorder\b.* for 5 s", said), said
     rows, _ = content(tmp_path / "experiment_bag")
     assert rows["excitation"]
     assert not any(Path(f"/proc/{pid}").exists() for pid in children.values())
@@ -332,7 +338,7 @@ def test_the_nodes_end_when_the_supervisor_is_killed(no_shared_memory, started, 
     run.wait_for_samples(tmp_path / "experiment_bag")
     children = run.children()
     run.process.kill()
-    patience = time.monotonic() + 20
+    patience = time.monotonic() + PATIENCE
     while any(Path(f"/proc/{pid}").exists() for pid in children.values()):
         assert time.monotonic() < patience
         time.sleep(0.05)
@@ -345,7 +351,7 @@ def test_a_machine_that_leaves_its_envelope_ends_the_run_with_code_1(rhythmid, t
         tmp_path,
         time={"mode": "realtime"},
         excitation={"type": "profile", "points": [[0.0, 0.0], [0.5, 20.0]], "length": 20.0},
-        safety={"envelope": [0.0, 0.25], "max_effort": 30.0, "stale_after": 5.0},
+        safety={"envelope": [0.0, 0.25], "max_effort": 30.0},
     )
     done = rhythmid("run", path, "--report", tmp_path / "page.html")
     assert done.returncode == 1 and "outside the envelope" in done.stderr
@@ -362,7 +368,7 @@ def test_nodes_started_one_by_one_find_each_other_and_end_by_themselves(domain, 
     nodes["recorder"] = started(path, "--node", "recorder")
     time.sleep(2.0)
     nodes["measurement_delay"] = started(path, "--node", "measurement_delay")  # late on purpose
-    code, said = nodes.pop("excitation").end(timeout=60)
+    code, said = nodes.pop("excitation").end()
     assert code == 0, said
     for node in nodes.values():
         node.process.send_signal(signal.SIGTERM)  # what `docker compose` does when one container has ended

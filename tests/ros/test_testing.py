@@ -9,12 +9,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from patience import LONG
 
 from rhythmid.errors import InputError
 from rhythmid_bringup.run import replacements
 
 ROOT = Path(__file__).parents[2]
-pytestmark = pytest.mark.timeout(300)
+pytestmark = pytest.mark.timeout(LONG)
 
 
 def run_tests(folder: Path, text: str, *options: str) -> subprocess.CompletedProcess[str]:
@@ -23,7 +24,7 @@ def run_tests(folder: Path, text: str, *options: str) -> subprocess.CompletedPro
     shutil.copy(ROOT / "docs" / "examples" / "command_filter.py", folder / "my_filter.py")
     words = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--rootdir", str(folder), *options]
     return subprocess.run(
-        [*words, str(folder)], capture_output=True, text=True, cwd=folder, timeout=280, check=False,
+        [*words, str(folder)], capture_output=True, text=True, cwd=folder, timeout=LONG, check=False,
         env={**os.environ, "ROS_DOMAIN_ID": "7"},  # which the run does not take over
     )  # fmt: skip
 
@@ -60,21 +61,21 @@ import pytest
 
 pytest_plugins = ["rhythmid.testing"]
 
-@pytest.mark.parametrize("amplitude", [0.01, 0.02, 0.03, 0.04])
+@pytest.mark.parametrize("amplitude", [0.01, 0.02])
 def test_it(run_graph, request, amplitude):
     begin = time.monotonic()
     chirp = {"type": "chirp", "amplitude": amplitude, "band": [1, 7], "sweep": 1.0}
-    run = run_graph({"excitation": chirp}, timeout=250.0)
+    run = run_graph({"excitation": chirp}, timeout=500.0)
     sent = run.values("excitation", "effort")
     assert len(sent) == 1000 and 0.9 * amplitude < np.abs(sent).max() <= amplitude
     np.testing.assert_array_equal(run.values("command", "effort"), sent)
     (request.path.parent / f"{amplitude}.span").write_text(f"{begin} {time.monotonic()}")
 """
-    done = run_tests(tmp_path, text, "-n", "4")
+    done = run_tests(tmp_path, text, "-n", "2")
     assert done.returncode == 0, done.stdout
-    assert "4 workers" in done.stdout and "4 passed" in done.stdout
+    assert "2 workers" in done.stdout and "2 passed" in done.stdout
     spans = sorted(tuple(map(float, one.read_text().split())) for one in tmp_path.glob("*.span"))
-    assert len(spans) == 4 and any(later < end for (_, end), (later, _) in pairwise(spans))  # they were
+    assert len(spans) == 2 and any(later < end for (_, end), (later, _) in pairwise(spans))  # they were
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from patience import LONG
 
 ROOT = Path(__file__).parents[2]
 pytestmark = [
-    pytest.mark.timeout(200),
+    pytest.mark.timeout(LONG),
     pytest.mark.skipif(
         not (shutil.which("colcon") or (Path(sys.executable).parent / "colcon").exists()),
         reason="colcon is not installed",
@@ -34,7 +35,7 @@ def install(tmp_path_factory):
     done = subprocess.run(
         ["colcon", "--log-base", str(folder / "log"), "build", "--base-paths", str(sources),
          "--build-base", str(folder / "build"), "--install-base", str(folder / "install"), "--event-handlers", "console_cohesion+"],
-        capture_output=True, text=True, timeout=180, env=environment, cwd=folder, check=False,
+        capture_output=True, text=True, timeout=LONG, env=environment, cwd=folder, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     assert "3 packages finished" in done.stdout
@@ -66,7 +67,7 @@ def sourced(install, folder, *command):
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     return subprocess.run(
         ["bash", "-c", script, "bash", *map(str, command)],
-        capture_output=True, text=True, timeout=120, cwd=folder, env=environment, check=False,
+        capture_output=True, text=True, timeout=LONG, cwd=folder, env=environment, check=False,
     )  # fmt: skip
 
 

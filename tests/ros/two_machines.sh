@@ -1,9 +1,11 @@
 #!/bin/sh
 # Two networks joined by a cable, as two machines are; a stranger on the second one calls to the plant on the first.
-#   two_machines.sh DISCOVERY_RANGE_OF_THE_PLANT PYTHON MODEL STRANGER    # within: unshare --net
+#   two_machines.sh DISCOVERY_RANGE_OF_THE_PLANT PYTHON MODEL STRANGER SECONDS_ABROAD    # within: unshare --net
 set -eu
-unshare --net sleep 60 &
+plant=
+unshare --net sleep 600 &
 other=$!
+trap 'kill -KILL $plant $other' EXIT
 ip link set lo up
 until [ "$(readlink "/proc/$other/ns/net")" != "$(readlink /proc/self/ns/net)" ]; do sleep 0.02; done
 ip link add here type veth peer name there netns "$other" || exit 3
@@ -13,7 +15,6 @@ export FASTDDS_BUILTIN_TRANSPORTS=UDPv4 # shared memory is no cable
 ROS_AUTOMATIC_DISCOVERY_RANGE=$1 "$2" -m rhythmid_nodes.plant --ros-args -r __ns:=/hopper -p model:="$3" &
 plant=$!
 # at home it is there ...
-ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST "$2" "$4" 20
+ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST "$2" "$4" 120
 # ... and abroad?
-ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET nsenter -t "$other" -n "$2" "$4" 6
-kill -KILL "$plant" "$other"
+ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET nsenter -t "$other" -n "$2" "$4" "$5"

@@ -20,6 +20,22 @@ def test_threads_that_ask_for_a_module_at_once_get_the_same_whole_one(
     assert all(run is found[0] for run in found) and found[0]() == str(tmp_path)
 
 
+def test_a_module_that_another_process_has_written_meanwhile_is_not_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("RHYTHMID_CACHE", str(tmp_path))
+    module = Module(f"here = {str(tmp_path)!r}\n\n\ndef run():\n    return here\n")
+    theirs = tmp_path / f"{module.name}.py"
+    theirs.write_text(module.text)
+    before = theirs.stat()
+    exists = Path.exists
+    monkeypatch.setattr(Path, "exists", lambda path: path != theirs and exists(path))
+    assert load_run.__wrapped__(module)() == str(tmp_path)
+    after = theirs.stat()
+    assert (before.st_ino, before.st_mtime_ns) == (after.st_ino, after.st_mtime_ns)
+    assert [path.name for path in tmp_path.glob("*kernel*") if path.is_file()] == [theirs.name]
+
+
 def test_a_module_that_fails_is_not_left_half_loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("RHYTHMID_CACHE", str(tmp_path))
     failing = Module(f"here = {str(tmp_path)!r}\nraise ValueError(here)\n")

@@ -11,12 +11,14 @@ from rhythmid.commands.terminal import Terminal
 from rhythmid.errors import InputError
 from rhythmid.output import require_new, write_json
 from rhythmid.report.quantity import number
+from rhythmid.ros_packages import not_installed
 
 if TYPE_CHECKING:
     from rhythmid.twin.twin import Status
     from rhythmid.twin.watch import Watch
 
 LIVE_GROUP = "rhythmid.live"  # entry points of packages that know how to reach a running robot
+LIVE = "watching a running machine (a recording is watched with --bag)"
 EXAMPLES = (
     "rhythmid watch model.yaml --signals signals.yaml",
     "rhythmid watch model.yaml --bag bag --healthy 120 --json -",
@@ -148,12 +150,8 @@ def _live(**options: Any) -> int:
     """Watch the running machine through whatever package knows how; the exit code."""
     known = {entry.name: entry for entry in entry_points(group=LIVE_GROUP)}
     if "watch" not in known:
-        raise InputError(
-            "watching a running machine needs the package rhythmid_bringup and ROS 2; a recording is watched with --bag"
-        )
+        raise not_installed(LIVE, "rhythmid_bringup")
     try:
         return known["watch"].load()(**options)
     except ModuleNotFoundError as missing:
-        raise InputError(
-            f"watching a running machine needs ROS 2: {missing}; a recording is watched with --bag"
-        ) from None
+        raise not_installed(LIVE, str(missing.name)) from None

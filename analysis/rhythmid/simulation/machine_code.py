@@ -72,7 +72,7 @@ def _load(module: Module) -> None:
             folder.mkdir(parents=True, exist_ok=True)
             partial = folder / f".{module.name}.{os.getpid()}"
             partial.write_text(module.text, encoding="utf-8")
-            os.replace(partial, path)
+            _put(partial, path)
         except OSError as error:
             raise InputError(
                 f"{folder}: compiled models cannot be kept there ({error.strerror}); "
@@ -90,6 +90,21 @@ def _load(module: Module) -> None:
             raise
         texts = "\n".join(one.text for one in (*module.imports, module))
         raise InputError(_complaint(texts, str(error))) from None
+
+
+def _put(partial: Path, path: Path) -> None:
+    """Give a whole file its name, unless another process has done so meanwhile.
+
+    A file that is replaced is another one for numba, which would compile it anew and overwrite what it keeps of the first
+    while other processes read it.
+    """
+    try:
+        os.link(partial, path)
+    except FileExistsError:
+        pass
+    except OSError:  # a file system without links
+        os.replace(partial, path)
+    partial.unlink(missing_ok=True)
 
 
 def _complaint(text: str, complaint: str) -> str:

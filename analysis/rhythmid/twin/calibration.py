@@ -19,6 +19,7 @@ from rhythmid.model import Model
 from rhythmid.record.timing import nominal_period
 from rhythmid.twin.changes import Change, watched
 from rhythmid.twin.detector import Healthy, learn_healthy
+from rhythmid.twin.lateness import Doubt, lateness
 from rhythmid.twin.observer import Filter, Innovations, Observer
 from rhythmid.twin.samples import Samples
 from rhythmid.twin.score import Whitener
@@ -70,9 +71,11 @@ class Calibration:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Samples of the healthy machine, taken in segments of `size` samples and averaged over blocks of `block` of them."""
+    """Samples of the healthy machine, taken in segments of `size` samples and averaged over blocks of `block` of them; `late` is the
+    lateness of each measurement."""
 
     output: Samples
+    late: Array
     command: Samples
     forcing: Samples | None
     block: int
@@ -85,8 +88,11 @@ class Stretch:
 
     def innovations(self, observer: Observer, pieces: Sequence[slice]) -> list[Innovations]:
         """What an observer finds of these segments, without those that it cannot follow."""
+        time, value = self.output.time, self.output.value
         found = [
-            observer.take(self.output.time[at], self.output.value[at], self.command, self.forcing)
+            observer.take(
+                time[at], value[at], Doubt.of(time, self.late, at.start, at.stop), self.command, self.forcing
+            )
             for at in pieces
         ]
         return [one for one in found if one is not None]
@@ -122,7 +128,7 @@ def calibrate(
     extended, changes = watched(model, catalogue, speed, settings.input_kind)
     simulation = Simulation(extended, changes, settings, period)
     scatter = _scatter(simulation, output, period, settings)
-    stretch = Stretch(output, command, forcing, block, size)
+    stretch = Stretch(output, lateness(output.time, period), command, forcing, block, size)
     force = model.mass.value * speed**2 / max(float(np.std(output.value)), 1e-300)
     sizes = np.array([_size(extended.value(c.name), c, force, speed, scatter[0]) for c in changes])
     filter, found = _followed(simulation, stretch, scatter, sizes)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
 
+from rhythmid.twin.lateness import Doubt
 from rhythmid.twin.samples import Samples
 from rhythmid.twin.segment import Inputs, Run, Simulation, Start
 
@@ -69,27 +70,36 @@ class Observer:
         self.by_change = np.zeros((q, len(self.simulation.changes)))
 
     def take(
-        self, stamps: Array, values: Array, command: Samples, forcing: Samples | None
+        self, stamps: Array, values: Array, doubt: Doubt, command: Samples, forcing: Samples | None
     ) -> Innovations | None:
-        """Take a segment of measurements in; None at the beginning and where the model diverges and is begun anew."""
+        """Take a segment of measurements in, whose times are in `doubt`; None at the beginning and where the model diverges and is
+        begun anew."""
         if self.start is None:
             self.begin(stamps, values)
             return None
         block, scatter = self.given.block, self.given.scatter
         given = self.simulation.inputs(stamps, self.start, command, forcing)
         run = self.simulation.run(given, self.start, block, scatter, self.sizes)
-        found = None if run is None else self._correct(run, given, values)
+        found = None if run is None else self._correct(run, given, values, doubt)
         if found is None:
             self.begin(stamps, values)
         return found
 
-    def _correct(self, run: Run, given: Inputs, values: Array) -> Innovations | None:
+    def _of_times(self, run: Run, doubt: Doubt) -> Array:
+        """Covariance (m, m) of the block averages by the doubt in their times: of each one's lateness, and of one that all have."""
+        each, all_of_them = (
+            (run.slope * late).reshape(-1, self.given.block).mean(axis=1) for late in (doubt.late, doubt.rms)
+        )
+        return np.diag(each**2) + np.outer(all_of_them, all_of_them)
+
+    def _correct(self, run: Run, given: Inputs, values: Array, doubt: Doubt) -> Innovations | None:
         assert self.start is not None
         error = values.reshape(-1, self.given.block).mean(axis=1) - run.output
         sensitivity = run.by_start @ self.by_change + run.by_change
         before = self.covariance.copy()
         before[1, 1] += self.given.kick
         spread = run.by_start @ before @ run.by_start.T + self.given.noise * np.eye(len(error))
+        spread += self._of_times(run, doubt)
         try:
             root = cholesky(spread, lower=True)
         except (LinAlgError, ValueError):

@@ -50,9 +50,11 @@ class Run:
 
     `output` (m,) are block averages, `states` (q,) those at its end, `by_start` (m, q) and `by_change` (m, p) what a unit of
     each state at the start and of each change does to the output, `end_by_start` (q, q) and `end_by_change` (q, p) to the end.
+    `slope` (n,) is the rate of change of the output at each sample.
     """
 
     output: Array
+    slope: Array
     states: Array
     by_start: Array
     by_change: Array
@@ -167,7 +169,7 @@ class Simulation:
         def averaged(output: Array) -> Array:
             return output.reshape(-1, block).mean(axis=1)
 
-        output = averaged(rows[:, q])
+        output, slope = averaged(rows[:, q]), _slope(given.times, rows[:, q])
         by_start, end_by_start = np.zeros((len(output), q)), np.zeros((q, q))
         by_change, end_by_change = np.zeros((len(output), p)), np.zeros((q, p))
 
@@ -185,7 +187,7 @@ class Simulation:
         for i, change in enumerate(self.changes if sizes is not None else ()):
             assert sizes is not None
             if change.name == "measurement_delay.delay":
-                by_change[:, i] = -averaged(np.gradient(rows[:, q], given.times))
+                by_change[:, i] = -averaged(slope)
             elif change.delay:
                 other = self.rows(given, start, command=given.later)
                 by_change[:, i], end_by_change[:, i] = moved(other, DELAY_STEP)
@@ -195,7 +197,13 @@ class Simulation:
                 parameters[place] += size
                 other = self.rows(given, start, parameters=parameters)
                 by_change[:, i], end_by_change[:, i] = moved(other, size)
-        return Run(output, rows[-1, :q].copy(), by_start, by_change, end_by_start, end_by_change, past)
+        return Run(output, slope, rows[-1, :q].copy(), by_start, by_change, end_by_start, end_by_change, past)
+
+
+def _slope(time: Array, value: Array) -> Array:
+    """Rate of change (n,) at samples; 0 where neighbours have one time."""
+    step = np.gradient(time)
+    return np.where(step > 0.0, np.gradient(value) / np.where(step > 0.0, step, 1.0), 0.0)
 
 
 def _hermite(time: Array, value: Array) -> Array:

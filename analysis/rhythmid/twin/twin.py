@@ -16,6 +16,7 @@ from rhythmid.twin.calibration import Calibration, calibrate
 from rhythmid.twin.changes import DELAYS, without_own_forcing
 from rhythmid.twin.detector import Threshold
 from rhythmid.twin.isolation import DelayNow, Isolation, delays_now, isolate
+from rhythmid.twin.lateness import LOOK, Doubt, lateness
 from rhythmid.twin.observer import Observer
 from rhythmid.twin.samples import Samples
 from rhythmid.twin.score import Score, Whitener
@@ -107,8 +108,7 @@ class Twin:
         while self._taken + size <= len(output) and self._complete(
             float(output.time[self._taken + size - 1])
         ):
-            part = slice(self._taken, self._taken + size)
-            status = self._judge(calibration, output.time[part], output.value[part])
+            status = self._judge(calibration, self._taken, self._taken + size)
             self._taken += size
             if status is not None:
                 said.append(status)
@@ -121,9 +121,9 @@ class Twin:
         return sum(one.refused for one in self.samples.values())
 
     def _complete(self, time: float) -> bool:
-        """Whether all signals are known up to a time, or their sources silent."""
+        """Whether all signals are known up to a time, or their sources silent, and the measurements that tell how late others were."""
         newest = self.samples["output"].newest
-        return all(
+        return newest >= time + LOOK and all(
             one.newest >= time or newest >= time + PATIENCE
             for role, one in self.samples.items()
             if role != "output"
@@ -153,9 +153,21 @@ class Twin:
         self._scores: deque[Score] = deque(maxlen=longest)
         self._settling = longest  # segments until what the filter was begun with is forgotten
 
-    def _judge(self, calibration: Calibration, time: Array, value: Array) -> Status | None:
+    def _doubt(self, first: int, end: int, period: float) -> Doubt:
+        """Of a segment's times."""
+        stamps = self.samples["output"].time
+        since = int(np.searchsorted(stamps, stamps[first] - LOOK))
+        until = int(np.searchsorted(stamps, stamps[end - 1] + LOOK, side="right"))
+        near = stamps[since:until]
+        return Doubt.of(near, lateness(near, period), first - since, end - since)
+
+    def _judge(self, calibration: Calibration, first: int, end: int) -> Status | None:
+        """Judge the measurements from `first` to before `end`."""
         assert self._observer is not None
-        found = self._observer.take(time, value, self.samples["input"], self.samples.get("forcing"))
+        output = self.samples["output"]
+        time, value = output.time[first:end], output.value[first:end]
+        doubt = self._doubt(first, end, calibration.period)
+        found = self._observer.take(time, value, doubt, self.samples["input"], self.samples.get("forcing"))
         if found is None:
             self._settling = self._scores.maxlen or 1
             return None
@@ -219,8 +231,9 @@ class Twin:
         simulation = self._observer.simulation
         keep = min(self._observer.start.time, float(output.time[self._taken - 1]))
         keep -= simulation.longest_delay + PATIENCE
-        output.time, output.value = output.time[self._taken :], output.value[self._taken :]
-        self._taken = 0
+        first = int(np.searchsorted(output.time, output.time[self._taken - 1] - LOOK))
+        output.time, output.value = output.time[first:], output.value[first:]
+        self._taken -= first
         for role, one in self.samples.items():
             if role != "output":
                 one.forget(keep, keep=8)

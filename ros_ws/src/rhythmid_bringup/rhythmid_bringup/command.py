@@ -12,6 +12,7 @@ import typer
 from rhythmid.commands.examples import epilog
 from rhythmid.commands.options import Quiet, ReportFile
 from rhythmid.errors import InputError
+from rhythmid.ros_packages import not_installed
 
 from . import isolation
 
@@ -66,9 +67,7 @@ def add(app: typer.Typer) -> None:
         try:  # ROS is slow to load, and the other commands need none
             from rhythmid_bringup.run import console, replacements, run_alone, run_graph
         except ModuleNotFoundError as missing:
-            raise InputError(
-                f"`rhythmid run` needs ROS 2: {missing}; see the README for both ways to get it"
-            ) from None
+            raise not_installed("rhythmid run", str(missing.name)) from None
         console.quiet = quiet
         if node is not None:
             raise typer.Exit(run_alone(experiment, out, node))

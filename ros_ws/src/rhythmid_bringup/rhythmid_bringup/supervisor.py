@@ -27,7 +27,7 @@ from .liveness import SILENT_AFTER, Liveness, Relay
 from .observer import Observer
 from .processes import Supervised, end
 
-READY_WITHIN = 60.0  # seconds; importing ROS and compiling the model take most of it on a busy machine
+READY_WITHIN = 180.0  # seconds; importing ROS and compiling the model take most of it on a busy machine
 STALLED_AFTER = 30.0  # seconds
 FIGURES_WITHIN = 2.0  # seconds; every node tells its figures once a second
 GRAPH = "graph"  # the process that holds all nodes of a composed layout

@@ -12,6 +12,9 @@ from collections.abc import Callable
 from .lateness import Lateness
 
 _TIMER_ABSTIME = 1
+_READINGS = (
+    20  # of both clocks, of which the closest pair counts: the others may have been interrupted in between
+)
 
 
 class _Timespec(ctypes.Structure):
@@ -28,7 +31,7 @@ class Clock:
     """
 
     def __init__(self) -> None:
-        self._offset_ns = time.time_ns() - time.monotonic_ns()
+        self._offset_ns = _offset_ns()
 
     def now(self) -> int:
         return time.monotonic_ns() + self._offset_ns
@@ -38,6 +41,21 @@ class Clock:
         seconds, nanoseconds = divmod(due_ns - self._offset_ns, 1_000_000_000)
         wake = _Timespec(seconds, nanoseconds)
         _libc.clock_nanosleep(time.CLOCK_MONOTONIC, _TIMER_ABSTIME, ctypes.byref(wake), None)
+
+
+def _offset_ns() -> int:
+    """Time since the Unix epoch minus that of CLOCK_MONOTONIC, to within the time that the closest of some readings takes.
+
+    A busy machine may interrupt a reading between the two clocks for milliseconds, which would shift every stamp.
+    """
+    best_ns, offset_ns = None, 0
+    for _ in range(_READINGS):
+        before = time.monotonic_ns()
+        epoch = time.time_ns()
+        after = time.monotonic_ns()
+        if best_ns is None or after - before < best_ns:
+            best_ns, offset_ns = after - before, epoch - (before + after) // 2
+    return offset_ns
 
 
 class Worker:

@@ -28,6 +28,7 @@ from .qos import AdaptiveSubscription, latched, message_type, stream
 
 _SLICE_NS = 100_000_000  # the relay looks at least so often whether it is to end
 _SETTLE_NS = 20_000_000  # after an overrun: what comes within this time has waited in the transport meanwhile
+_LOOK_NS = 1_000_000  # between two looks for it
 
 DELAY = Parameter("delay", 0.0, "time by which every message is held back", "s", (0.0, 10.0), settable=True)
 PARAMETERS = (
@@ -196,7 +197,7 @@ class DelayInjector(GraphNode):
 
     def _leave_backlog(self, resumed_ns: int) -> None:
         """After an overrun: keep of what has waited meanwhile only the newest."""
-        self._wall.sleep_until(resumed_ns + _SETTLE_NS)
+        self._await_backlog(resumed_ns)
         waited: list[tuple[int, int, bytes]] = []
         by_arrival = self.values["delay_from"] == "receive"
         while self._queue:
@@ -207,6 +208,21 @@ class DelayInjector(GraphNode):
         if waited:
             self._queue.appendleft(waited[-1])
             self._skipped += len(waited) - 1
+
+    def _await_backlog(self, resumed_ns: int) -> None:
+        """Until all that has waited in the transport has been read, which takes a busy machine a while.
+
+        Messages come in order, so the first one that was not due before the overrun ended comes after the backlog. It is waited for
+        as long as the machine may be late (`catch_up`). Where the delay counts from receipt, nothing tells the backlog but the time.
+        """
+        look_ns = resumed_ns + _SETTLE_NS
+        self._wall.sleep_until(look_ns)
+        if self.values["delay_from"] == "receive":
+            return
+        end_ns = resumed_ns + round(self.values["catch_up"] * 1e9)
+        while not (self._queue and self._queue[-1][0] > resumed_ns) and look_ns < end_ns:
+            look_ns += _LOOK_NS
+            self._wall.sleep_until(look_ns)
 
 
 def main() -> None:

@@ -59,6 +59,7 @@ class JointPlantNode(PlantNode):
 
     def _open(self, profile: QoSProfile) -> None:
         machine, joints = self._machine, self._machine.joints
+        self._unlimited = True  # but for the limits of each joint
         self._field = command_field(machine)
         self._reader = JointStatesReader(joints)
         self._state_writer = JointStatesWriter(self._plant.measured, *FIELDS)

@@ -38,6 +38,8 @@ PARAMETERS = (
     PRIORITY,
     CATCH_UP,
     Parameter("max_effort", math.inf, "largest |effort| of a command; what exceeds it is clamped", "N", (0.0, math.inf)),
+    Parameter("max_effort_rate", math.inf, "realtime: largest change of the effort", "N/s", (0.0, math.inf)),
+    Parameter("max_power", math.inf, "realtime: largest |effort times speed of the plant|", "W", (0.0, math.inf)),
     Parameter("command_timeout", TIMEOUT, "hold of a command that is not renewed; 0: for ever", "s", (0.0, 3600.0)),
     Parameter("command_ramp", RAMP, "fading of a command after that", "s", (0.0, 3600.0)),
     Parameter("model", "", "model YAML file of the machine"),
@@ -114,7 +116,16 @@ class PlantNode(GraphNode):
         self._hold: Any = CommandHold(
             self.values["command_timeout"], self.values["command_ramp"], self.period_ns
         )
-        self._limits = EffortLimits(size=self.values["max_effort"])
+        self._size = EffortLimits(size=self.values["max_effort"])
+        self._limits = EffortLimits(math.inf, self.values["max_effort_rate"], self.values["max_power"])
+        self._unlimited = self._limits == EffortLimits()
+        if self.lockstep and not self._unlimited:
+            raise InputError(
+                "parameters max_effort_rate, max_power: in lockstep only the size of the effort is limited; limit the excitation"
+            )
+        self._wanted = self._given = self._speed = 0.0  # effort commanded and effort given last, newest speed
+        self._given_ns = 0
+        self._limited = 0
 
     def _build(self) -> Any:
         values = self.values
@@ -156,6 +167,7 @@ class PlantNode(GraphNode):
         if self._grid is None:
             return figures
         late = {
+            **({} if self._unlimited else {"limited_commands": str(self._limited)}),
             "late_commands": str(self._transport.late),
             **self._transport.summary("transport"),
             "commands_of_other_joints": str(self._other_joint),
@@ -185,7 +197,7 @@ class PlantNode(GraphNode):
         if not math.isfinite(sample.effort):
             self.trip(f"a command of {sample.effort} on {self._authority.topic}")
             return None
-        effort = self._limits.apply(sample.effort, 0.0, 0.0)
+        effort = self._size.apply(sample.effort, 0.0, 0.0)
         self._clamped += effort != sample.effort
         return sample._replace(effort=effort)
 
@@ -200,6 +212,7 @@ class PlantNode(GraphNode):
             samples.effort.tolist(), samples.forcing.tolist(), strict=True,
         )  # fmt: skip
         for stamp_ns, position, velocity, effort, forcing in list(rows)[-1 if newest_only else 0 :]:
+            self._speed = velocity
             stamp_ns += origin_ns
             self._states.publish(self._state_writer.write(stamp_ns, position, velocity, effort))
             self._forcing.publish(self._forcing_writer.write(stamp_ns, forcing))
@@ -260,13 +273,16 @@ class PlantNode(GraphNode):
         if self.tripped:
             self._drop_command(done_ns)
         self._fade_until(self._done_ns)
+        if not self._unlimited and not self.tripped:
+            self._push(max(self._done_ns, self._newest_ns + 1), self._wanted)
         self._publish(self._done_ns, self._origin_ns, newest_only=True)
         self._next_ns = self._done_ns + self.period_ns
 
     def _drop_command(self, stamp_ns: int) -> None:
         """What is left without a command, from a time since the origin on."""
         left = self._nothing()
-        self._push(max(stamp_ns, self._newest_ns + 1), left)
+        self._give(max(stamp_ns, self._newest_ns + 1), left)
+        self._wanted = left
         self._hold.renew(self._newest_ns, left)
 
     def _nothing(self) -> Any:
@@ -280,8 +296,18 @@ class PlantNode(GraphNode):
         self._tell_lapse()
 
     def _push(self, stamp_ns: int, effort: Any) -> None:
+        """Give an effort from a time on, as far as its rate and its power may be; the rest of it follows tick by tick."""
+        self._wanted = effort
+        if not self._unlimited:
+            elapsed_ns = min(stamp_ns - self._given_ns, self.period_ns)
+            effort = self._limits.apply(effort, self._given, elapsed_ns * 1e-9, self._speed)
+            self._limited += effort != self._wanted
+        self._give(stamp_ns, effort)
+
+    def _give(self, stamp_ns: int, effort: Any) -> None:
         self._plant.push(stamp_ns, effort)
-        self._newest_ns = stamp_ns
+        self._newest_ns = self._given_ns = stamp_ns
+        self._given = effort
 
 
 def main() -> None:
