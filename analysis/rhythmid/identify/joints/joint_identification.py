@@ -23,7 +23,7 @@ from rhythmid.identify.joints.base_parameters import InertialEstimate, estimate_
 from rhythmid.identify.joints.correlation import Correlations
 from rhythmid.identify.joints.held_reference import balances_of, not_told
 from rhythmid.identify.joints.joint_motion import JointBalances
-from rhythmid.identify.joints.joint_order import check_order
+from rhythmid.identify.joints.joint_plausibility import check_joints
 from rhythmid.identify.joints.output_error import Knowledge, free_runs, refine
 from rhythmid.identify.joints.reference_delay import reference_delay
 from rhythmid.model import INERTIA, Model
@@ -159,8 +159,8 @@ def identify_machine(
     records, said = cleaned_joints(records)
     holdout, of_holdout = cleaned_joints(holdout)
     seen, unseen = (records, holdout) if holdout else _split(records)
+    check_joints(machine, seen)
     balances = balances_of(machine, seen)
-    check_order(balances)
     fits: dict[str, tuple[Balance, EffortFit]] = {}
     found: dict[str, JointEstimate] = {}
     correlations: list[Correlations] = []
