@@ -41,14 +41,15 @@ def likely_joint_mend(machine: Machine, records: Sequence[JointRecord]) -> str |
     if not records:
         return None
     record = max(records, key=_moved)
-    motion = RecordedMotion(machine, record)
-    declared = motion.balanced(motion.as_declared)
-    if all(one.left <= POOR_MOTION for one in declared):
-        return None
-    for free in (False, True):
-        found = _searched(motion, free)
-        if found != motion.as_declared and _convinces(motion, found, declared):
-            return f"{record.name}: {_words(motion, found, declared)}"
+    for touching in (False, True) if machine.body.contacts else (False,):
+        motion = RecordedMotion(machine, record, touching)
+        declared = motion.balanced(motion.as_declared)
+        if all(one.left <= POOR_MOTION for one in declared):
+            return None
+        for free in (False, True):
+            found = _searched(motion, free)
+            if found != motion.as_declared and _convinces(motion, found, declared):
+                return f"{record.name}: {_words(motion, found, declared)}"
     return None
 
 
@@ -142,15 +143,21 @@ def _moved_round(readings: Readings, places: Sequence[int]) -> Readings:
 
 
 def _convinces(motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]) -> bool:
-    """Whether a reading explains what the declared one does not."""
+    """Whether a reading explains what the declared one does not, and does so by the body: an effort that a controller asks for against the
+    motion is, turned round, what a spring and a damper would need."""
     left = motion.balanced(found)
     changed = [k for k, (one, own) in enumerate(zip(found, motion.as_declared, strict=True)) if one != own]
-    before, after = (math.sqrt(sum(one.left**2 for one in many)) for many in (declared, left))
+    before, after = (_rms(one.left for one in many) for many in (declared, left))
     return (
         after <= CLEARLY * before
         and all(left[k].left <= POOR_MOTION for k in changed)
         and max(left[k].left for k in changed) <= BETTER_UNIT * max(declared[k].left for k in changed)
+        and _rms(left[k].left for k in changed) <= CLEARLY * _rms(left[k].bare for k in changed)
     )
+
+
+def _rms(values: Iterable[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(list(values)))))
 
 
 def _words(motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]) -> str:

@@ -25,9 +25,9 @@ from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord
 
 Array = NDArray[np.float64]
-POSES = 400  # at which readings are compared
-FEW = 50  # poses without contact, below which a reading is not judged
-NEIGHBOURS = 5  # poses across the reach of the filter at which contact is looked for
+POSES = 300  # at which readings are compared
+FEW = 60  # poses without contact, below which a reading is not judged
+NEIGHBOURS = 3  # poses across the reach of the filter at which contact is looked for
 LONGEST = 60.0  # [s] of a record that are looked at, from its start
 
 
@@ -45,35 +45,40 @@ class Reading:
 
 @dataclass(frozen=True)
 class Balanced:
-    """What a body leaves of a joint's effort, as a share of its variation, and the `gain` of that effort over what the body asks for."""
+    """What a body leaves of a joint's effort, as a share of its variation, and the `gain` of that effort over what the body asks for;
+    `bare` is what a spring, a damper and a dry friction leave by themselves."""
 
     left: float
     gain: float = 1.0
+    bare: float = 1.0
 
 
 class RecordedMotion:
-    """Poses of a record and the efforts at them, for whatever reading of the driven joints."""
+    """Poses of a record and the efforts at them, for whatever reading of the driven joints.
 
-    def __init__(self, machine: Machine, record: JointRecord) -> None:
+    With `touching`, poses in contact under a reading are left out of it. Without, they are not looked for, which takes a fifth of the time.
+    """
+
+    def __init__(self, machine: Machine, record: JointRecord, touching: bool = False) -> None:
         start, end = record.span
         part = record.cut(start, min(end, start + LONGEST))
         body = machine.body
         self.joints = machine.joints
-        self.body = body
+        self.body, self._touching = body, touching
         # contacts are looked for under each reading: degrees that are taken for radians put the feet anywhere
         stretches = joint_stretches(replace(machine, body=replace(body, contacts=False)), [part])
         self.computed = tuple(joint for joint in self.joints if joint in stretches[0].reference)
         cut = _cut(machine, stretches)
         found = [_sampled(machine, one, cut) for one in stretches]
-        every = max(1, sum(len(one) for one, *_ in found) // POSES)
-        near = [_near(len(one), period, cut) for one, *_, period in found]
-        picked = [(slice(None, None, every), one) for one in found]
+        every = max(1, sum(len(one.pose) for one in found) // POSES)
         self._pose, self._rate, self._acceleration, self._effort = (
-            np.concatenate([one[place][part] for part, one in picked]) for place in range(4)
+            np.concatenate([getattr(one, name)[::every] for one in found])
+            for name in ("pose", "rate", "acceleration", "effort")
         )
         # poses before and after each, within the reach of the filter
+        near = [_near(len(one.pose), one.period, cut) for one in found]
         self._beside = [
-            np.concatenate([one[0][at[part]] for (part, one), at in zip(picked, ats, strict=True)])
+            np.concatenate([one.pose[at[::every]] for one, at in zip(found, ats, strict=True)])
             for ats in zip(*near, strict=True)
         ]
         own = [body.joints[joint] for joint in self.joints]
@@ -91,9 +96,10 @@ class RecordedMotion:
         sources = [one.source for one in readings]
         factors = np.array([one.position for one in readings])
         clear = np.ones(len(self._pose), dtype=bool)
-        if self.body.contacts:
-            for beside in self._beside:
-                clear &= ~self.body.touches(self._read(beside, self._positions, sources, factors), NEAR)
+        if self._touching:
+            beside = self._read(np.concatenate(self._beside), self._positions, sources, factors)
+            touched = self.body.touches(beside, NEAR).reshape(len(self._beside), -1)
+            clear = ~np.any(touched, axis=0)
         if clear.sum() < min(FEW, len(clear)):
             return tuple(Balanced(1.0) for _ in readings)
         pose = self._read(self._pose[clear], self._positions, sources, factors)
@@ -120,19 +126,23 @@ class RecordedMotion:
 
 def _fitted(effort: Array, asked: Array, x: Array, v: Array, a: Array, free: bool) -> Balanced:
     """What is left of an effort (n,) beside the force that a body asks for, losses fitted."""
+    losses = np.column_stack([v, np.sign(v), x])
+    columns = np.column_stack([losses, a, asked]) if free else np.column_stack([losses, a])
+    if np.ptp(effort) == 0.0 or not np.all(np.isfinite(asked)):
+        return Balanced(1.0)
+    values, left = _without_sign(columns, effort if free else effort - asked)
+    _, bare = _without_sign(losses, effort)
     size = float(np.std(effort))
-    columns = np.column_stack([a, v, np.sign(v), x])
-    wanted = effort if free else effort - asked
-    if free:
-        columns = np.column_stack([asked, columns])
+    return Balanced(min(left / size, 1.0), float(values[-1]) if free else 1.0, min(bare / size, 1.0))
+
+
+def _without_sign(columns: Array, wanted: Array) -> tuple[Array, float]:
+    """Factors (p,), none negative, of the columns (n, p) that come nearest to what is wanted (n,) beside a constant, and the rms left."""
     columns, wanted = columns - columns.mean(axis=0), wanted - wanted.mean()
     norms = np.linalg.norm(columns, axis=0)
     norms[norms == 0.0] = 1.0
-    if size == 0.0 or not np.all(np.isfinite(columns)):
-        return Balanced(1.0)
     values, missed = nnls(columns / norms, wanted)
-    left = float(missed) / math.sqrt(len(wanted)) / size
-    return Balanced(min(left, 1.0), float(values[0] / norms[0]) if free else 1.0)
+    return values / norms, float(missed) / math.sqrt(len(wanted))
 
 
 def _cut(machine: Machine, stretches: list[JointStretch]) -> float:
@@ -148,8 +158,18 @@ def _cut(machine: Machine, stretches: list[JointStretch]) -> float:
     return max(found)
 
 
-def _sampled(machine: Machine, stretch: JointStretch, cut: float) -> tuple[Array, Array, Array, Array, float]:
-    """Poses, rates, accelerations (n, nv) and efforts (n, joints) of a stretch below the cut-off, and the time [s] between them."""
+@dataclass(frozen=True, eq=False)
+class _Sampled:
+    """Poses, rates, accelerations (n, nv) and efforts (n, joints) of a stretch below the cut-off, a `period` [s] apart."""
+
+    pose: Array
+    rate: Array
+    acceleration: Array
+    effort: Array
+    period: float
+
+
+def _sampled(machine: Machine, stretch: JointStretch, cut: float) -> _Sampled:
     every = max(1, int(1.0 / (FINER * cut * stretch.period)))
     time = stretch.time[::every]
     pose = low_pass(stretch.pose, stretch.period, cut)[::every]
@@ -158,9 +178,8 @@ def _sampled(machine: Machine, stretch: JointStretch, cut: float) -> tuple[Array
     effort = np.column_stack(
         [_effort(machine.paths[joint], joint, stretch, place) for joint, place in _places(machine)]
     )
-    return (
-        pose, rate, acceleration, low_pass(effort, stretch.period, cut)[::every], stretch.period * every
-    )  # fmt: skip
+    effort = low_pass(effort, stretch.period, cut)[::every]
+    return _Sampled(pose, rate, acceleration, effort, stretch.period * every)
 
 
 def _places(machine: Machine) -> list[tuple[str, int]]:
