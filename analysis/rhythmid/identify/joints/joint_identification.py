@@ -74,7 +74,7 @@ class MachineIdentification(Result):
     `parameters` by "joint.element.parameter" and "body.joint.armature"; `effort_nrmse` of each joint's predicted effort, `free_run`
     of its motion as given and as identified, on records or ends of records that no fit has seen where `unseen`; `worse` the joints whose
     motion the identified values predict worse than those given, `not_identified` those of which they predict neither motion nor effort;
-    `not_separable` in words.
+    `not_separable` in words. `fits` are of each joint the balance of its effort, its path as given, and the fit.
     """
 
     machine: Machine
@@ -88,6 +88,7 @@ class MachineIdentification(Result):
     worse: tuple[str, ...] = ()
     not_identified: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    fits: Mapping[str, tuple[Balance, Model, EffortFit]] = field(default_factory=dict, repr=False)
 
     @property
     def usable(self) -> bool:
@@ -209,6 +210,7 @@ def identify_machine(
     return MachineIdentification(
         identified, found, told, (*_not_separable(told, balances.computed), *not_told(balances, seen)), inertia, errors,
         runs, True, worse, poor_joints(errors, runs.get("identified")), tuple(notes),
+        {joint: (balance, balances.models[joint], fit) for joint, (balance, fit) in fits.items()},
     )  # fmt: skip
 
 
