@@ -5,7 +5,7 @@ import xml.etree.ElementTree as tree
 from legged import MODELS
 
 from rhythmid.body.machine import Machine
-from rhythmid.diagnose.joints.joint_present import parents_of
+from rhythmid.body.robot_tree import parents_of
 from rhythmid.report.robot_figure import DrawnJoint, robot_svg
 
 

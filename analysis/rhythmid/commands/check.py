@@ -45,6 +45,7 @@ def check(
     from rhythmid.progress_bar import progress
     from rhythmid.record.bag_report import BagReport, quality_report
     from rhythmid.record.elsewhere import elsewhere_notes
+    from rhythmid.record.joint_record import joint_records
 
     require_new(json, report)
     if report is not None and len(bags) > 1:
@@ -73,7 +74,8 @@ def check(
         if model is not None:
             from rhythmid.commands.model_line import model_lines
 
-            for line in model_lines(model, records, elements or ()):
+            of_joints = joint_records([found.path for found in made if found.usable], signals)
+            for line in model_lines(model, records, elements or (), of_joints):
                 terminal.say(line)
     except InputError as error:
         refused.append(str(error))

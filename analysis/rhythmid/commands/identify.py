@@ -92,11 +92,19 @@ def identify(
     require_new(json, report, save_model, save)
     if model is not None and machines.is_machine(model):
         machines.refuse(
-            report=report, save=save, forcing=forcing, clock_offset=clock_offset, clock_offset_std=clock_offset_std,
+            save=save, forcing=forcing, clock_offset=clock_offset, clock_offset_std=clock_offset_std,
             method=method, htf=htf,
         )  # fmt: skip
         machines.identify_files(
-            bags, model, signals, holdout or (), elements or (), json, save_model, Terminal(quiet, json)
+            bags,
+            model,
+            signals,
+            holdout or (),
+            elements or (),
+            json,
+            report,
+            save_model,
+            Terminal(quiet, json),
         )
         return
     method, htf = method or "joint", htf or "auto"

@@ -129,6 +129,7 @@ def identify_files(
     holdout: Sequence[Path],
     elements: Sequence[Path],
     json: Path | None,
+    report: Path | None,
     save_model: Path | None,
     terminal: "Terminal",
 ) -> None:
@@ -144,6 +145,14 @@ def identify_files(
     found.show(terminal.answer)
     if json is not None:
         write_json(json, found.to_dict())
+    if report is not None:
+        from rhythmid.commands.options import command_line
+        from rhythmid.identify.joints.joint_present import present_identified
+        from rhythmid.report.page import write_page
+
+        source = f"{model.name} with {', '.join(bag.name for bag in bags)}"
+        write_page(report, present_identified(found, machine, source, command_line()))
+        terminal.say(f"report: {report}")
     saved(found.machine, save_model, terminal)
 
 

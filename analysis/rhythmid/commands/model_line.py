@@ -9,12 +9,18 @@ from rhythmid.model import INERTIA, Model
 from rhythmid.report.quantity import with_written_unit
 
 if TYPE_CHECKING:
+    from rhythmid.record.joint_record import JointRecord
     from rhythmid.record.record import Record
 
 
-def model_lines(path: Path, records: Sequence["Record"], elements: Sequence[Path] = ()) -> list[str]:
+def model_lines(
+    path: Path,
+    records: Sequence["Record"],
+    elements: Sequence[Path] = (),
+    joints: Sequence["JointRecord"] = (),
+) -> list[str]:
     """What a model is, in one line, and notes: on each unit of the records that is not the model's, and on the share of them in which
-    the machine rests, where their effort would be scored.
+    the machine rests, where their effort would be scored. `joints` are the records of a machine of several joints.
 
     Raises InputError as a diagnosis would, where the model is wrong or the records do not fit it.
     """
@@ -25,8 +31,11 @@ def model_lines(path: Path, records: Sequence["Record"], elements: Sequence[Path
     catalogue = load_catalogue(elements)
     if is_machine(path):
         from rhythmid.body.machine import Machine
+        from rhythmid.identify.joints.joint_plausibility import check_joints
+        from rhythmid.record.cleaning import cleaned_joints
 
         machine = Machine.load(path, catalogue)
+        check_joints(machine, cleaned_joints(joints)[0])
         paths = "; ".join(f"{joint}: {_elements(model)}" for joint, model in machine.paths.items())
         return [f"{path}: {len(machine.joints)} joints; {paths}; {_free(machine.free)}"]
     model = Model.load(path, catalogue)

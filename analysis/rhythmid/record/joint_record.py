@@ -8,6 +8,7 @@ A signals.yaml with `joints:` says of all joints at once which channel is what:
     effort: {field: "effort[*]", taken: before_actuator, sampled: mean}   # or after_actuator; or instant
     base:   {field: "position[rail]"}                 # where the body's base moves along a joint
 
+A channel's `scale` holds for all joints, or is given by joint: `scale: {knee: -1}`; for those that are not named it is 1.
 `[*]` stands for each joint's name in a bag and for its place in the list in a table's array (`column: "q[*]"`); elsewhere in a column's
 name `*` stands for the joint's name (`column: "q_*"`). What has no topic or file takes the output's. A command that is a position is a
 reference for the controllers, see `kind` of the one axis' signals.yaml; `feedforward` is a force that the controllers add.
@@ -98,6 +99,16 @@ def load_joint_records(paths: Iterable[str | Path], signals: JointSignals | str 
     return [read_joint_record(path, known) for path in paths]
 
 
+def joint_records(paths: Iterable[str | Path], signals: str | Path | None) -> list[JointRecord]:
+    """Those recordings of which the signals, or the paths themselves, name joints. Raises InputError as `read_record` does."""
+    named = [(path, signals or path) for path in paths]
+    return [
+        read_joint_record(path, JointSignals.load(own))
+        for path, own in named
+        if Path(own).suffix in (".yaml", ".yml") and names_joints(own)
+    ]
+
+
 def read_joint_record(source: str | Path, signals: JointSignals) -> JointRecord:
     """Read one recording: a bag, or a table whose columns the signals name. A signals.yaml that names its tables stands for itself."""
     found = {joint: _read(source, one, signals.path) for joint, one in signals.joints.items()}
@@ -143,6 +154,8 @@ def _joint_signals(document: Node, path: Path) -> JointSignals:
     for role, node in keys.items():
         if role not in ("output", "time", "use", "tables", "parameters") and isinstance(node.value, dict):
             keys[role] = _with_shared(node, output)
+    for role in ("input", "forcing", "output", "effort"):
+        _check_scale(keys.get(role), names)
     whole = replace(document, value=keys)
     found = {
         joint: Signals.from_node(_for_joint(whole, own, place), path)
@@ -178,8 +191,20 @@ def _with_shared(node: Node, output: Node) -> Node:
     return replace(node, value={**{name: usual[name] for name in SHARED if name in usual}, **options})
 
 
+def _check_scale(channel: Node | None, names: Iterable[str]) -> None:
+    """Raise InputError where a channel has a scale for what is no joint."""
+    scale = channel.value.get("scale") if channel is not None and isinstance(channel.value, dict) else None
+    if scale is not None and isinstance(scale.value, dict):
+        for joint, one in scale.value.items():
+            if joint not in names:
+                one.fail(f"is no joint; those are {', '.join(names)}")
+
+
 def _for_joint(node: Node, joint: str, place: int) -> Node:
     """The document with the joint in the place of every star."""
+    if isinstance(node.value, dict) and node.path.endswith("scale"):
+        own = node.value.get(joint)
+        return replace(node, value=1.0) if own is None else own
     if isinstance(node.value, dict):
         return replace(node, value={key: _for_joint(one, joint, place) for key, one in node.value.items()})
     if isinstance(node.value, list):

@@ -26,7 +26,7 @@ from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.joints.held_reference import balances_of, likely_readings
 from rhythmid.identify.joints.joint_motion import JointBalances
-from rhythmid.identify.joints.joint_order import check_order
+from rhythmid.identify.joints.joint_plausibility import check_joints
 from rhythmid.identify.joints.reference_delay import reference_delay
 from rhythmid.identify.joints.reference_lead import told_of
 from rhythmid.model import INERTIA, Model
@@ -102,8 +102,8 @@ def diagnose_machine(
     known, spent = catalogue or load_catalogue(), Budget(budget)
     records, said = cleaned_joints(records)
     holdout, of_holdout = cleaned_joints(holdout)
+    check_joints(machine, records)
     balances = balances_of(machine, records)
-    check_order(balances)
     best = None
     for reading in likely_readings(balances, records):
         tried = _explained(machine, reading, records, holdout, known, tell, spent)

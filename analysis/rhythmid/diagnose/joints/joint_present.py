@@ -6,6 +6,7 @@ import numpy as np
 
 from rhythmid.body.machine import Machine
 from rhythmid.body.mujoco_body import MujocoBody
+from rhythmid.body.robot_tree import parents_of
 from rhythmid.diagnose.joints.joint_case import JointResult
 from rhythmid.diagnose.joints.joint_diagnosis import MachineAnswer
 from rhythmid.report.joints import JointCurves, joints_page
@@ -39,23 +40,6 @@ def _robot(answer: MachineAnswer, body: MujocoBody) -> list[DrawnJoint]:
         )
         for name, joint in body.joints.items()
     ]
-
-
-def parents_of(body: MujocoBody) -> dict[str, str | None]:
-    """Of each joint the one that carries it; none of one at the base."""
-    model, found = body.model, {}
-    last: dict[int, str] = {}  # the last joint of each link
-    for number in range(model.njnt):
-        name, link = model.joint(number).name, int(model.jnt_bodyid[number])
-        if name not in body.joints:
-            continue
-        above, before = link, last.get(link)
-        while before is None and above:
-            above = int(model.body_parentid[above])
-            before = last.get(above)
-        found[name] = before
-        last[link] = name
-    return found
 
 
 def _curves(results: Mapping[str, JointResult], machine: Machine) -> dict[str, JointCurves]:

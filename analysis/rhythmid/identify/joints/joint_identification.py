@@ -23,7 +23,7 @@ from rhythmid.identify.joints.base_parameters import InertialEstimate, estimate_
 from rhythmid.identify.joints.correlation import Correlations
 from rhythmid.identify.joints.held_reference import balances_of, not_told
 from rhythmid.identify.joints.joint_motion import JointBalances
-from rhythmid.identify.joints.joint_order import check_order
+from rhythmid.identify.joints.joint_plausibility import check_joints
 from rhythmid.identify.joints.output_error import Knowledge, free_runs, refine
 from rhythmid.identify.joints.reference_delay import reference_delay
 from rhythmid.model import INERTIA, Model
@@ -74,7 +74,7 @@ class MachineIdentification(Result):
     `parameters` by "joint.element.parameter" and "body.joint.armature"; `effort_nrmse` of each joint's predicted effort, `free_run`
     of its motion as given and as identified, on records or ends of records that no fit has seen where `unseen`; `worse` the joints whose
     motion the identified values predict worse than those given, `not_identified` those of which they predict neither motion nor effort;
-    `not_separable` in words.
+    `not_separable` in words. `fits` are of each joint the balance of its effort, its path as given, and the fit.
     """
 
     machine: Machine
@@ -88,6 +88,7 @@ class MachineIdentification(Result):
     worse: tuple[str, ...] = ()
     not_identified: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    fits: Mapping[str, tuple[Balance, Model, EffortFit]] = field(default_factory=dict, repr=False)
 
     @property
     def usable(self) -> bool:
@@ -159,8 +160,8 @@ def identify_machine(
     records, said = cleaned_joints(records)
     holdout, of_holdout = cleaned_joints(holdout)
     seen, unseen = (records, holdout) if holdout else _split(records)
+    check_joints(machine, seen)
     balances = balances_of(machine, seen)
-    check_order(balances)
     fits: dict[str, tuple[Balance, EffortFit]] = {}
     found: dict[str, JointEstimate] = {}
     correlations: list[Correlations] = []
@@ -209,6 +210,7 @@ def identify_machine(
     return MachineIdentification(
         identified, found, told, (*_not_separable(told, balances.computed), *not_told(balances, seen)), inertia, errors,
         runs, True, worse, poor_joints(errors, runs.get("identified")), tuple(notes),
+        {joint: (balance, balances.models[joint], fit) for joint, (balance, fit) in fits.items()},
     )  # fmt: skip
 
 

@@ -1,0 +1,224 @@
+"""Joints that were recorded in another order, in another unit or with their sign turned round: found by the balance of effort.
+
+As on one axis (`identify/plausibility.py`) a change is believed only where the record as declared cannot be explained, and the changed one
+can. Of several joints the changes are sought one after another, from the one that helps most: another factor for one joint or for all,
+an exchange of two joints, a cycle of three. What turns out to help nothing is taken back. Efforts in unknown units, such as a motor's
+current, are sought last: there every effort may have a factor of its own, which a balance tells of joints whose weight or
+coupling acts on them.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from rhythmid.body.machine import Machine
+from rhythmid.errors import InputError
+from rhythmid.identify.channel_change import DEGREE, NAMED, UNITS
+from rhythmid.identify.joint import POOR_MOTION
+from rhythmid.identify.joints.joint_reading import Balanced, Reading, RecordedMotion
+from rhythmid.identify.plausibility import BETTER_UNIT, LEAST_UNIT_FACTOR
+from rhythmid.record.joint_record import JointRecord
+from rhythmid.report.quantity import number
+
+Readings = tuple[Reading, ...]
+CLEARLY = 0.5  # of what all efforts leave as declared, that another reading may leave at most
+FLOOR = 0.01  # of an effort, below which it does not matter how little is left
+HELPS = 0.05  # fall of the mean logarithm of what is left, by which a change has to help to be made, and not to be taken back
+POSITIONS = {True: (DEGREE, 1.0 / DEGREE), False: (1e-3, 1e3)}  # factors of joints that turn, and that slide
+
+
+def check_joints(machine: Machine, records: Sequence[JointRecord]) -> None:
+    """Raise InputError with the likely mend where the efforts fit the body only with another order, unit or sign of recorded joints."""
+    if (mend := likely_joint_mend(machine, records)) is not None:
+        raise InputError(mend)
+
+
+def likely_joint_mend(machine: Machine, records: Sequence[JointRecord]) -> str | None:
+    """What of the joints seems to be declared wrongly, and how to mend it, in one line; None where the efforts are plausible."""
+    if not records:
+        return None
+    record = max(records, key=_moved)
+    for touching in (False, True) if machine.body.contacts else (False,):
+        motion = RecordedMotion(machine, record, touching)
+        declared = motion.balanced(motion.as_declared)
+        if all(one.left <= POOR_MOTION for one in declared):
+            return None
+        for free in (False, True):
+            found = _searched(motion, free)
+            if found != motion.as_declared and _convinces(motion, found, declared):
+                return f"{record.name}: {_words(motion, found, declared)}"
+    return None
+
+
+def _moved(record: JointRecord) -> float:
+    """How much the joints of a record move, in each one's own unit."""
+    return float(sum(np.std(one.output.value) for one in record.joints.values()))
+
+
+def _score(balanced: Iterable[Balanced]) -> float:
+    """Mean logarithm of what is left of the efforts: one joint that comes right counts, whatever the others do."""
+    return float(np.mean([math.log(one.left + FLOOR) for one in balanced]))
+
+
+def _searched(motion: RecordedMotion, free: bool) -> Readings:
+    """The reading under which least is left of the efforts, with no more changes than help; with `free`, with each effort's factor."""
+
+    def score(readings: Readings) -> float:
+        return _score(motion.balanced(readings, free))
+
+    best = motion.as_declared
+    least = score(best)
+    while True:
+        tried = ((score(one), one) for one in _changed(motion, best, free))
+        found, reading = min(tried, key=lambda one: one[0])
+        if found > least - HELPS:
+            tried = ((score(one), one) for one in _cycled(best))
+            found, reading = min(tried, key=lambda one: one[0], default=(math.inf, best))
+        if found > least - HELPS:
+            break
+        best, least = reading, found
+    for place, given in enumerate(motion.as_declared):  # what has helped on the way may help no more
+        for one in (
+            replace(best[place], position=given.position),
+            replace(best[place], effort=given.effort),
+            replace(best[place], position=given.position, effort=given.effort),
+        ):
+            back = _with(best, place, one)
+            if back != best and score(back) < least + HELPS:
+                best, least = back, score(back)
+    return _in_units(motion, best) if free else best
+
+
+def _in_units(motion: RecordedMotion, readings: Readings) -> Readings:
+    """The reading with the factor that each effort needs where that is no physics."""
+    made = []
+    for joint, one, found in zip(motion.joints, readings, motion.balanced(readings, True), strict=True):
+        factor = 1.0 / found.gain if found.gain > 0.0 else 1.0
+        foreign = not 1.0 / LEAST_UNIT_FACTOR < factor < LEAST_UNIT_FACTOR
+        free = joint not in motion.computed
+        made.append(replace(one, effort=one.effort * factor) if foreign and free else one)
+    return tuple(made)
+
+
+def _with(readings: Readings, place: int, one: Reading) -> Readings:
+    return (*readings[:place], one, *readings[place + 1 :])
+
+
+def _changed(motion: RecordedMotion, readings: Readings, free: bool) -> Iterator[Readings]:
+    """Readings with one change more: of all joints, of one, or of two that are exchanged."""
+    turned = [replace(one, effort=-one.effort) for one in readings]
+    yield tuple(turned)
+    yield tuple(replace(one, position=-one.position) for one in readings)
+    for place in (0, 1):
+        yield tuple(
+            replace(one, position=one.position * POSITIONS[kind][place])
+            for one, kind in zip(readings, motion.rotational, strict=True)
+        )
+    for place, one in enumerate(readings):
+        sides = [(1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
+        factors = [*sides, *((factor, 1.0) for factor in POSITIONS[motion.rotational[place]])]
+        for position, effort in factors:
+            changed = replace(one, position=one.position * position, effort=one.effort * effort)
+            yield _with(readings, place, changed)
+    for places in combinations(range(len(readings)), 2):
+        yield _moved_round(readings, places)
+
+
+def _cycled(readings: Readings) -> Iterator[Readings]:
+    """Readings with three joints in another order."""
+    for one, other, third in combinations(range(len(readings)), 3):
+        yield _moved_round(readings, (one, other, third))
+        yield _moved_round(readings, (one, third, other))
+
+
+def _moved_round(readings: Readings, places: Sequence[int]) -> Readings:
+    """The reading with the sources of some joints moved on by one."""
+    made = list(readings)
+    for place, following in zip(places, (*places[1:], places[0]), strict=True):
+        made[place] = replace(readings[place], source=readings[following].source)
+    return tuple(made)
+
+
+def _convinces(motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]) -> bool:
+    """Whether a reading explains what the declared one does not, and does so by the body: an effort that a controller asks for against the
+    motion is, turned round, what a spring and a damper would need."""
+    left = motion.balanced(found)
+    changed = [k for k, (one, own) in enumerate(zip(found, motion.as_declared, strict=True)) if one != own]
+    before, after = (_rms(one.left for one in many) for many in (declared, left))
+    return (
+        after <= CLEARLY * before
+        and all(left[k].left <= POOR_MOTION for k in changed)
+        and max(left[k].left for k in changed) <= BETTER_UNIT * max(declared[k].left for k in changed)
+        and _rms(left[k].left for k in changed) <= CLEARLY * _rms(left[k].bare for k in changed)
+    )
+
+
+def _rms(values: Iterable[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(list(values)))))
+
+
+def _words(motion: RecordedMotion, found: Readings, declared: Sequence[Balanced]) -> str:
+    joints, left = motion.joints, motion.balanced(found)
+    said: list[str] = []
+    moved = [
+        f"{joint} is recorded as {joints[one.source]}"
+        for joint, one in zip(joints, found, strict=True)
+        if joints[one.source] != joint
+    ]
+    if moved:
+        said.append(f"the joints seem to be recorded in another order: {', '.join(moved)}; correct 'joints:'")
+    for channel in ("position", "effort"):
+        factors: dict[str, dict[str, float]] = {}
+        for joint, one, turns in zip(joints, found, motion.rotational, strict=True):
+            factor = getattr(one, channel)
+            if factor != 1.0:
+                factors.setdefault(_guess(channel, factor, turns), {})[joint] = factor
+        for guess, those in factors.items():
+            roles = "'effort:'" if channel == "effort" else "'output:'"
+            if channel == "position" and any(joint in motion.computed for joint in those):
+                roles += " and 'input:'"
+            names = "every joint" if len(those) == len(joints) else ", ".join(those)
+            said.append(f"the {channel} of {names} {guess}; write  {_scale(those, joints)}  under {roles}")
+    mirrored = tuple(replace(one, position=-one.position, effort=-one.effort) for one in found)
+    if any(one.position < 0.0 for one in found) and _score(motion.balanced(mirrored)) < _score(left) + HELPS:
+        said[-1] += " (or the same for the other joints: the mirrored machine moves alike)"
+    worst = max(range(len(joints)), key=lambda k: declared[k].left - left[k].left)
+    return (
+        f"{'; '.join(said)} in signals.yaml. The body then leaves {100.0 * left[worst].left:.0f} % of the effort at {joints[worst]} "
+        f"instead of {100.0 * declared[worst].left:.0f} %"
+    )
+
+
+def _scale(factors: Mapping[str, float], joints: Sequence[str]) -> str:
+    """The words of signals.yaml that multiply a channel of these joints by factors."""
+    written = {joint: _factor(factor) for joint, factor in factors.items()}
+    if len(written) == len(joints) and len(set(written.values())) == 1:
+        return f"scale: {written[joints[0]]}"
+    return f"scale: {{{', '.join(f'{joint}: {one}' for joint, one in written.items())}}}"
+
+
+def _factor(factor: float) -> str:
+    """A factor as it is written into signals.yaml."""
+    exact = any(abs(abs(factor) / one - 1.0) < 1e-9 for one in (DEGREE, 1.0 / DEGREE))
+    return f"{factor:.6g}" if exact else f"{float(f'{factor:.2g}'):g}"
+
+
+def _guess(channel: str, factor: float, turns: bool) -> str:
+    """What a channel that has to be multiplied by this factor seems to be."""
+    turned = " with its sign turned round" if factor < 0.0 else ""
+    size = abs(factor)
+    if size == 1.0:
+        return "seems to have its sign turned round"
+    unit = {("position", True): "rad", ("position", False): "m", ("effort", True): "N*m"}.get(
+        (channel, turns), "N"
+    )
+    for known, name in UNITS[unit].items():
+        if abs(size / known - 1.0) < NAMED:
+            return f"looks like {name}{turned}, where {unit} is declared"
+    times = f"{number(max(size, 1.0 / size), 1)} times too {'large' if size < 1.0 else 'small'}"
+    return (
+        f"seems to be in units about {times}{turned}, such as a motor's current in A where {unit} is declared"
+    )

@@ -1,0 +1,206 @@
+"""How recorded joints may be read: which is which, in which units and with which signs; and what a body then leaves of the efforts.
+
+Natural laws of a body do not forgive a wrong reading: gravity turns with the angles, and what moves one joint is felt at the others. So the
+body of the file is asked for its force along the motion as it would be under a reading, and each joint's effort is fitted with it and with
+the losses that no file knows: a rotor, a damper, a dry friction and a spring, none of which is negative, and a constant. A wrong sign of an
+effort would need negative ones.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.optimize import nnls
+
+from rhythmid.body.inertial_parameter import ARMATURE
+from rhythmid.body.machine import Machine
+from rhythmid.identify.inverse_dynamics.bandwidth import bandwidth_of_motion
+from rhythmid.identify.inverse_dynamics.motion import FINER, Stretch, low_pass
+from rhythmid.identify.joints.joint_motion import CLEAR
+from rhythmid.identify.joints.joint_stretch import NEAR, JointStretch, joint_stretches
+from rhythmid.model import Model
+from rhythmid.record.joint_record import JointRecord
+
+Array = NDArray[np.float64]
+POSES = 300  # at which readings are compared
+FEW = 60  # poses without contact, below which a reading is not judged
+NEIGHBOURS = 3  # poses across the reach of the filter at which contact is looked for
+LONGEST = 60.0  # [s] of a record that are looked at, from its start
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How one joint may have been recorded: as the joint number `source`, its position and its effort to be multiplied by factors.
+
+    An effort that was not recorded follows from the positions and has their factor.
+    """
+
+    source: int
+    position: float = 1.0
+    effort: float = 1.0
+
+
+@dataclass(frozen=True)
+class Balanced:
+    """What a body leaves of a joint's effort, as a share of its variation, and the `gain` of that effort over what the body asks for;
+    `bare` is what a spring, a damper and a dry friction leave by themselves."""
+
+    left: float
+    gain: float = 1.0
+    bare: float = 1.0
+
+
+class RecordedMotion:
+    """Poses of a record and the efforts at them, for whatever reading of the driven joints.
+
+    With `touching`, poses in contact under a reading are left out of it. Without, they are not looked for, which takes a fifth of the time.
+    """
+
+    def __init__(self, machine: Machine, record: JointRecord, touching: bool = False) -> None:
+        start, end = record.span
+        part = record.cut(start, min(end, start + LONGEST))
+        body = machine.body
+        self.joints = machine.joints
+        self.body, self._touching = body, touching
+        # contacts are looked for under each reading: degrees that are taken for radians put the feet anywhere
+        stretches = joint_stretches(replace(machine, body=replace(body, contacts=False)), [part])
+        self.computed = tuple(joint for joint in self.joints if joint in stretches[0].reference)
+        cut = _cut(machine, stretches)
+        found = [_sampled(machine, one, cut) for one in stretches]
+        every = max(1, sum(len(one.pose) for one in found) // POSES)
+        self._pose, self._rate, self._acceleration, self._effort = (
+            np.concatenate([getattr(one, name)[::every] for one in found])
+            for name in ("pose", "rate", "acceleration", "effort")
+        )
+        # poses before and after each, within the reach of the filter
+        near = [_near(len(one.pose), one.period, cut) for one in found]
+        self._beside = [
+            np.concatenate([one.pose[at[::every]] for one, at in zip(found, ats, strict=True)])
+            for ats in zip(*near, strict=True)
+        ]
+        own = [body.joints[joint] for joint in self.joints]
+        self._positions, self._velocities = [one.position for one in own], [one.velocity for one in own]
+        self.rotational = tuple(one.rotational for one in own)
+        self._armature = [body.parameters[f"{joint}.{ARMATURE}"] for joint in self.joints]
+
+    @cached_property
+    def as_declared(self) -> tuple[Reading, ...]:
+        """The reading that signals.yaml declares."""
+        return tuple(Reading(k) for k in range(len(self.joints)))
+
+    def balanced(self, readings: tuple[Reading, ...], free: bool = False) -> tuple[Balanced, ...]:
+        """What the body leaves of each joint's effort under a reading; with `free`, the effort may be in any unit."""
+        sources = [one.source for one in readings]
+        factors = np.array([one.position for one in readings])
+        clear = np.ones(len(self._pose), dtype=bool)
+        if self._touching:
+            beside = self._read(np.concatenate(self._beside), self._positions, sources, factors)
+            touched = self.body.touches(beside, NEAR).reshape(len(self._beside), -1)
+            clear = ~np.any(touched, axis=0)
+        if clear.sum() < min(FEW, len(clear)):
+            return tuple(Balanced(1.0) for _ in readings)
+        pose = self._read(self._pose[clear], self._positions, sources, factors)
+        rate, acceleration = (
+            self._read(one[clear], self._velocities, sources, factors)
+            for one in (self._rate, self._acceleration)
+        )
+        force = self.body.inverse(pose, rate, acceleration)
+        found = []
+        for place, one in enumerate(readings):
+            factor = one.position if self.joints[place] in self.computed else one.effort
+            own, a = self._velocities[place], acceleration[:, self._velocities[place]]
+            asked = force[:, own] - self._armature[place] * a  # without the rotor, which is fitted
+            effort = factor * self._effort[clear, one.source]
+            found.append(_fitted(effort, asked, pose[:, self._positions[place]], rate[:, own], a, free))
+        return tuple(found)
+
+    @staticmethod
+    def _read(values: Array, places: list[int], sources: list[int], factors: Array) -> Array:
+        made = values.copy()
+        made[:, places] = factors * values[:, [places[k] for k in sources]]
+        return made
+
+
+def _fitted(effort: Array, asked: Array, x: Array, v: Array, a: Array, free: bool) -> Balanced:
+    """What is left of an effort (n,) beside the force that a body asks for, losses fitted."""
+    losses = np.column_stack([v, np.sign(v), x])
+    columns = np.column_stack([losses, a, asked]) if free else np.column_stack([losses, a])
+    if np.ptp(effort) == 0.0 or not np.all(np.isfinite(asked)):
+        return Balanced(1.0)
+    values, left = _without_sign(columns, effort if free else effort - asked)
+    _, bare = _without_sign(losses, effort)
+    size = float(np.std(effort))
+    return Balanced(min(left / size, 1.0), float(values[-1]) if free else 1.0, min(bare / size, 1.0))
+
+
+def _without_sign(columns: Array, wanted: Array) -> tuple[Array, float]:
+    """Factors (p,), none negative, of the columns (n, p) that come nearest to what is wanted (n,) beside a constant, and the rms left."""
+    columns, wanted = columns - columns.mean(axis=0), wanted - wanted.mean()
+    norms = np.linalg.norm(columns, axis=0)
+    norms[norms == 0.0] = 1.0
+    values, missed = nnls(columns / norms, wanted)
+    return values / norms, float(missed) / math.sqrt(len(wanted))
+
+
+def _cut(machine: Machine, stretches: list[JointStretch]) -> float:
+    """Highest frequency [Hz] of the fastest joint's motion."""
+    found = []
+    for joint in machine.joints:
+        place = machine.body.joints[joint].position
+        raw = [
+            Stretch(s.record, s.name, s.time, s.pose[:, place], s.time, s.period, "force", "position")
+            for s in stretches
+        ]
+        found.append(bandwidth_of_motion(raw)[0])
+    return max(found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sampled:
+    """Poses, rates, accelerations (n, nv) and efforts (n, joints) of a stretch below the cut-off, a `period` [s] apart."""
+
+    pose: Array
+    rate: Array
+    acceleration: Array
+    effort: Array
+    period: float
+
+
+def _sampled(machine: Machine, stretch: JointStretch, cut: float) -> _Sampled:
+    every = max(1, int(1.0 / (FINER * cut * stretch.period)))
+    time = stretch.time[::every]
+    pose = low_pass(stretch.pose, stretch.period, cut)[::every]
+    rate = CubicSpline(time, pose).derivative()(time)
+    acceleration = CubicSpline(time, rate).derivative()(time)
+    effort = np.column_stack(
+        [_effort(machine.paths[joint], joint, stretch, place) for joint, place in _places(machine)]
+    )
+    effort = low_pass(effort, stretch.period, cut)[::every]
+    return _Sampled(pose, rate, acceleration, effort, stretch.period * every)
+
+
+def _places(machine: Machine) -> list[tuple[str, int]]:
+    return [(joint, machine.body.joints[joint].position) for joint in machine.joints]
+
+
+def _effort(model: Model, joint: str, stretch: JointStretch, place: int) -> Array:
+    """Effort (n,) of a joint, or what its controller's known gains make of the reference."""
+    if joint in stretch.effort:
+        return stretch.effort[joint]
+    x = stretch.pose[:, place]
+    v = np.gradient(x, stretch.time)
+    asked, total = stretch.reference[joint], np.zeros(len(x))
+    for term in model.terms:
+        if term.element.acts == "feedback" and term.element.kernel is not None:
+            total = term.element.kernel(asked, x, v, stretch.time, **term.numbers)
+    return total + stretch.forward.get(joint, 0.0)
+
+
+def _near(length: int, period: float, cut: float) -> tuple[NDArray[np.intp], ...]:
+    """Of each sample of a stretch the places of itself and of those within the reach of its filter, on either side."""
+    reach = math.ceil(CLEAR / (cut * period))
+    steps = np.unique(np.linspace(-reach, reach, NEIGHBOURS).astype(int))
+    return tuple(np.clip(np.arange(length) + step, 0, length - 1) for step in steps)
