@@ -185,3 +185,42 @@ def test_estimates_print_to_their_digits_at_any_width(width):
     print_estimates(console, "t", {"k": {"value": 200.00069, "std": 0.00047, "unit": "N/m"}}, "name")
     assert isinstance(console.file, io.StringIO)
     assert "200.00069" in console.file.getvalue() and "0.00047" in console.file.getvalue()
+
+
+WITHOUT_JSON = {"export", "proof", "run"}  # what they write is for machines already
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name not in WITHOUT_JSON])
+def test_every_answer_can_be_had_as_json(name):
+    one = typer.main.get_command(app).commands[name]
+    assert any("--json" in parameter.opts for parameter in one.params)
+
+
+def test_init_and_convert_tell_their_guesses_as_json(command, tmp_path):
+    time = 0.01 * np.arange(400)
+    rows = np.column_stack([time, np.sin(3.0 * time), np.sin(3.0 * time + 0.8)])
+    np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header="t,torque,angle", comments="")
+    begun = command("init", "run.csv", "--yes", "--json", "-")
+    told = json.loads(begun.out)
+    assert {role: one["channel"] for role, one in told["roles"].items()} == {
+        "output": "angle",
+        "input": "torque",
+    }
+    assert told["nominal"]["inertia.mass"]["unit"] == "kg*m^2" and told["files"]["model"] == "model.yaml"
+    assert told["roles"]["output"]["reason"] and "go on with" in begun.err
+    made = json.loads(command("convert", "run.csv", "--out", "bag", "--json", "-").out)
+    assert made["samples"] == {"output": 400, "input": 400} and made["path"] == "bag"
+    assert made["guessed"]["roles"]["input"]["channel"] == "torque"
+    saved = json.loads(command("recover", "bag", "--json", "-").out)
+    assert (
+        saved["path"] == "bag_recovered" and set(saved["recovered"].values()) == {400} and saved["lost"] == {}
+    )
+
+
+def test_simulate_tells_what_it_wrote_as_json(command, tmp_path):
+    rh.paper_hopper().save(tmp_path / "model.yaml")
+    (tmp_path / "experiment.yaml").write_text("model: model.yaml\nexcitation: {type: silence, length: 0.5}\n")
+    told = command(
+        "simulate", "model.yaml", "--experiment", "experiment.yaml", "--out", "bag", "--json", "-"
+    ).out
+    assert json.loads(told)["path"] == "bag" and json.loads(told)["topics"]
