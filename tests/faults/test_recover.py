@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from read_back import by_us, require_readable_by_others
 
 from rhythmid.errors import InputError
+from rhythmid.record.bag import Bag
 from rhythmid.record.bag_report import quality_report
-from rhythmid.record.bag_writer import BagWriter, add_topic
+from rhythmid.record.bag_writer import BagWriter, add_topic, new_bag
 from rhythmid.record.mcap_writer import CHUNK
 from rhythmid.record.messages import Messages
 from rhythmid.record.recover import recover
@@ -120,6 +121,69 @@ def test_behind_a_broken_chunk_the_next_one_is_found_and_the_loss_is_counted(dam
     expected = [row for row in sorted(by_us(whole["mcap"])) if not 4 * PART <= row[1] / 1e6 < 5 * PART]
     assert kept == expected
     require_readable_by_others(tmp_path / "out")
+
+
+BEGINNINGS = {  # what stands in the place of the first bytes of a file
+    "zeros": bytes(1024),
+    "another file": b"PK\x03\x04" + bytes(range(252)) * 4,
+    "no magic": bytes(8),
+    "a header too long": b"\x89MCAP0\r\n\x01" + struct.pack("<Q", 300),
+}
+
+
+@pytest.mark.parametrize("beginning", BEGINNINGS)
+def test_a_file_whose_beginning_is_damaged_is_read_from_its_first_whole_chunk_on(
+    beginning, spoilt, whole, tmp_path
+):
+    bag = spoilt("mcap", lambda data: BEGINNINGS[beginning] + data[len(BEGINNINGS[beginning]) :])
+    done = recover(bag, tmp_path / "out")
+    first = 0 if len(BEGINNINGS[beginning]) < 20 else PART  # a chunk with a wrong checksum is left out
+    assert any("first" in note and "damaged" in note for note in done.notes)
+    assert dict(done.lost) == (dict.fromkeys(TOPICS, first) if first else {})
+    assert sorted(by_us(tmp_path / "out")) == [
+        row for row in sorted(by_us(whole["mcap"])) if row[1] / 1e6 >= first
+    ]
+    require_readable_by_others(tmp_path / "out")
+
+
+def test_messages_whose_topic_nothing_names_any_more_are_counted(spoilt, tmp_path):
+    bag = spoilt("mcap", lambda data: bytes(1024) + data[1024 : chunks(data)[5]])
+    (bag / "metadata.yaml").unlink()
+    with pytest.raises(InputError, match="no readable message"):
+        recover(bag, tmp_path / "out")
+    (note,) = [note for note in quality_report(bag).notes if "channel 1" in note]
+    assert f"{4 * PART} messages" in note and "lost" in note
+
+
+@pytest.mark.parametrize("beginning", ["zeros", "another file", "no magic", "a page"])
+def test_a_database_whose_beginning_is_damaged_is_read_page_by_page(beginning, spoilt, whole, tmp_path):
+    bytes_ = BEGINNINGS.get(beginning, bytes(4096))
+    done = recover(spoilt("sqlite3", lambda data: bytes_ + data[len(bytes_) :]), tmp_path / "out")
+    assert not done.lost and any("page by page" in note for note in done.notes)
+    assert sorted(by_us(tmp_path / "out")) == sorted(by_us(whole["sqlite3"]))
+    require_readable_by_others(tmp_path / "out")
+
+
+def test_a_database_without_its_beginning_and_a_page_more_tells_what_it_lost(spoilt, whole, tmp_path):
+    def change(data):
+        at = data.index(VALUES[N // 2].tobytes()) // 4096 * 4096
+        data[at : at + 4096] = data[:4096] = bytes(4096)
+
+    done = recover(spoilt("sqlite3", change), tmp_path / "out")
+    assert 0 < sum(done.lost.values()) < 100 and any("are lost" in note for note in done.notes)
+    kept, sent = by_us(tmp_path / "out"), set(by_us(whole["sqlite3"]))
+    assert set(kept) < sent and len(kept) == 2 * N - sum(done.lost.values())
+
+
+def test_rows_longer_than_a_page_come_back_from_a_damaged_database(tmp_path):
+    with new_bag(tmp_path / "bag", "sqlite3") as writer:
+        connection = add_topic(writer, "/text", "std_msgs/msg/String")
+        sent = [bytes([0, 1, 0, 0]) + np.random.default_rng(k).bytes(1500 * k) for k in range(12)]
+        for k, data in enumerate(sent):
+            writer.write(connection, k, data)
+    (file,) = (tmp_path / "bag").glob("*.db3")
+    file.write_bytes(bytes(4096) + file.read_bytes()[4096:])
+    assert [data for block in Bag(tmp_path / "bag").blocks() for data in block] == sent
 
 
 def test_of_a_database_with_a_broken_page_all_other_pages_are_read(spoilt, whole, tmp_path):

@@ -1,6 +1,7 @@
 """`rhythmid check` tells what analyses will do with a recording: what is left out, how much and why, and where it is cut."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,11 @@ import pytest
 from rhythmid.diagnose.admission import admitted
 from rhythmid.model import Model
 from rhythmid.record.bag_report import BagReport, quality_report
+from rhythmid.record.bag_writer import write_bag
+from rhythmid.record.messages import Messages
+from rhythmid.record.quality import ChannelQuality
 from rhythmid.record.read import read_record
+from rhythmid.record.timing import Timing
 
 N = 4000
 TIME = 0.005 * np.arange(N)
@@ -205,3 +210,42 @@ def test_a_spring_that_the_effort_stretches_and_a_free_motion_are_not(tmp_path, 
     effort = stiffness * Y if stiffness else U
     report = quality_report(table(tmp_path, effort, Y), tmp_path / "signals.yaml")
     assert not any("copy" in one for one in report.notes)
+
+
+class TestStrict:
+    """`rhythmid check --strict`: exit code 1 where anything may change an answer."""
+
+    @pytest.mark.parametrize(("spoil", "code"), [(False, 0), (True, 1)])
+    def test_a_recording_with_samples_that_are_left_out_fails_and_a_flawless_one_does_not(
+        self, spoil, code, spoilt, command, tmp_path
+    ):
+        rng = np.random.default_rng(3)
+        run = table(tmp_path, U, (spoilt if spoil else Y) + 1e-5 * rng.standard_normal(N))
+        given = ("check", run, "--signals", tmp_path / "signals.yaml")
+        assert command(*given).code == 0
+        answer = command(*given, "--strict", "--json", "-")
+        assert answer.code == code and bool(json.loads(answer.out)["matters"]) == spoil
+        assert ("--strict: 1 of the remarks may change an answer" in answer.err) == spoil
+
+    def test_what_changes_no_answer_does_not_matter(self):
+        timing = Timing.of(0.01 * np.array([0, 1, 2, 4, 3, 5, 6, 6, 7]))
+        quality = ChannelQuality("a", timing, missing=3)
+        assert len(quality.complaints()) == 3 and quality.matters() == []
+        assert len(replace(quality, conflicts=1).matters()) == 1
+
+    def test_a_recording_that_cannot_be_used_has_exit_code_2(self, command, tmp_path):
+        assert command("check", tmp_path / "nothing", "--strict").code == 2
+
+    def test_clocks_that_are_taken_for_one_are_told_but_do_not_matter(self, tmp_path):
+        bag = write_bag(
+            tmp_path / "bag",
+            {
+                "/u": Messages((1e9 * TIME).astype(np.int64), effort=U),
+                "/y": Messages((1e9 * TIME).astype(np.int64), Y),
+            },
+        )
+        (tmp_path / "s.yaml").write_text(
+            "time: header\ninput: {topic: /u, field: 'effort[0]', time: receive}\noutput: {topic: /y, field: 'position[0]'}\n"
+        )
+        report = quality_report(bag, tmp_path / "s.yaml")
+        assert any(note.startswith("assumed: ") for note in report.notes) and report.matters == []

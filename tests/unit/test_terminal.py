@@ -8,6 +8,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +16,15 @@ import typer
 from rich.console import Console
 
 import rhythmid as rh
+from rhythmid.batch.agreement import Agreement
+from rhythmid.batch.batch import Batch
+from rhythmid.batch.scatter import Slope
 from rhythmid.cli import app
 from rhythmid.commands.begin import BEGIN
+from rhythmid.commands.terminal import console
 from rhythmid.output import STANDARD_OUTPUT, require_new, write_json
-from rhythmid.report.terminal_table import estimate_cells, print_estimates, print_table
+from rhythmid.record.record import Channel
+from rhythmid.report.terminal_table import estimate_cells, print_estimates, print_markdown, print_table
 
 COMMANDS = (*typer.main.get_command(app).commands, "run")  # `run` is in a package of its own
 NARROW = 40
@@ -180,6 +186,83 @@ def test_a_table_fits_its_terminal_and_loses_nothing(width):
     assert ("━" in text) == (width > NARROW)
 
 
+def test_all_tables_are_printed_by_the_one_function_that_fits_them_to_the_terminal():
+    root = Path(rh.__file__).parent
+    found = {
+        file.relative_to(root).as_posix()
+        for file in root.rglob("*.py")
+        if re.search(
+            r"^\s*from rich\.(table import Table|markdown)", file.read_text(encoding="utf-8"), re.MULTILINE
+        )
+    }
+    assert found == {"report/terminal_table.py"}
+
+
+@pytest.mark.parametrize("width", [40, 80])
+def test_a_text_with_tables_fits_its_terminal_and_loses_nothing(width):
+    console = Console(file=io.StringIO(), width=width)
+    print_markdown(
+        console,
+        "# Card\n\nRates with intervals.\n\n| concealed | answered |\n| --- | --- |\n"
+        "| `coulomb_friction` | coulomb friction: 12, coulomb friction + stribeck friction: 3, undecided: 4 |\n",
+    )
+    assert isinstance(console.file, io.StringIO)
+    text = console.file.getvalue()
+    assert max(map(len, text.splitlines())) <= width and "…" not in text and "|" not in text
+    assert (
+        "answered" in text and " ".join(text.split()).endswith("undecided: 4") and "coulomb_friction" in text
+    )
+
+
+FRAMES = set("━─│┃")  # characters that frame tables
+
+
+def swings() -> list[rh.Record]:
+    """Two records of a pushed mass on a spring."""
+    time = 0.01 * np.arange(600)
+    push = np.sin(3.0 * time) + np.sin(7.0 * time)
+    shift = (np.sin(3.0 * time - 0.1) / 51.0) + np.sin(7.0 * time - 0.9) / 16.0
+    noise = 1e-4 * np.random.default_rng(1).standard_normal((2, 600))
+    return [
+        rh.Record(name, Channel(time, shift + own, "m"), Channel(time, push, "N"))
+        for name, own in zip(("one", "two"), noise, strict=True)
+    ]
+
+
+def compared() -> Batch:
+    """A batch whose one parameter differs between rigs."""
+    one = Agreement(
+        "identify", "linear_spring.stiffness", "N/m", (None, None, None), 0, ("A", "B"), 60.1, 0.2, 0.1, 1.1, 0.4, 0.001,
+        Slope(0.1, 0.05, 0.06, 3), "day", ("rig to rig",),
+    )  # fmt: skip
+    return Batch((), (one,), Path("week"))
+
+
+def test_tables_fit_any_terminal_and_without_one_lines_are_whole(monkeypatch, capsys):
+    model = rh.Model.from_text(
+        "inertia: {mass: {value: 1.0, unit: kg, fixed: true}}\nforce:\n  - linear_spring: {stiffness: {value: 60.0, unit: N/m}}\n"
+        "  - viscous_damper: {damping: {value: 1.5, unit: N*s/m}}\n"
+    )
+    first, second = swings()
+    results = {
+        "identify": rh.identify(first, model),
+        "compare": rh.compare(first, second),
+        "batch": compared(),
+    }
+    for name, found in results.items():
+        for columns in ("40", "80"):
+            monkeypatch.setenv("COLUMNS", columns)
+            found.show(console())
+            text = capsys.readouterr().out
+            assert "…" not in text and max(map(len, text.splitlines())) <= int(columns), name
+            assert columns == "80" or not set(text) & FRAMES
+        monkeypatch.delenv("COLUMNS")
+        found.show(console())
+        text = capsys.readouterr().out
+        assert "…" not in text and max(map(len, text.splitlines())) > 80, name
+        assert name == "compare" or set(text) & FRAMES
+
+
 def test_digits_follow_the_standard_deviation():
     assert estimate_cells(199.99612345, 0.00123) == ("199.9961", "0.0012")
     assert estimate_cells(1234.5, 210.0) == ("1230", "210")
@@ -193,3 +276,42 @@ def test_estimates_print_to_their_digits_at_any_width(width):
     print_estimates(console, "t", {"k": {"value": 200.00069, "std": 0.00047, "unit": "N/m"}}, "name")
     assert isinstance(console.file, io.StringIO)
     assert "200.00069" in console.file.getvalue() and "0.00047" in console.file.getvalue()
+
+
+WITHOUT_JSON = {"export", "proof", "run"}  # what they write is for machines already
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name not in WITHOUT_JSON])
+def test_every_answer_can_be_had_as_json(name):
+    one = typer.main.get_command(app).commands[name]
+    assert any("--json" in parameter.opts for parameter in one.params)
+
+
+def test_init_and_convert_tell_their_guesses_as_json(command, tmp_path):
+    time = 0.01 * np.arange(400)
+    rows = np.column_stack([time, np.sin(3.0 * time), np.sin(3.0 * time + 0.8)])
+    np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header="t,torque,angle", comments="")
+    begun = command("init", "run.csv", "--yes", "--json", "-")
+    told = json.loads(begun.out)
+    assert {role: one["channel"] for role, one in told["roles"].items()} == {
+        "output": "angle",
+        "input": "torque",
+    }
+    assert told["nominal"]["inertia.mass"]["unit"] == "kg*m^2" and told["files"]["model"] == "model.yaml"
+    assert told["roles"]["output"]["reason"] and "go on with" in begun.err
+    made = json.loads(command("convert", "run.csv", "--out", "bag", "--json", "-").out)
+    assert made["samples"] == {"output": 400, "input": 400} and made["path"] == "bag"
+    assert made["guessed"]["roles"]["input"]["channel"] == "torque"
+    saved = json.loads(command("recover", "bag", "--json", "-").out)
+    assert (
+        saved["path"] == "bag_recovered" and set(saved["recovered"].values()) == {400} and saved["lost"] == {}
+    )
+
+
+def test_simulate_tells_what_it_wrote_as_json(command, tmp_path):
+    rh.paper_hopper().save(tmp_path / "model.yaml")
+    (tmp_path / "experiment.yaml").write_text("model: model.yaml\nexcitation: {type: silence, length: 0.5}\n")
+    told = command(
+        "simulate", "model.yaml", "--experiment", "experiment.yaml", "--out", "bag", "--json", "-"
+    ).out
+    assert json.loads(told)["path"] == "bag" and json.loads(told)["topics"]

@@ -15,6 +15,7 @@ EXAMPLES = (
     "rhythmid check small.csv large.csv --signals signals.yaml",
     "rhythmid check run.csv --signals signals.yaml --model model.yaml",
     "rhythmid check bag --report page.html",
+    "rhythmid check bag --strict --quiet",
 )
 
 
@@ -33,6 +34,10 @@ def check(
         ),
     ] = None,
     elements: Elements = None,
+    strict: Annotated[
+        bool,
+        typer.Option("--strict", help="Exit code 1 if a recording has anything that may change an answer."),
+    ] = False,
     json: JsonFile = None,
     report: ReportFile = None,
     quiet: Quiet = False,
@@ -40,6 +45,7 @@ def check(
     """Report data quality: topics, rates, gaps, duplicates, jitter, clock. Exit code 2 if a recording cannot be used.
 
     Several recordings are reported one after the other, and the JSON is then a list. With --model, a last line says what the model is.
+    With --strict, exit code 1 if a recording has gaps, samples that are left out, damage, or anything else that may change an answer.
     """
     from rhythmid.errors import InputError
     from rhythmid.progress_bar import progress
@@ -68,7 +74,8 @@ def check(
         for line in found.lines():
             terminal.say(line)
     records = [found.record for found in made if found.usable and found.record is not None]
-    for line in elsewhere_notes(records):
+    elsewhere = elsewhere_notes(records)
+    for line in elsewhere:
         terminal.say(f"note: {line}")
     try:
         if model is not None:
@@ -91,3 +98,7 @@ def check(
         terminal.say(f"report: {report}")
     if refused:
         raise InputError("; ".join(refused))
+    matters = [*(line for found in made for line in found.matters), *elsewhere]
+    if strict and matters:
+        terminal.say(f"--strict: {len(matters)} of the remarks may change an answer, the first: {matters[0]}")
+        raise typer.Exit(1)

@@ -1,14 +1,14 @@
 """`rhythmid convert`: a table as a bag."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from rhythmid.commands.options import Quiet, SignalsFile
+from rhythmid.commands.options import JsonFile, Quiet, SignalsFile
 from rhythmid.commands.terminal import Terminal
 from rhythmid.errors import InputError
-from rhythmid.output import require_new
+from rhythmid.output import require_new, write_json
 
 EXAMPLES = (
     "rhythmid convert run.csv --out bag",
@@ -28,6 +28,7 @@ def convert(
         float | None,
         typer.Option("--rate", metavar="HZ", help="Sample rate of the table, if it has no column of times."),
     ] = None,
+    json: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Write a table as a rosbag2 (MCAP) of joint states, with a signals.yaml inside that reads it back.
@@ -40,12 +41,14 @@ def convert(
     from rhythmid.record.signals import Signals
     from rhythmid.start.start import guess
 
-    require_new(out)
-    terminal = Terminal(quiet)
+    require_new(out, json)
+    terminal = Terminal(quiet, json)
     if is_bag(table):
         raise InputError(f"{table}: is a bag already; convert takes a table")
+    told: dict[str, Any] = {}
     if signals is None and table.suffix not in (".yaml", ".yml"):
         guessed = guess(table, rate=rate)
+        told = guessed.to_dict()
         for line in guessed.lines():
             terminal.say(line)
         record = read_record(table, Signals.from_text(guessed.signals))
@@ -53,3 +56,7 @@ def convert(
         record = read_record(table, signals)
     write_record(record, out, joint)
     terminal.say(f"{out}: {', '.join(record.channels)}; read it with --signals {out / 'signals.yaml'}")
+    if json is not None:
+        samples = {role: len(channel) for role, channel in record.channels.items()}
+        files = {"path": str(out), "signals": str(out / "signals.yaml")}
+        write_json(json, {**files, "joint": joint, "samples": samples, "guessed": told})

@@ -9,10 +9,10 @@ from typing import Annotated
 
 import typer
 
-from rhythmid.commands.options import Elements, Quiet
+from rhythmid.commands.options import Elements, JsonFile, Quiet
 from rhythmid.commands.terminal import Terminal
 from rhythmid.errors import InputError
-from rhythmid.output import require_new, require_writable, write_text
+from rhythmid.output import STANDARD_OUTPUT, require_new, require_writable, write_json, write_text
 
 EXAMPLES = (
     "rhythmid init run.csv",
@@ -43,6 +43,7 @@ def init(
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite files that exist.")] = False,
     elements: Elements = None,
+    json: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Guess what each channel is and a first nominal model; write both, every guess with its reason."""
@@ -51,6 +52,7 @@ def init(
     if rate is not None and not (math.isfinite(rate) and rate > 0.0):
         raise InputError("--rate is a number of rows a second, greater than 0")
     signals, model = out / "signals.yaml", out / "model.yaml"
+    require_new(json)
     for path in (signals, model):
         require_writable(path) if force else require_new(path)
     if body is not None and joint is not None:
@@ -64,11 +66,11 @@ def init(
         from rhythmid.start.roles import first_answer
         from rhythmid.start.start import start
 
-        asking = not yes and not quiet and sys.stdin.isatty()
+        asking = not yes and not quiet and json != STANDARD_OUTPUT and sys.stdin.isatty()
         begun = start(sources, joint, rate, _prompt if asking else first_answer, known)
     write_text(signals, begun.signals)
     write_text(model, begun.model)
-    terminal = Terminal(quiet)
+    terminal = Terminal(quiet, json)
     for line in begun.lines():
         terminal.say(line)
     terminal.say(f"{signals}, {model}: every guess is a comment there; go on with")
@@ -76,6 +78,8 @@ def init(
     terminal.say(f"  {shlex.join(['rhythmid', 'check', *map(str, sources), *with_signals])}")
     diagnosis = ["rhythmid", "diagnose", *map(str, sources), *with_signals, "--model", str(model)]
     terminal.say(f"  {shlex.join(diagnosis)}")
+    if json is not None:
+        write_json(json, {"files": {"signals": str(signals), "model": str(model)}, **begun.to_dict()})
 
 
 def _prompt(question: str, answers: Sequence[str]) -> int:

@@ -41,26 +41,21 @@ def design_files(
 
 def show(found: "JointDesign", console: "Console") -> None:
     """Print a design: references, and every parameter with its predicted standard deviation."""
-    from rich.markup import escape
-    from rich.table import Table
+    from rhythmid.report.terminal_table import print_table
 
-    table = Table(title="references")
-    for column in ("joint", "middle", "rms", "largest force"):
-        table.add_column(column)
-    for joint, one in found.excitation.items():
-        table.add_row(joint, f"{one['offset']:.3g}", f"{one['rms']:.3g}", f"{found.peak[joint]:.3g}")
-    console.print(table)
-    table = Table(title="predicted standard deviations")
-    for column in ("parameter", "value", "std", "unit"):
-        table.add_column(column)
-    for name, one in found.parameters.items():
-        table.add_row(name, rounded(one.value, one.std), f"{one.std:.2g}", escape(one.unit))
+    references = [
+        (joint, f"{one['offset']:.3g}", f"{one['rms']:.3g}", f"{found.peak[joint]:.3g}")
+        for joint, one in found.excitation.items()
+    ]
+    print_table(console, "references", ("joint", "middle", "rms", "largest force"), references)
+    rows = [
+        (name, rounded(one.value, one.std), f"{one.std:.2g}", one.unit)
+        for name, one in found.parameters.items()
+    ]
     for base in found.inertia.base:
         beside = "".join(f" {factor:+.3g} {name}" for name, factor in base.beside.items())
-        table.add_row(
-            escape(base.name + beside), rounded(base.value, base.std), f"{base.std:.2g}", escape(base.unit)
-        )
-    console.print(table)
+        rows.append((base.name + beside, rounded(base.value, base.std), f"{base.std:.2g}", base.unit))
+    print_table(console, "predicted standard deviations", ("parameter", "value", "std", "unit"), rows)
     console.print(
         f"{found.inertia.rank} of {found.inertia.count} inertial parameters, or combinations of them, will be seen; condition "
         f"{found.inertia.condition:.3g}"

@@ -157,7 +157,12 @@ def identify_files(
 
 
 def simulate_files(
-    model: Path, experiment: Path, out: Path, elements: Sequence[Path], terminal: "Terminal"
+    model: Path,
+    experiment: Path,
+    out: Path,
+    elements: Sequence[Path],
+    json: Path | None,
+    terminal: "Terminal",
 ) -> None:
     """Run an experiment with the machine of several joints in a model file, and write its bag."""
     from rhythmid.body.joint_run import run_experiment
@@ -167,3 +172,5 @@ def simulate_files(
     made = run_experiment(Machine.load(model, load_catalogue(elements)), experiment)
     made.save(out)
     terminal.say(f"{out}: {made.headline} of {', '.join(made.messages.topics)}")
+    if json is not None:
+        write_json(json, {"path": str(out), **made.to_dict()})

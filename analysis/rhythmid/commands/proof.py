@@ -51,7 +51,6 @@ def proof(
     quiet: Quiet = False,
 ) -> None:
     """Draw random machines with concealed effects, seal the truth, diagnose their records, open the seals and score the answers."""
-    from rich.markdown import Markdown
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -62,6 +61,7 @@ def proof(
     )
 
     from rhythmid.proof.campaign import Campaign, Sealed, Task, begin, carry_out, scores_in, write_card
+    from rhythmid.report.terminal_table import print_markdown
 
     def chosen(campaign: Campaign) -> list[Task]:
         tasks = campaign.tasks
@@ -103,7 +103,7 @@ def proof(
 
         failures = carry_out(out, tasks, jobs, report, keep)
     write_card(out, campaign)
-    console.print(Markdown((out / "proof.md").read_text(encoding="utf-8")))
+    print_markdown(console, (out / "proof.md").read_text(encoding="utf-8"))
     for name, failure in failures.items():
         console.print(f"[red]{name} could not be done:[/] {failure}", highlight=False, soft_wrap=True)
     console.print(f"{out / 'proof.md'}, {out / 'proof.json'}")
@@ -113,13 +113,12 @@ def proof(
 
 def _replay(out: Path, console: "Console", chosen) -> None:
     """Score kept answers of the campaign that the folder holds."""
-    from rich.markdown import Markdown
-
     from rhythmid.proof.campaign import read_campaign
     from rhythmid.proof.replay import replay_campaign
+    from rhythmid.report.terminal_table import print_markdown
 
     campaign = read_campaign(out)
     scores, anew = replay_campaign(out, campaign, chosen(campaign))
-    console.print(Markdown((out / "replay.md").read_text(encoding="utf-8")))
+    print_markdown(console, (out / "replay.md").read_text(encoding="utf-8"))
     console.print(f"{len(scores)} answers scored, {anew} of them decided anew from their evidence")
     console.print(f"{out / 'replay.md'}, {out / 'replay.json'}")

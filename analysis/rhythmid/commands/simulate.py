@@ -6,9 +6,9 @@ from typing import Annotated
 import typer
 
 from rhythmid.commands import machines
-from rhythmid.commands.options import Elements, Quiet
+from rhythmid.commands.options import Elements, JsonFile, Quiet
 from rhythmid.commands.terminal import Terminal
-from rhythmid.output import require_new
+from rhythmid.output import require_new, write_json
 
 EXAMPLES = (
     "rhythmid simulate model.yaml --experiment experiment.yaml --out bag",
@@ -24,21 +24,24 @@ def simulate(
         bool, typer.Option("--all-topics", help="Also record the true output and the command as it acts.")
     ] = False,
     elements: Elements = None,
+    json: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Run an experiment without ROS, and write the bag that the ROS graph would record."""
     from rhythmid.offline_run import simulate as run
     from rhythmid.progress_bar import progress
 
-    require_new(out)
+    require_new(out, json)
+    terminal = Terminal(quiet, json)
     if machines.is_machine(model):
         machines.refuse(all_topics=all_topics)
-        machines.simulate_files(model, experiment, out, elements or (), Terminal(quiet))
+        machines.simulate_files(model, experiment, out, elements or (), json, terminal)
         return
-    terminal = Terminal(quiet)
     with progress(terminal.progress, log=False) as tell:
         tell("simulating")
         found = run(model, experiment, elements or ())
         tell("writing the bag")
         found.save(out, all_topics)
     terminal.say(f"{out}: {found.headline} of {', '.join(found.topics(all_topics))}")
+    if json is not None:
+        write_json(json, {"path": str(out), **found.to_dict()})

@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
-from rhythmid.commands.options import Quiet
+from rhythmid.commands.options import JsonFile, Quiet
 from rhythmid.commands.terminal import Terminal
+from rhythmid.output import require_new, write_json
 
 EXAMPLES = (
     "rhythmid split episodes.parquet --out episodes",
@@ -22,6 +23,7 @@ def split(
         str | None,
         typer.Option("--by", metavar="COLUMN", help="Column that numbers the recordings."),
     ] = None,
+    json: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
     """Write each recording of a table that holds several, one below the other or in a struct array, as a table of its own (.npz).
@@ -34,6 +36,7 @@ def split(
     from rhythmid.record.split import split as write
     from rhythmid.record.table import Table
 
+    require_new(json)
     found = Table.load(table)
     runs = grouped_runs(found) if by is None else None
     if runs is not None:
@@ -41,6 +44,8 @@ def split(
     else:
         why, rows = recordings(found, by)
         made = write(found, rows, out)
-    terminal = Terminal(quiet)
+    terminal = Terminal(quiet, json)
     terminal.say(f"{out}: {len(made)} recordings by {why}; go on with")
     terminal.say(f"  rhythmid init {made[0]}")
+    if json is not None:
+        write_json(json, {"path": str(out), "told_apart_by": why, "tables": [str(one) for one in made]})

@@ -1,27 +1,39 @@
 """Where a command prints: its answer, its progress, and its JSON where that goes to standard output."""
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rhythmid.output import STANDARD_OUTPUT
 
 if TYPE_CHECKING:
-    pass
+    from rich.console import Console
+
+WHOLE = 100_000  # columns where nobody says how many there are, as in a file: no line is that long
 
 
 class Terminal:
     """Consoles of one command.
 
     `answer` prints the result, on standard error where standard output carries JSON; `progress` prints what is under way, on
-    standard error. Both are silent where the command is `quiet`.
+    standard error. Both are silent where the command is `quiet`. They break lines to the width of the terminal, or to COLUMNS; where
+    there is neither, each line is printed whole.
     """
 
     def __init__(self, quiet: bool = False, json: Path | None = None) -> None:
-        from rich.console import Console
-
-        self.answer: Console = Console(quiet=quiet, stderr=json == STANDARD_OUTPUT)
-        self.progress: Console = Console(quiet=quiet, stderr=True)
+        self.answer: Console = console(quiet, json == STANDARD_OUTPUT)
+        self.progress: Console = console(quiet, stderr=True)
 
     def say(self, line: str) -> None:
         """Print one line of the answer as it is; a long one is not broken."""
         self.answer.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def console(quiet: bool = False, stderr: bool = False) -> "Console":
+    """A console on standard output or standard error, as wide as whoever reads it."""
+    from rich.console import Console
+
+    made = Console(quiet=quiet, stderr=stderr)
+    if not made.is_terminal and not os.environ.get("COLUMNS"):
+        made.width = WHOLE
+    return made

@@ -80,6 +80,7 @@ class BagReport:
     damage : those of the notes that tell damage of the files; empty for a whole recording.
     record : what could be read; None if it cannot be used as mapped.
     left_out : samples that no analysis will use, one entry for each reason; the notes tell of them, too.
+    assumed : those of the notes that tell what the signals.yaml takes for granted.
     columns : how many columns of tables are read, the time's too; 0 for a bag.
     cut : the record as an analysis will take it, cut where commands are missing; None if it cannot be used.
     """
@@ -97,6 +98,7 @@ class BagReport:
     left_out: tuple[LeftOut, ...] = ()
     cut: Cut | None = None
     columns: int = 0
+    assumed: tuple[str, ...] = ()
 
     @property
     def remarks(self) -> list[str]:
@@ -105,6 +107,14 @@ class BagReport:
             f"{role}: {one}" for role, channel in self.channels.items() for one in channel.complaints()
         ]
         return [*self.notes, *complaints]
+
+    @property
+    def matters(self) -> list[str]:
+        """Those of the remarks by which an answer may change, one line each: what `check --strict` fails on."""
+        complaints = [
+            f"{role}: {one}" for role, channel in self.channels.items() for one in channel.matters()
+        ]
+        return [*self.problems, *(note for note in self.notes if note not in self.assumed), *complaints]
 
     @property
     def usable(self) -> bool:
@@ -124,6 +134,7 @@ class BagReport:
             "problems": list(self.problems),
             "notes": list(self.notes),
             "damage": list(self.damage),
+            "matters": self.matters,
             "left_out": [one.to_dict() for one in self.left_out],
             "cut": None if self.cut is None else {
                 "gaps": [list(gap) for gap in self.cut.gaps],
@@ -182,6 +193,7 @@ def quality_report(
     channels: dict[str, ChannelQuality] = {}
     problems: list[str] = []
     notes: list[str] = []
+    assumed: list[str] = []
     duration, record, left_out, cut = 0.0, None, (), None
     try:
         parts: dict[str, Record] = {}
@@ -196,6 +208,7 @@ def quality_report(
         for begin, one in parts.items():
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             notes += [note for note in one.quality.notes if note not in notes]
+            assumed += one.quality.assumed
             notes += [f"{begin}{note}" for note in (*copy_notes(one), *unsigned_notes(one), *wrap_notes(one))]
             notes += [f"{begin}{note}" for note in rest_notes(one) if begin]
             if begin and (still := standstill(one)) is not None:
@@ -220,7 +233,7 @@ def quality_report(
         size, columns = _tables(source, signals)
         return BagReport(
             source, size, duration, (), channels, problems=tuple(problems), notes=tuple(notes),
-            record=record, left_out=left_out, cut=cut, columns=columns,
+            record=record, left_out=left_out, cut=cut, columns=columns, assumed=tuple(assumed),
         )  # fmt: skip
     bag = Bag(source, verify=True)
     received, stamped = _times(bag)
@@ -244,7 +257,7 @@ def quality_report(
     size = sum(file.stat().st_size for file in bag.files)
     return BagReport(
         source, size, duration, topics, channels, bag.truncated, tuple(problems), tuple(notes), damage, record,
-        left_out, cut,
+        left_out, cut, assumed=tuple(assumed),
     )  # fmt: skip
 
 

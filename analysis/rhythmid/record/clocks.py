@@ -15,7 +15,7 @@ def clock_notes(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str
     """Notes on the clocks of channels by role; `clocks` says whether their times are those of `header` or `receive`."""
     return (
         *_different(channels),
-        *_assumed(channels, clocks),
+        *assumed_clock(channels, clocks),
         *_running_apart(channels, clocks),
         *_jittered(channels),
     )
@@ -32,7 +32,7 @@ def _different(channels: Mapping[str, ChannelQuality]) -> tuple[str, ...]:
     return (f"stamps of different clocks: received after their stamps by {told}; use  time: receive",)
 
 
-def _assumed(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) -> tuple[str, ...]:
+def assumed_clock(channels: Mapping[str, ChannelQuality], clocks: Mapping[str, str]) -> tuple[str, ...]:
     """What is assumed where some channels have the times of their stamps and others those of their receipt."""
     if set(clocks.values()) != {"header", "receive"}:
         return ()

@@ -2,6 +2,7 @@
 
 import struct
 import zlib
+from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
@@ -10,7 +11,9 @@ from rhythmid.record.mcap_writer import (
     CHUNK,
     DATA_END,
     FOOTER,
+    HEADER,
     MAGIC,
+    MESSAGE,
     MESSAGE_INDEX,
     STATISTICS,
 )
@@ -21,6 +24,10 @@ _PRIVATE = 0x80  # opcodes from here on are free for applications
 _METHODS = (b"", b"zstd", b"lz4")
 _WINDOW = 2**24  # bytes looked through at a time,
 _SEARCHED = 2**28  # and in all: no chunk is that long
+_CHAINED = 8  # records, each beginning where the one before ends: no other bytes look like that
+MESSAGE_HEAD_SIZE = (
+    2 + 4 + 8 + 8
+)  # bytes of channel, sequence number and two times in front of the message's data
 
 _head = struct.Struct("<BQ")
 
@@ -37,29 +44,68 @@ def is_record(data: bytes | memoryview, at: int, end: int) -> bool:
     return True
 
 
-def is_chunk(data: bytes | memoryview, at: int, end: int) -> bool:
-    """Whether a whole chunk stands at `at`: the lengths within it must agree."""
+def begins_chunk(data: bytes | memoryview, at: int, end: int) -> bool:
+    """Whether a chunk begins at `at`, wherever it ends: the lengths within it must agree."""
     if at + 9 + 40 > end or data[at] != CHUNK:
         return False
     size = _head.unpack_from(data, at)[1]
     (length,) = struct.unpack_from("<I", data, at + 37)
-    if size > end - at - 9 or length > 4 or bytes(data[at + 41 : at + 41 + length]) not in _METHODS:
+    if at + 49 + length > end or length > 4 or bytes(data[at + 41 : at + 41 + length]) not in _METHODS:
         return False
     return struct.unpack_from("<Q", data, at + 41 + length)[0] == size - 40 - length
 
 
+def is_chunk(data: bytes | memoryview, at: int, end: int) -> bool:
+    """Whether a whole chunk stands at `at`."""
+    return begins_chunk(data, at, end) and _head.unpack_from(data, at)[1] <= end - at - 9
+
+
+def is_header(data: bytes | memoryview) -> bool:
+    """Whether the header record that follows the magic bytes is whole: the lengths within it must agree."""
+    at = len(MAGIC)
+    if at + 17 > len(data) or data[at] != HEADER:
+        return False
+    size, profile = struct.unpack_from("<QI", data, at + 1)
+    if size < 8 + profile or at + 9 + size > len(data):
+        return False
+    return struct.unpack_from("<I", data, at + 13 + profile)[0] == size - 8 - profile
+
+
 def find_chunk(data: memoryview, at: int) -> int | None:
     """Where the next whole chunk begins, from `at` on; None if there is none within reach."""
+    return _find(data, at, CHUNK, is_chunk)
+
+
+def find_messages(data: memoryview, at: int) -> int | None:
+    """Where records follow one another again, a message first, from `at` on; None if there are none within reach."""
+    return _find(data, at, MESSAGE, _are_messages)
+
+
+def _find(data: memoryview, at: int, op: int, stands: Callable[[memoryview, int, int], bool]) -> int | None:
     end = len(data)
     for begin in range(at, min(end, at + _SEARCHED), _WINDOW):
         window = np.frombuffer(data[begin : min(end, begin + _WINDOW + 9)], dtype=np.uint8)
         if len(window) < 9:
             return None
         high = window[6:-2] | window[7:-1] | window[8:]  # of a length, bytes that are zero below a terabyte
-        for place in np.flatnonzero((window[:-8] == CHUNK) & (high == 0)).tolist():
-            if is_chunk(data, begin + place, end):
+        for place in np.flatnonzero((window[:-8] == op) & (high == 0)).tolist():
+            if stands(data, begin + place, end):
                 return begin + place
     return None
+
+
+def _are_messages(data: memoryview, at: int, end: int) -> bool:
+    """Whether records stand at `at` one behind the other, the first of them a message."""
+    if at + 9 > end or _head.unpack_from(data, at)[1] < MESSAGE_HEAD_SIZE:
+        return False
+    for _ in range(_CHAINED):
+        if not is_record(data, at, end):
+            return False
+        op, size = _head.unpack_from(data, at)
+        if op == DATA_END:
+            return True
+        at += 9 + size
+    return at <= end
 
 
 def messages_in_chunk(data: bytes | memoryview, at: int) -> dict[int, int]:

@@ -1,12 +1,14 @@
 """MCAP files read front to back (format: https://mcap.dev/spec).
 
 The index at the end of a file is not needed, so that a file whose recorder was killed reads like any other, up to the
-last whole message. Records are found by hopping from length to length; numbers are then gathered by array.
+last whole message. One whose beginning is damaged is read from its first whole chunk on. Records are found by hopping from length to length; numbers are then gathered by array.
 """
 
 import mmap
+import os
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -18,9 +20,13 @@ from rhythmid.record.block import Block, Topic, Wanted, by_topic, gather
 from rhythmid.record.compression import decompress
 from rhythmid.record.mcap_damage import (
     FOOTER_SIZE,
+    MESSAGE_HEAD_SIZE,
+    begins_chunk,
     counted,
     find_chunk,
+    find_messages,
     is_chunk,
+    is_header,
     is_record,
     messages_in_chunk,
     summary_start,
@@ -29,9 +35,6 @@ from rhythmid.record.mcap_damage import (
 from rhythmid.record.mcap_writer import CHANNEL, CHUNK, FOOTER, MAGIC, MESSAGE, SCHEMA
 
 _head = struct.Struct("<BQ")
-_MESSAGE_HEAD = (
-    2 + 4 + 8 + 8
-)  # bytes of channel, sequence number and two times in front of the message's data
 _MESSAGE_BATCH = 100_000  # messages that lie outside of chunks are handed out in blocks of at most this many
 
 
@@ -46,24 +49,41 @@ class McapReader:
         self.damage: list[str] = []
         self._schemas: dict[int, tuple[str, str, str]] = {}
         self._channels: dict[int, Topic] = {}
+        self._undeclared: Counter[int] = Counter()  # messages by channel of which nothing says the topic
         try:
             with path.open("rb") as file:
-                if file.read(len(MAGIC)) != MAGIC:
-                    raise InputError(
-                        f"{path}: is not an MCAP file (it does not start with the MCAP magic bytes)"
-                    )
-                self._data = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
+                size = file.seek(0, os.SEEK_END)
+                self._data = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if size else b"")
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+        self._begin = len(MAGIC)
+        if bytes(self._data[: len(MAGIC)]) != MAGIC or not is_header(self._data):
+            self._begin = self._behind_damaged_beginning()
+
+    def _behind_damaged_beginning(self) -> int:
+        """Where the first chunk begins of a file whose first bytes are not what was written."""
+        magic = bytes(self._data[: len(MAGIC)]) == MAGIC
+        first = find_chunk(self._data, 0)
+        first = find_messages(self._data, 0) if first is None else first
+        if magic and first in (None, len(MAGIC)):  # breaks off there, or has no header
+            return len(MAGIC)
+        if first is None:
+            raise InputError(
+                f"{self.path}: is not an MCAP file (it does not start with the MCAP magic bytes)"
+            )
+        self.damage.append(f"its first {first} bytes are damaged and were skipped")
+        self._declare_from_summary()
+        return first
 
     def blocks(self, wanted: Wanted = lambda topic: True) -> Iterator[Block]:
         """Messages of the wanted topics, block by block in file order."""
-        at, end = len(MAGIC), len(self._data)
+        at, end = self._begin, len(self._data)
         while at < end:
-            loose, at = self._scan(self._data, at, end)
+            loose, last, at = self._scan(self._data, at, end)
             yield from self._split(self._data, loose, wanted)
             whole = at + 9 <= end and (size := _head.unpack_from(self._data, at)[1]) <= end - at - 9
             if whole and self._data[at] == FOOTER:
+                self._tell_undeclared()
                 return
             if whole and self._data[at] == MESSAGE:  # the scan hands out so many at a time
                 continue
@@ -71,14 +91,24 @@ class McapReader:
                 yield from self._chunk(at + 9, at + 9 + size, wanted, whole=True)
                 at += 9 + size
                 continue
-            following = find_chunk(self._data, at + 1)
+            following = find_chunk(self._data, last + 1)  # the length of the last record may be wrong
+            if following is None and not begins_chunk(self._data, at, end):
+                following = find_messages(self._data, last + 1)
             if following is None:
                 break
+            self._declare_from_summary()  # what is skipped may have declared topics
             self.damage.append(f"bytes {at} to {following} are damaged and were skipped")
             at = following
         self.truncated = True
         if at + 9 <= end and self._data[at] == CHUNK:
             yield from self._chunk(at + 9, end, wanted, whole=False)
+        self._tell_undeclared()
+
+    def _tell_undeclared(self) -> None:
+        self.damage += [
+            f"{count} messages of channel {number} are lost: the part of the file that names its topic is damaged"
+            for number, count in sorted(self._undeclared.items())
+        ]
 
     def wrong_checksums(self) -> list[str]:
         """What the checksums of a finished file say against it, one phrase each."""
@@ -93,9 +123,13 @@ class McapReader:
                 found[names[number]] = found.get(names[number], 0) + count
         return found
 
-    def _scan(self, data: bytes | memoryview, at: int, end: int) -> tuple[list[int], int]:
-        """Offsets of message records from `at` up to a chunk, the footer, a record that breaks off, or the end."""
+    def _scan(self, data: bytes | memoryview, at: int, end: int) -> tuple[list[int], int, int]:
+        """Offsets of message records from `at` up to a chunk, the footer, a record that breaks off, or the end.
+
+        Then the offsets of the last record that was passed, and of where it stopped.
+        """
         found: list[int] = []
+        last = at
         unpack, add = _head.unpack_from, found.append
         while at + 9 <= end:
             op, size = unpack(data, at)
@@ -103,7 +137,7 @@ class McapReader:
             if following > end or (len(found) >= _MESSAGE_BATCH and data is self._data):
                 break
             if op == MESSAGE:
-                if size >= _MESSAGE_HEAD:  # a shorter one is none
+                if size >= MESSAGE_HEAD_SIZE:  # a shorter one is none
                     add(at)
             elif op == SCHEMA:
                 self._declare_schema(bytes(data[at + 9 : following]))
@@ -111,17 +145,19 @@ class McapReader:
                 self._declare_channel(bytes(data[at + 9 : following]))
             elif op in (FOOTER, CHUNK) or not is_record(data, at, end):
                 break
-            at = following
-        return found, at
+            last, at = at, following
+        return found, last, at
 
     def _split(self, data: bytes | memoryview, found: list[int], wanted: Wanted) -> Iterator[Block]:
         if not found:
             return
         at = np.array(found, dtype=np.int64)
         topics = {number: topic for number, topic in self._channels.items() if wanted(topic)}
-        size = gather(data, at + 1, "<i8") - _MESSAGE_HEAD
-        log_ns = gather(data, at + 15, "<i8")
-        yield from by_topic(topics, gather(data, at + 9, "<u2"), data, at + 31, size, log_ns)
+        size = gather(data, at + 1, "<i8") - MESSAGE_HEAD_SIZE
+        log_ns, channel = gather(data, at + 15, "<i8"), gather(data, at + 9, "<u2")
+        unknown, counts = np.unique(channel[~np.isin(channel, list(self._channels))], return_counts=True)
+        self._undeclared.update(dict(zip(unknown.tolist(), counts.tolist(), strict=True)))
+        yield from by_topic(topics, channel, data, at + 31, size, log_ns)
 
     def _chunk(self, at: int, end: int, wanted: Wanted, whole: bool) -> Iterator[Block]:
         """Messages of the chunk whose content starts at `at`; of one that breaks off, those that are there."""
@@ -147,7 +183,7 @@ class McapReader:
             held = f"; lost messages: {held}" if held else ""
             self.damage.append(f"chunk at byte {at - 9} is damaged and was skipped: {error}{held}")
             return
-        found, stop = self._scan(plain, 0, len(plain))
+        found, _, stop = self._scan(plain, 0, len(plain))
         if whole and stop < len(plain):
             self.damage.append(
                 f"chunk at byte {at - 9} is damaged: its last {len(plain) - stop} bytes were skipped"

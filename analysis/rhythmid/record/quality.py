@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -88,14 +88,25 @@ class ChannelQuality:
         }
         return [phrase for phrase, count in found.items() if count]
 
+    def matters(self) -> list[str]:
+        """Those of the complaints by which an answer may change: not messages without the entry, equal duplicates, and what was put in order."""
+        harmless = replace(self, missing=0, timing=replace(self.timing, late=0))
+        if not self.conflicts:
+            harmless = replace(harmless, timing=replace(harmless.timing, duplicates=0))
+        return harmless.complaints()
+
 
 @dataclass(frozen=True)
 class Quality:
-    """Quality of a record, channel by channel; `truncated` if the recording breaks off; `notes` one line each."""
+    """Quality of a record, channel by channel; `truncated` if the recording breaks off; `notes` one line each.
+
+    `assumed` are those of the notes that tell what the signals.yaml takes for granted, and no fault of the recording.
+    """
 
     channels: Mapping[str, ChannelQuality]
     truncated: bool = False
     notes: tuple[str, ...] = field(default_factory=tuple)
+    assumed: tuple[str, ...] = field(default_factory=tuple)
 
     @property
     def rate(self) -> float:

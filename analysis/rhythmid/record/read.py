@@ -13,7 +13,7 @@ from rhythmid.errors import InputError
 from rhythmid.progress import Tell, counted, silent
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Block, Topic
-from rhythmid.record.clocks import clock_notes
+from rhythmid.record.clocks import assumed_clock, clock_notes
 from rhythmid.record.columns import Columns, read_columns
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.held_back import evened
@@ -300,7 +300,8 @@ def _record(name: str, made: Mapping[str, Samples], signals: Signals, mend: str,
     notes = (*quality.notes, *clock_notes(judgement, clocks), *held_back)
     return Record(
         name, input_kind=signals.input_kind, output_kind=signals.output_kind, forcing_law=signals.forcing_law,
-        quality=replace(quality, channels=judgement, notes=notes), parameters=signals.declared(name), stamped=stamped,
+        quality=replace(quality, channels=judgement, notes=notes, assumed=assumed_clock(judgement, clocks)),
+        parameters=signals.declared(name), stamped=stamped,
         **channels,
     )  # fmt: skip
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
+from typing import Any
 
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import ReaderError
@@ -30,6 +31,15 @@ class Recovered:
     counts: Mapping[str, int]
     notes: tuple[str, ...]
     lost: Mapping[str, int]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as plain values for JSON."""
+        return {
+            "path": str(self.path),
+            "recovered": dict(self.counts),
+            "lost": dict(self.lost),
+            "notes": list(self.notes),
+        }
 
     def lines(self) -> list[str]:
         """The result as plain text."""

@@ -1,20 +1,24 @@
 """sqlite3 storage files of rosbag2, also those whose recorder was killed in the middle of a transaction."""
 
+import mmap
 import os
 import shutil
 import sqlite3
 import struct
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
 from rhythmid.errors import InputError
 from rhythmid.record.block import Block, Topic, Wanted, by_topic
 from rhythmid.record.sqlite_damage import in_order, next_readable, wrong_checksums
+from rhythmid.record.sqlite_pages import Pages
 
 _ROWS = 50_000  # rows fetched at once,
 _BYTES = 64 << 20  # and bytes, behind which no further one is fetched
@@ -26,13 +30,14 @@ class SqliteReader:
 
     A journal beside the file holds what sqlite needs to undo or finish the last transaction. That needs writing, so
     file and journal are copied and the copy is opened; the recording itself is never changed. So is a file that was cut
-    off, to be read up to the cut.
+    off, to be read up to the cut. Where sqlite cannot open a file, because its beginning is damaged, it is read page by page.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.topics: dict[str, Topic] = {}
         self.damage: list[str] = []
+        self.by_pages = False
         self._last = 0
         self._journals = [
             journal for end in ("-journal", "-wal")
@@ -46,9 +51,10 @@ class SqliteReader:
             with self.path.open("rb") as file:
                 head = file.read(32)
             if not head.startswith(b"SQLite format 3"):
-                raise InputError(
-                    f"{self.path}: is not an sqlite3 bag (it does not start like an sqlite database)"
+                yield from self._by_pages(
+                    wanted, "is not an sqlite3 bag (it does not start like an sqlite database)"
                 )
+                return
             page, whole = _sizes_by_header(head)
             size = self.path.stat().st_size
             cut_off = size < whole and not self._journals
@@ -67,8 +73,10 @@ class SqliteReader:
                     os.truncate(copy, whole)
                 yield from self._read(copy, "mode=rw", wanted)
         except sqlite3.Error as error:
-            reason = " ".join(str(error).split())[:200]  # sqlite quotes whole columns
-            raise InputError(f"{self.path}: is not a readable sqlite3 bag: {reason}") from None
+            reason = f"is not a readable sqlite3 bag: {' '.join(str(error).split())[:200]}"  # sqlite quotes whole columns
+            if self._last or not _is_damage(error):
+                raise InputError(f"{self.path}: {reason}") from None
+            yield from self._by_pages(wanted, reason)
         except OSError as error:
             raise InputError(f"{self.path}: cannot be read: {error.strerror or error}") from None
 
@@ -81,14 +89,50 @@ class SqliteReader:
             numbered = _topics(database)
             self.topics = {topic.name: topic for topic in numbered.values()}
             chosen = {number: topic for number, topic in numbered.items() if wanted(topic)}
-            rows = self._rows(database, ",".join(map(str, chosen)))
-            while batch := self._messages(_batch(rows)):
-                number, log_ns, data = zip(*batch, strict=True)
-                size = np.fromiter(map(len, data), dtype=np.int64, count=len(data))
-                start = np.cumsum(size) - size
-                yield from by_topic(
-                    chosen, np.array(number), b"".join(data), start, size, np.array(log_ns, dtype=np.int64)
-                )
+            yield from self._blocks_of(chosen, self._rows(database, ",".join(map(str, chosen))))
+
+    def _by_pages(self, wanted: Wanted, reason: str) -> Iterator[Block]:
+        """Messages of a file that sqlite cannot open. Raises InputError with the reason where its pages name no topic."""
+        with self.path.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            data = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if size else b"")
+        pages = Pages(data)
+        numbered = _numbered(
+            [(number, *values[1:5]) for number, values in pages.rows(_is_topic)],
+            [(values[1], values[3], values[2]) for _, values in pages.rows(_is_definition)],
+        )
+        if not numbered:
+            raise InputError(f"{self.path}: {reason}")
+        self.topics = {topic.name: topic for topic in numbered.values()}
+        self.by_pages = True
+        self.damage.append("sqlite cannot open it, so that it was read page by page")
+        chosen = {number: topic for number, topic in numbered.items() if wanted(topic)}
+        unnamed: Counter[int] = Counter()
+
+        def rows() -> Iterator[tuple[int, int, bytes]]:
+            for number, (_, topic, time, message) in pages.rows(_is_message):
+                if number > self._last + 1:
+                    self.damage.append(f"messages {self._last + 1} to {number - 1} are lost")
+                self._last = number
+                if topic in chosen:
+                    yield topic, time, message
+                elif topic not in numbered:
+                    unnamed[topic] += 1
+
+        yield from self._blocks_of(chosen, rows())
+        self.damage += [
+            f"{count} messages of topic number {number} are lost: the part of the file that names it is damaged"
+            for number, count in sorted(unnamed.items())
+        ]
+
+    def _blocks_of(self, chosen: dict[int, Topic], rows: Iterator[tuple[int, int, bytes]]) -> Iterator[Block]:
+        while batch := self._messages(_batch(rows)):
+            number, log_ns, data = zip(*batch, strict=True)
+            size = np.fromiter(map(len, data), dtype=np.int64, count=len(data))
+            start = np.cumsum(size) - size
+            yield from by_topic(
+                chosen, np.array(number), b"".join(data), start, size, np.array(log_ns, dtype=np.int64)
+            )
 
     def _rows(self, database: sqlite3.Connection, chosen: str) -> Iterator[tuple[int, int, bytes]]:
         """The rows of the chosen topics; pages that cannot be read are passed over and told."""
@@ -121,7 +165,7 @@ class SqliteReader:
 
     def wrong_checksums(self) -> list[str]:
         """What sqlite's own check and the checksums of a finished file say against it, one phrase each."""
-        if self.truncated:
+        if self.truncated or self.by_pages:
             return []
         with closing(sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True)) as database:
             return wrong_checksums(database)
@@ -129,6 +173,16 @@ class SqliteReader:
     def counted(self) -> dict[str, int]:
         """Messages by topic, as the file counts them: not at all."""
         return {}
+
+
+class _NoTables(sqlite3.DatabaseError):
+    """The schema does not name the tables of a recording."""
+
+
+def _is_damage(error: sqlite3.Error) -> bool:
+    """Whether sqlite finds no database, or a damaged one."""
+    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_OK)
+    return isinstance(error, _NoTables) or code & 0xFF in (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT)
 
 
 def _batch(rows: Iterator[tuple[int, int, bytes]]) -> list[tuple[int, int, bytes]]:
@@ -155,21 +209,45 @@ def _sizes_by_header(head: bytes) -> tuple[int, int]:
 def _topics(database: sqlite3.Connection) -> dict[int, Topic]:
     tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
     if not {"topics", "messages"} <= tables:
-        raise sqlite3.DatabaseError("it has no tables 'topics' and 'messages'")
-    definitions: dict[str, tuple[str, str]] = {}
+        raise _NoTables("it has no tables 'topics' and 'messages'")
+    definitions: list[tuple[str, str, str]] = []
     if "message_definitions" in tables:
         query = "SELECT topic_type, encoded_message_definition, encoding FROM message_definitions"
-        rows = list(database.execute(query))
-        if any({*map(type, row)} != {str} for row in rows):
+        definitions = list(database.execute(query))
+        if any({*map(type, row)} != {str} for row in definitions):
             raise sqlite3.DatabaseError("its table 'message_definitions' holds no texts")
-        definitions = {name: (definition, form) for name, definition, form in rows}
     stored = {column[1] for column in database.execute("PRAGMA table_info(topics)")}
     qos = "offered_qos_profiles" if "offered_qos_profiles" in stored else "''"
     query = f"SELECT id, name, type, serialization_format, {qos} FROM topics ORDER BY id"
     found = list(database.execute(query))
     if not all(isinstance(number, int) and {*map(type, texts)} == {str} for number, *texts in found):
         raise sqlite3.DatabaseError("its table 'topics' holds no names and types")
+    return _numbered(found, definitions)
+
+
+def _numbered(topics: Sequence[tuple[Any, ...]], definitions: Sequence[tuple[Any, ...]]) -> dict[int, Topic]:
+    """Topics by number, of rows with number, name, type, encoding and QoS, and of rows with type, definition and its form."""
+    known = {name: (definition, form) for name, definition, form in definitions}
     return {
-        number: Topic(name, msgtype, encoding, *definitions.get(msgtype, ("", "")), profiles)
-        for number, name, msgtype, encoding, profiles in found
+        number: Topic(name, msgtype, encoding, *known.get(msgtype, ("", "")), *profiles)
+        for number, name, msgtype, encoding, *profiles in topics
     }
+
+
+# the rows of a recording's tables, by their types; the first value, an INTEGER PRIMARY KEY, stands in the row's number
+
+
+def _is_message(values: Sequence[object]) -> bool:
+    return [*map(type, values)] == [type(None), int, int, bytes]
+
+
+def _is_topic(values: Sequence[object]) -> bool:
+    return _are_texts(values) and str(values[1]).startswith("/") and "/" in str(values[2])
+
+
+def _is_definition(values: Sequence[object]) -> bool:
+    return _are_texts(values) and not str(values[1]).startswith("/") and "/" in str(values[1])
+
+
+def _are_texts(values: Sequence[object]) -> bool:
+    return len(values) >= 4 and values[0] is None and {*map(type, values[1:])} == {str}

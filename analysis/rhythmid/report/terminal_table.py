@@ -52,6 +52,23 @@ def _print_paragraphs(
                 console.print(f"  {escape(head)}: {escape(cell)}", highlight=False)
 
 
+def print_markdown(console: Console, text: str) -> None:
+    """Print a text with headings and tables in Markdown; its tables fit the terminal."""
+    table: list[list[str]] = []
+    for line in [*text.splitlines(), ""]:
+        if line.startswith("|"):
+            table.append([cell.strip().replace("`", "") for cell in line.strip().strip("|").split("|")])
+            continue
+        if table:
+            heads, _, *rows = table
+            print_table(console, "", heads, rows)
+            table = []
+        if line.startswith("#"):
+            console.print(f"[bold]{escape(line.lstrip('# '))}[/]")
+        else:
+            console.print(line, markup=False, highlight=False)
+
+
 def print_estimates(
     console: Console, title: str, estimates: Mapping[str, Mapping[str, Any]], heading: str
 ) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,15 @@ class Choice:
     reason: str
     others: tuple[Recorded, ...] = ()
     doubts: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "channel": str(self.recorded),
+            "reason": self.reason,
+            "others": [str(one) for one in self.others],
+            "doubts": list(self.doubts),
+        }
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -35,10 +36,15 @@ class RobotStart:
     signals: str
     model: str
     told: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The guesses as plain values for JSON."""
+        return {"roles": list(self.told), "doubts": list(self.doubts)}
 
     def lines(self) -> list[str]:
         """The guesses in plain text, one line each."""
-        return list(self.told)
+        return [*self.told, *(f"CHECK {doubt}" for doubt in self.doubts)]
 
 
 def start_robot(
@@ -100,7 +106,7 @@ def start_robot(
     idle = [name for name in robot.joints if name not in joints]
     doubts += [f"held at zero, because not recorded: {', '.join(idle)}"] if idle else []
     doubts += list(robot.notes)
-    return RobotStart(signals, model, (*told, *(f"CHECK {doubt}" for doubt in doubts)))
+    return RobotStart(signals, model, tuple(told), tuple(doubts))
 
 
 def _chosen(

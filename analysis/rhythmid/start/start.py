@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
@@ -37,6 +38,19 @@ class Guess:
     signals: str
     moves: bool = True
 
+    def to_dict(self) -> dict[str, Any]:
+        """The guesses as plain values for JSON."""
+        joint = self.roles.joint
+        return {
+            "roles": {role: choice.to_dict() for role, choice in self.roles.choices.items()},
+            "input_kind": self.roles.input_kind,
+            "output_kind": self.roles.output_kind,
+            "joint": joint.name or None,
+            "other_joints": joint.others,
+            "moves": self.moves,
+            "notes": [*self.inventory.notes, *self.roles.notes],
+        }
+
     def lines(self) -> list[str]:
         """The guesses in plain text, one line each."""
         choices = self.roles.choices.items()
@@ -61,6 +75,17 @@ class Start:
     def signals(self) -> str:
         """The text of signals.yaml."""
         return self.guess.signals
+
+    def to_dict(self) -> dict[str, Any]:
+        """The guesses as plain values for JSON."""
+        values = self.nominal.model.parameters
+        return {
+            **self.guess.to_dict(),
+            "remarks": [*self.remarks, *self.nominal.remarks],
+            "nominal": {name: {"value": one.value, "unit": one.unit} for name, one in values.items()},
+            "reasons": self.nominal.reasons,
+            "doubts": self.nominal.doubts,
+        }
 
     def lines(self) -> list[str]:
         """The guesses in plain text, one line each."""

@@ -2,11 +2,11 @@
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.report.quantity import NONE, number, rounded
+from rhythmid.report.terminal_table import print_table
 
 
 def show_diagnosis(found: MachineDiagnosis, console: Console) -> None:
@@ -23,13 +23,12 @@ def show_diagnosis(found: MachineDiagnosis, console: Console) -> None:
             console.print(f"  {name}: {rounded(value.value, value.std)}{std} {escape(value.unit)}")
     for group in found.indistinguishable:
         console.print(f"indistinguishable here: {escape(', '.join(group))}")
-    table = Table(title="error of the effort on data that no fit has seen, as a share of it")
-    for column in ("joint", "verdict", "nominal", "augmented", "left"):
-        table.add_column(column)
+    rows = []
     for joint, one in found.joints.items():
         before, after = (one.fit[name].heldout_nrmse for name in ("refitted_nominal", "augmented"))
-        table.add_row(joint, one.verdict.replace("_", " "), _share(before), _share(after), left_words(one))
-    console.print(table)
+        rows.append((joint, one.verdict.replace("_", " "), _share(before), _share(after), left_words(one)))
+    title = "error of the effort on data that no fit has seen, as a share of it"
+    print_table(console, title, ("joint", "verdict", "nominal", "augmented", "left"), rows)
     for joint, why in found.not_judged.items():
         console.print(f"not judged: {escape(joint)}: {escape(why)}")
     for label, lines in (("assumption", found.assumptions), ("note", found.notes)):

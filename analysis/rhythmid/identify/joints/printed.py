@@ -4,10 +4,10 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from rhythmid.identify.caution import GIVEN_VALUES
 from rhythmid.report.quantity import number, rounded
+from rhythmid.report.terminal_table import print_table
 
 if TYPE_CHECKING:
     from rhythmid.identify.joints.joint_identification import MachineIdentification
@@ -21,13 +21,12 @@ def show_identification(found: "MachineIdentification", console: Console) -> Non
             f"[bold]not identified: the identified values predict neither the motion nor the effort of {missed}, so none of theirs can be used[/]"
         )
         console.print(f"  {GIVEN_VALUES}")
-    table = Table(title="parameters" + ("" if found.usable else " of a fit that is not usable"))
-    for column in ("name", "value", "95 % interval", "unit"):
-        table.add_column(column)
+    rows = []
     for name, one in found.parameters.items():
         low, high = (rounded(end, one.std) for end in one.interval)
-        table.add_row(name, rounded(one.value, one.std), f"{low} to {high}", escape(one.unit))
-    console.print(table)
+        rows.append((name, rounded(one.value, one.std), f"{low} to {high}", one.unit))
+    title = "parameters" + ("" if found.usable else " of a fit that is not usable")
+    print_table(console, title, ("name", "value", "95 % interval", "unit"), rows)
     if found.inertia is not None:
         seen = found.inertia
         console.print(

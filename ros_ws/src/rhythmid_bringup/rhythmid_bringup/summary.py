@@ -19,6 +19,8 @@ def show(
     """Print the summary of a run."""
     if observed.figures:
         table = Table(box=None, show_header=False, pad_edge=False)
+        for _ in range(3):
+            table.add_column(overflow="fold")
         for spec in experiment.nodes():
             figures = observed.figures.get(spec.name, {})
             for number, (key, value) in enumerate(figures.items()):

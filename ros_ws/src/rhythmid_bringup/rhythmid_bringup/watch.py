@@ -56,6 +56,8 @@ def drawn(newest: Mapping[str, DiagnosticStatus]) -> RenderableType:
         colour = _COLOURS.get(status.level, "dim")
         parts.append(Text.assemble((f"{name}  ", "bold"), (status.message, colour)))
         table = Table(box=None, show_header=False, padding=(0, 2), pad_edge=True)
+        table.add_column(overflow="fold")
+        table.add_column(overflow="fold")
         for pair in status.values:
             table.add_row(Text(pair.key), Text(pair.value))
         parts.append(table)
