@@ -36,11 +36,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def rhythmid(tmp_path: Path) -> Command:
     """The command line, run in `tmp_path`: rhythmid("check", bag) -> completed process with its output as text."""
 
-<<<<<<< HEAD
-    def run(*arguments: object, timeout: float = 400.0, **options) -> subprocess.CompletedProcess[str]:
-=======
     def run(*arguments: object, timeout: float = LONG, **options) -> subprocess.CompletedProcess[str]:
->>>>>>> ea9b5ade3d047ae2e6d05c9604aca40d80092a56
         options.setdefault("cwd", tmp_path)
         return subprocess.run(
             [sys.executable, "-m", "rhythmid.cli", *map(str, arguments)],

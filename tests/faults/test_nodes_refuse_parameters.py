@@ -28,11 +28,7 @@ def domain(tmp_path, monkeypatch):
 def run_node(executable, *arguments):
     return subprocess.run(
         [sys.executable, "-m", f"rhythmid_nodes.{executable}", "--ros-args", *arguments],
-<<<<<<< HEAD
-        capture_output=True, text=True, timeout=240, check=False, cwd=FOLDER,
-=======
         capture_output=True, text=True, timeout=PATIENCE, check=False, cwd=FOLDER,
->>>>>>> ea9b5ade3d047ae2e6d05c9604aca40d80092a56
     )  # fmt: skip
 
 

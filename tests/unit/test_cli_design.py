@@ -35,11 +35,7 @@ def made(folder, rhythmid):
             "--json",
             "out/plan.json",
             cwd=folder,
-<<<<<<< HEAD
-            timeout=500.0,
-=======
             timeout=600.0,
->>>>>>> ea9b5ade3d047ae2e6d05c9604aca40d80092a56
         )
         assert (done.returncode, done.stderr) == (0, ""), done.stderr
         (folder / "said").write_text(done.stdout, encoding="utf-8")
@@ -86,11 +82,7 @@ def test_the_example_in_the_documents_gives_what_they_show(rhythmid, tmp_path):
     shown = re.search(r"    rhythmid (design .*?)\n\n((?:    [┃│][^\n]*\n)+)", text, re.DOTALL)
     assert shown is not None
     (tmp_path / "paper_hopper.yaml").write_bytes(PAPER.read_bytes())
-<<<<<<< HEAD
-    done = rhythmid(*shown[1].replace("\\\n", " ").split(), timeout=500.0)
-=======
     done = rhythmid(*shown[1].replace("\\\n", " ").split(), timeout=600.0)
->>>>>>> ea9b5ade3d047ae2e6d05c9604aca40d80092a56
     assert done.returncode == 0, done.stderr
     for line in shown[2].splitlines():
         assert line.strip() in done.stdout

@@ -74,11 +74,7 @@ def test_three_commands_lead_from_a_foreign_recording_to_a_verdict(recording, re
     checked = rhythmid(*commands[0])
     assert checked.returncode == 0
     assert all("clocks" in line for line in checked.stdout.splitlines() if "note" in line)
-<<<<<<< HEAD
-    done = rhythmid(*commands[1], "--json", "answer.json", timeout=500.0)
-=======
     done = rhythmid(*commands[1], "--json", "answer.json", timeout=600.0)
->>>>>>> ea9b5ade3d047ae2e6d05c9604aca40d80092a56
     assert done.returncode == 0, done.stderr
     answer = json.loads((source.parent / "answer.json").read_text())
     assert answer["verdict"] == "missing_physics" and answer["missing"][0]["element"] == "coulomb_friction"
@@ -115,11 +111,7 @@ def test_on_a_terminal_close_candidates_are_asked_for(tmp_path):
     terminal, end = os.openpty()
     os.write(terminal, b"7\n2\n")
     done = subprocess.run(
-<<<<<<< HEAD
-        [sys.executable, "-m", "rhythmid.cli", "init", "run.npz"], stdin=end, capture_output=True, text=True, timeout=240, cwd=tmp_path
-=======
         [sys.executable, "-m", "rhythmid.cli", "init", "run.npz"], stdin=end, capture_output=True, text=True, timeout=600, cwd=tmp_path
->>>>>>> ea9b5ade3d047ae2e6d05c9604aca40d80092a56
     )  # fmt: skip
     os.close(terminal)
     os.close(end)

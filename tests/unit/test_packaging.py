@@ -31,11 +31,7 @@ ROSDEP = {
 
 def run(*command: object, cwd: Path, **variables: str) -> str:
     done = subprocess.run(
-<<<<<<< HEAD
-        list(map(str, command)), cwd=cwd, capture_output=True, text=True, timeout=500.0, check=False,
-=======
         list(map(str, command)), cwd=cwd, capture_output=True, text=True, timeout=600.0, check=False,
->>>>>>> ea9b5ade3d047ae2e6d05c9604aca40d80092a56
         env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"} | variables,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]

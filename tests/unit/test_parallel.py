@@ -71,11 +71,7 @@ except KeyboardInterrupt:
     print("interrupted")
 """
     done = subprocess.run(
-<<<<<<< HEAD
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=240.0, check=True
-=======
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=600.0, check=True
->>>>>>> ea9b5ade3d047ae2e6d05c9604aca40d80092a56
     )
     assert (done.stdout, done.stderr) == ("interrupted\n", "")
 

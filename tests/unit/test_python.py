@@ -74,11 +74,7 @@ def test_the_import_is_fast_and_brings_nothing_with_it():
         "print(t, any(name in sys.modules for name in ('numpy', 'yaml', 'numba', 'rich')))"
     )
     done = subprocess.run(
-<<<<<<< HEAD
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=240.0, check=True
-=======
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=600.0, check=True
->>>>>>> ea9b5ade3d047ae2e6d05c9604aca40d80092a56
     )
     seconds, heavy = done.stdout.split()
     assert float(seconds) < IMPORT and heavy == "False"

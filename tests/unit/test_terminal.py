@@ -35,11 +35,7 @@ def python_m(*arguments: str, **variables: str) -> subprocess.CompletedProcess[s
     """`python -m rhythmid` with environment variables."""
     return subprocess.run(
         [sys.executable, "-m", "rhythmid", *arguments],
-<<<<<<< HEAD
-        capture_output=True, text=True, timeout=240.0, check=False, env={**os.environ, **variables},
-=======
         capture_output=True, text=True, timeout=600.0, check=False, env={**os.environ, **variables},
->>>>>>> ea9b5ade3d047ae2e6d05c9604aca40d80092a56
     )  # fmt: skip
 
 
@@ -65,11 +61,7 @@ def test_python_m_and_the_short_option_give_the_same_help():
 def test_help_loads_none_of_the_libraries_that_take_long():
     traced = subprocess.run(
         [sys.executable, "-X", "importtime", "-m", "rhythmid", "--help"],
-<<<<<<< HEAD
-        capture_output=True, text=True, timeout=240.0, check=True,
-=======
         capture_output=True, text=True, timeout=600.0, check=True,
->>>>>>> ea9b5ade3d047ae2e6d05c9604aca40d80092a56
     )  # fmt: skip
     loaded = {line.rsplit("|", 1)[-1].strip().split(".")[0] for line in traced.stderr.splitlines()}
     assert "typer" in loaded and not loaded & SLOW
