@@ -37,8 +37,12 @@ def at_work(
     seed: int = 0,
     noise: float = 1e-4,
     forced: bool = True,
+    late: Callable[[Array], Array] | None = None,
 ) -> Stretch:
-    """The lift from `start` to `end` [s], from a state or from rest, its position measured with white noise [m]."""
+    """The lift from `start` to `end` [s], from a state or from rest, its position measured with white noise [m].
+
+    `late` says how much later [s] than their times commands are released.
+    """
     delay = model.value("measurement_delay.delay")
     free = model.without("measurement_delay")
     if state is None:
@@ -47,6 +51,9 @@ def at_work(
     known = np.arange(round(start * RATE) - 50, round(end * RATE) + 1) / RATE
     command = EXCITATION(np.mod(known, EXCITATION.period))
     forcing = (6.0 if forced else 0.0) * np.cos(2.0 * np.pi * 1.4 * known)
-    run = simulate(free, time, zero_order_hold(known, command), spline(known, forcing), state)
+    acting = known
+    if late is not None:
+        acting = np.maximum.accumulate(known + late(known)) + 1e-9 * np.arange(len(known))
+    run = simulate(free, time, zero_order_hold(acting, command), spline(known, forcing), state)
     measured = run.output + noise * np.random.default_rng(seed).standard_normal(len(time))
     return Stretch(time, command[50:], forcing[50:], time + delay, measured, run.states[-1])

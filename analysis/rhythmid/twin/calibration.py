@@ -19,7 +19,7 @@ from rhythmid.model import Model
 from rhythmid.record.timing import nominal_period
 from rhythmid.twin.changes import Change, watched
 from rhythmid.twin.detector import Healthy, learn_healthy
-from rhythmid.twin.lateness import Doubt, lateness
+from rhythmid.twin.lateness import Doubt, possible_lateness
 from rhythmid.twin.observer import Filter, Innovations, Observer
 from rhythmid.twin.samples import Samples
 from rhythmid.twin.score import Whitener
@@ -128,7 +128,7 @@ def calibrate(
     extended, changes = watched(model, catalogue, speed, settings.input_kind)
     simulation = Simulation(extended, changes, settings, period)
     scatter = _scatter(simulation, output, period, settings)
-    stretch = Stretch(output, lateness(output.time, period), command, forcing, block, size)
+    stretch = Stretch(output, possible_lateness(output.time, period), command, forcing, block, size)
     force = model.mass.value * speed**2 / max(float(np.std(output.value)), 1e-300)
     sizes = np.array([_size(extended.value(c.name), c, force, speed, scatter[0]) for c in changes])
     filter, found = _followed(simulation, stretch, scatter, sizes)

@@ -12,16 +12,16 @@ from rhythmid.record.signals import Signals, Source
 from rhythmid.twin.twin import Role
 
 Array = NDArray[np.float64]
-ROLES: tuple[Role, ...] = ("input", "output", "forcing")
+ROLES: tuple[Role, ...] = ("input", "output", "forcing", "released")
 
 
 class Inbox:
     """Takes serialised messages from any thread; `drain` makes samples of them.
 
-    Times are seconds since the first message. Raises InputError where the signals do not name topics, or a forcing by formula.
+    Times are seconds since the first message; `released` are the commands as the last relay released them. Raises InputError where the signals do not name topics, or a forcing by formula.
     """
 
-    def __init__(self, signals: Signals) -> None:
+    def __init__(self, signals: Signals, released: Source | None = None) -> None:
         if signals.from_tables:
             raise InputError(f"{signals.path}: names columns of tables; a running machine has topics")
         if signals.forcing_law is not None:
@@ -32,6 +32,8 @@ class Inbox:
         self.channels: dict[Role, Source] = {
             role: signals.channels[role] for role in ROLES if role in signals.channels
         }
+        if released is not None:
+            self.channels["released"] = released
         self.topics = tuple(dict.fromkeys(source.topic for source in self.channels.values()))
         self._types: dict[str, Topic] = {}
         self._waiting: dict[str, deque[tuple[bytes, int]]] = {topic: deque() for topic in self.topics}

@@ -16,8 +16,9 @@ from rhythmid.twin.calibration import Calibration, calibrate
 from rhythmid.twin.changes import DELAYS, without_own_forcing
 from rhythmid.twin.detector import Threshold
 from rhythmid.twin.isolation import DelayNow, Isolation, delays_now, isolate
-from rhythmid.twin.lateness import LOOK, Doubt, lateness
+from rhythmid.twin.lateness import LOOK, Doubt, possible_lateness
 from rhythmid.twin.observer import Observer
+from rhythmid.twin.released import Released
 from rhythmid.twin.samples import Samples
 from rhythmid.twin.score import Score, Whitener
 from rhythmid.twin.segment import Simulation
@@ -25,7 +26,7 @@ from rhythmid.twin.settings import Settings
 
 Array = NDArray[np.float64]
 Level = Literal["learning", "ok", "warn", "error"]
-Role = Literal["input", "output", "forcing"]
+Role = Literal["input", "output", "forcing", "released"]
 CONFIRMED = 10.0  # s of mismatch after which a warning becomes an error
 PATIENCE = 1.0  # s that commands and forcing may be older than the measurement, before they are taken as held
 
@@ -63,6 +64,7 @@ class Twin:
     settings : how the signals are to be read, and the allowed rate of false alarms.
     forced : whether the forcing is measured; else the model's own drives act.
     calibration : of an earlier run of the twin; None: the first `settings.healthy` seconds are taken for healthy.
+    released : whether the times at which commands are released are told as well.
     """
 
     def __init__(
@@ -72,12 +74,14 @@ class Twin:
         forced: bool = True,
         calibration: Calibration | None = None,
         catalogue: Catalogue | None = None,
+        released: bool = False,
     ) -> None:
         self.model = without_own_forcing(model) if forced else model
         self.settings, self.calibration = settings, calibration
         self.samples: dict[Role, Samples] = {"input": Samples(), "output": Samples()}
         if forced:
             self.samples["forcing"] = Samples()
+        self._released = Released(_delay(self.model, DELAYS[0])) if released else None
         self._catalogue = load_catalogue() if catalogue is None else catalogue
         self._taken = 0  # measurements of the buffer that have been judged
         self._observer: Observer | None = None
@@ -89,7 +93,11 @@ class Twin:
 
     def push(self, role: Role, time: Array, value: Array) -> None:
         """Samples of one signal: times [s] on one clock for all signals, increasing, and values; shapes (n,), (n,)."""
-        self.samples[role].append(np.asarray(time, dtype=float), np.asarray(value, dtype=float))
+        into = self.samples.get(role)
+        if self._released is not None and role in ("input", "released"):
+            into = self._released.given if role == "input" else self._released.released
+        if into is not None:
+            into.append(np.asarray(time, dtype=float), np.asarray(value, dtype=float))
 
     def advance(self) -> list[Status]:
         """Judge all segments for which everything has come in; what is said of each.
@@ -97,6 +105,8 @@ class Twin:
         Raises InputError when the healthy stretch is over and shows no motion, or motion that the model does not make.
         """
         output = self.samples["output"]
+        if self._released is not None:
+            self.samples["input"].append(*self._released.take(output.newest - PATIENCE))
         if self.calibration is None:
             if not len(output) or output.newest - output.time[0] < self.settings.healthy + PATIENCE:
                 return [Status(output.newest, "learning")] if len(output) else []
@@ -156,10 +166,10 @@ class Twin:
     def _doubt(self, first: int, end: int, period: float) -> Doubt:
         """Of a segment's times."""
         stamps = self.samples["output"].time
-        since = int(np.searchsorted(stamps, stamps[first] - LOOK))
+        since = max(0, int(np.searchsorted(stamps, stamps[first] - LOOK)) - 1)
         until = int(np.searchsorted(stamps, stamps[end - 1] + LOOK, side="right"))
         near = stamps[since:until]
-        return Doubt.of(near, lateness(near, period), first - since, end - since)
+        return Doubt.of(near, possible_lateness(near, period), first - since, end - since)
 
     def _judge(self, calibration: Calibration, first: int, end: int) -> Status | None:
         """Judge the measurements from `first` to before `end`."""
@@ -231,7 +241,7 @@ class Twin:
         simulation = self._observer.simulation
         keep = min(self._observer.start.time, float(output.time[self._taken - 1]))
         keep -= simulation.longest_delay + PATIENCE
-        first = int(np.searchsorted(output.time, output.time[self._taken - 1] - LOOK))
+        first = max(0, int(np.searchsorted(output.time, output.time[self._taken - 1] - LOOK)) - 2)
         output.time, output.value = output.time[first:], output.value[first:]
         self._taken -= first
         for role, one in self.samples.items():

@@ -39,8 +39,9 @@ class Watch:
         catalogue: Catalogue | None = None,
         diagnose: bool = True,
         elements: tuple[Path, ...] = (),
+        released: bool = False,
     ) -> None:
-        self.twin = Twin(model, settings, forced, calibration, catalogue)
+        self.twin = Twin(model, settings, forced, calibration, catalogue, released)
         self.events = Events()
         self._model, self._settings, self._elements = model, settings, elements
         self._diagnose = diagnose
@@ -51,7 +52,7 @@ class Watch:
     def push(self, role: Role, time: Array, value: Array) -> None:
         """Samples of one signal, as in `Twin.push`."""
         self.twin.push(role, time, value)
-        if self._diagnose:
+        if self._diagnose and role in self._recent:
             self._recent[role].append(np.asarray(time, dtype=float), np.asarray(value, dtype=float))
             self._recent[role].forget(self._recent["output"].newest - DIAGNOSED - BEFORE)
 

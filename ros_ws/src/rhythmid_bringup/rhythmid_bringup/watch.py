@@ -18,21 +18,19 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
-from rich.console import Console, Group, RenderableType
+from rich.console import Console
 from rich.live import Live
-from rich.table import Table
-from rich.text import Text
 
 from rhythmid.errors import InputError
 from rhythmid_nodes.qos import latched
 
+from .board import drawn
 from .environment import run_environment
 from .processes import Supervised, end
 from .run import interruptions
 
 NAMESPACE = "/hopper"  # of rhythmid's own nodes, whose topics are watched where no signals are given
 REFRESH = 4.0  # a second
-_COLOURS = {DiagnosticStatus.OK: "green", DiagnosticStatus.WARN: "yellow", DiagnosticStatus.ERROR: "bold red"}
 
 
 class Board(Node):
@@ -46,22 +44,6 @@ class Board(Node):
     def _take(self, message: DiagnosticArray) -> None:
         for status in message.status:
             self.newest[status.name] = status
-
-
-def drawn(newest: Mapping[str, DiagnosticStatus]) -> RenderableType:
-    """The board as a table: the models first, then the rates and lateness of all nodes."""
-    ordered = sorted(newest.items(), key=lambda item: (not item[0].endswith("/model"), item[0]))
-    parts: list[RenderableType] = []
-    for name, status in ordered:
-        colour = _COLOURS.get(status.level, "dim")
-        parts.append(Text.assemble((f"{name}  ", "bold"), (status.message, colour)))
-        table = Table(box=None, show_header=False, padding=(0, 2), pad_edge=True)
-        table.add_column(overflow="fold")
-        table.add_column(overflow="fold")
-        for pair in status.values:
-            table.add_row(Text(pair.key), Text(pair.value))
-        parts.append(table)
-    return Group(*parts) if parts else Text("waiting for the twin")
 
 
 def parameters(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -19,7 +19,8 @@ from rhythmid.elements.catalogue import load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.output import require_new, write_json
-from rhythmid.record.signals import Signals
+from rhythmid.record.field import Field
+from rhythmid.record.signals import Signals, Source
 from rhythmid.twin.inbox import Inbox
 from rhythmid.twin.kept import load, save
 from rhythmid.twin.settings import Settings
@@ -35,6 +36,7 @@ from .parameters import Parameter
 from .qos import AdaptiveSubscription, latched, message_type
 
 _PERIOD = 0.1  # s between two looks at what has come in
+_RELEASED = "command"  # topic of the commands that the last relay before the machine has released
 _LATE_NS = 10_000_000  # a message that is older when it comes in is counted as late
 PARAMETERS = (
     TIME_MODE,
@@ -102,7 +104,7 @@ class TwinNode(GraphNode):
         if self.lockstep:
             raise InputError("parameter time_mode = 'lockstep': a twin runs beside a machine, in real time")
         self.wall = Clock()
-        self.inbox = Inbox(self._signals())
+        self.inbox = Inbox(self._signals(), self._released())
         self._catalogue = load_catalogue(tuple(Path(folder) for folder in values["elements"] or ()))
         self._watch = self._build()
         self._status: Status | None = None
@@ -119,6 +121,13 @@ class TwinNode(GraphNode):
             return Signals.load(self.values["signals"])
         return Signals.default(self.get_namespace(), self.values["joint"])
 
+    def _released(self) -> Source | None:
+        """Of rhythmid's own graph, the commands that the delay injector has released."""
+        if self.values["signals"]:
+            return None
+        field = Field.parse(f"effort[{self.values['joint']}]")
+        return Source("N", self.resolve_topic_name(_RELEASED), field)
+
     def _build(self) -> Watch:
         values = self.values
         if not values["model"]:
@@ -134,7 +143,16 @@ class TwinNode(GraphNode):
         if values["calibration"]:
             known = load(Path(values["calibration"]), model, settings, forced, self._catalogue)
         folders = tuple(Path(folder) for folder in values["elements"] or ())
-        return Watch(model, settings, forced, known, self._catalogue, values["diagnose"], folders)
+        return Watch(
+            model,
+            settings,
+            forced,
+            known,
+            self._catalogue,
+            values["diagnose"],
+            folders,
+            "released" in self.inbox.channels,
+        )
 
     def figures(self) -> dict[str, str]:
         found: dict[str, str] = {}
@@ -147,7 +165,9 @@ class TwinNode(GraphNode):
 
     def obstacles(self) -> list[str]:
         return [
-            f"no publisher of {topic}" for topic, ear in self._ears.items() if not ear.subscription.matched
+            f"no publisher of {topic}"
+            for topic, ear in self._ears.items()
+            if not ear.subscription.matched and topic != self.resolve_topic_name(_RELEASED)
         ]
 
     def finish(self) -> None:

@@ -1,0 +1,43 @@
+"""Commands as they were released: where a relay on the way passes some on late, they act later than their stamps and the delay say."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rhythmid.twin.lateness import LOOK, lateness
+from rhythmid.twin.samples import Samples
+
+Array = NDArray[np.float64]
+APART = 1e-9  # s between commands that were released together
+
+
+class Released:
+    """Gives commands the times that they would have been stamped with, had they been released punctually when they were.
+
+    Parameters
+    ----------
+    delay : from a command's stamp to its release [s].
+    """
+
+    def __init__(self, delay: float) -> None:
+        self.given, self.released = Samples(), Samples()
+        self._delay = delay
+        self._newest = -np.inf
+
+    def take(self, silent: float) -> tuple[Array, Array]:
+        """Times [s] and values of the commands whose lateness is known now, shapes (n,), (n,), each told once.
+
+        Those stamped before `silent` [s] are told in any case.
+        """
+        released, given = self.released.time, self.given
+        until = max(silent, self.released.newest - self._delay - LOOK)
+        count = int(np.searchsorted(given.time, until, side="right"))
+        time, value = given.time[:count], given.value[:count]
+        given.time, given.value = given.time[count:], given.value[count:]
+        if count and len(released) > 1:
+            late = lateness(released, float(np.median(np.diff(released))))
+            time = time + np.interp(time + self._delay, released - late, late, left=0.0, right=0.0)
+            self.released.forget(float(time[0]) - LOOK)
+        time = np.maximum.accumulate(np.concatenate([[self._newest], time]))[1:]
+        time = time + APART * np.arange(1, count + 1)
+        self._newest = float(time[-1]) if count else self._newest
+        return time, value
