@@ -38,6 +38,11 @@ class JointResult:
     late: float
     result: EffortResult
 
+    @property
+    def by_reference(self) -> bool:
+        """Whether the joint's effort is what its controller makes of its reference."""
+        return self.result.search.balance.by_reference
+
 
 def joint_catalogue(catalogue: Catalogue) -> Catalogue:
     """The catalogue for a joint, whose inertia and weight are known from the body: there an actuator's gain is no mere calibration,
@@ -91,14 +96,14 @@ def _applicable(balance: Balance, model: Model) -> Applicability:
     )
 
 
-def name_of(joint: str, label: str) -> tuple[str, str]:
+def name_of(joint: str, label: str, by_reference: bool = False) -> tuple[str, str]:
     """What was found wrong at a joint, and where, of a label that is no element's: a link's mass, its inertia, its payload, the rotor's
-    inertia, a delay."""
+    inertia, a delay: of the actuator, or where the effort is made `by_reference` of that."""
     if label == INERTIA:
         return "armature", joint
     if label.startswith(f"{BODY}."):
         link, kind = split(label.removeprefix(f"{BODY}."))
         return OF_LINKS[kind], link
     if label == INPUT_DELAY:
-        return "actuator_delay", joint
+        return "input_delay" if by_reference else "actuator_delay", joint
     return label, joint

@@ -17,6 +17,7 @@ from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import STATED
+from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
@@ -27,7 +28,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.joints.held_reference import balances_of, likely_readings
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.joints.joint_order import check_order
-from rhythmid.identify.joints.reference_delay import reference_delay
+from rhythmid.identify.joints.reference_delay import ReferenceDelay, reference_delay
 from rhythmid.identify.joints.reference_lead import told_of
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
@@ -116,20 +117,25 @@ def diagnose_machine(
     answers = {joint: _answer(one) for joint, one in best.found.items()}
     told = () if records[0].sampled else tuple(told_of(best.leads))
     put_right = (one.beside(machine) for one in best.links.values())
-    notes = (*machine.body.notes, *said, *of_holdout, *told, *put_right, *misfits(answers))
-    diagnosis = compose_machine(machine, best.found, answers, best.stated, best.links, best.refused, notes)
+    late = () if best.delay is None else (best.delay.told,)
+    notes = (*machine.body.notes, *said, *of_holdout, *told, *late, *put_right, *misfits(answers))
+    diagnosis = compose_machine(
+        machine, best.found, answers, best.stated, best.links, best.refused, notes, best.delay
+    )
     return MachineAnswer(diagnosis, _augmented(best), best.found)
 
 
 @dataclass(frozen=True, eq=False)
 class _Explained:
-    """What was found at the joints: the machine with the links' parameters that are put right, and the `leads` [s] that were allowed for."""
+    """What was found at the joints: the machine with the links' parameters that are put right, and the `leads` [s] and
+    the `delay` of references that were allowed for."""
 
     machine: Machine
     found: Mapping[str, JointResult]
     refused: Mapping[str, str]
     links: Mapping[str, WrongLink]
     leads: Mapping[str, float]
+    delay: ReferenceDelay | None
 
     @property
     def stated(self) -> dict[str, tuple[str, ...]]:
@@ -155,7 +161,8 @@ def _explained(
     """Search every joint, put a link's mass or inertia right where one is found, and search again what feels it."""
     links: dict[str, WrongLink] = {}
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
-    found, refused = _searched(balances, unseen, machine.joints, catalogue, tell, budget)
+    delay = reference_delay(balances, balances.computed) if balances.computed else None
+    found, refused = _searched(balances, unseen, machine.joints, catalogue, tell, budget, delay)
     for _ in range(max(MOST_LINKS, len(machine.body.links))):
         best = _heaviest(found, set(links))
         if best is None or budget.spent:
@@ -166,18 +173,19 @@ def _explained(
         balances = JointBalances.of(machine, records, balances)
         unseen = JointBalances.of(machine, holdout, balances) if holdout else None
         again = [joint for joint in machine.joints if link in balances.links(joint)]
-        better, refused = _searched(balances, unseen, again, catalogue, tell, budget)
+        delay = reference_delay(balances, balances.computed) if balances.computed else None
+        better, refused = _searched(balances, unseen, again, catalogue, tell, budget, delay)
         found = {**found, **better}
-    return _Explained(machine, found, refused, links, balances.leads)
+    return _Explained(machine, found, refused, links, balances.leads, delay)
 
 
 def _searched(
     balances: JointBalances, unseen: JointBalances | None, joints: Sequence[str], catalogue: Catalogue,
-    tell: Tell, budget: Budget,
+    tell: Tell, budget: Budget, delay: ReferenceDelay | None,
 ) -> tuple[dict[str, JointResult], dict[str, str]]:  # fmt: skip
     found: dict[str, JointResult] = {}
     refused: dict[str, str] = {}
-    late = reference_delay(balances, balances.computed) if balances.computed else 0.0
+    late = 0.0 if delay is None else delay.shared.value
     for joint in joints:
         tell(f"joint {joint}")
         try:
@@ -281,8 +289,17 @@ def _augmented(best: _Explained) -> Machine:
             free = label.startswith(f"{BODY}.") and label in adopted and link not in best.links
             if free and std < spreads.get(link, math.inf):
                 inertial[link], spreads[link] = fitted.model.value(label), std
-        machine = machine.with_path(joint, _without_body(fitted.model, path))
+        machine = machine.with_path(joint, _without_body(_with_delay(one, fitted), path))
     return machine.with_inertial(inertial) if inertial else machine
+
+
+def _with_delay(one: JointResult, fitted: Fitted) -> Model:
+    """A joint's fitted path with the whole delay of its reference, where the effort was made from that and the path has a delay."""
+    model = fitted.model
+    if not one.by_reference or INPUT_DELAY not in model.parameters or model.parameters[INPUT_DELAY].fixed:
+        return model
+    late = model.value(INPUT_DELAY) + one.late + fitted.fit.alignment
+    return model.with_values({INPUT_DELAY: max(late, 0.0)})
 
 
 def _without_body(model: Model, path: Model) -> Model:

@@ -24,6 +24,7 @@ from rhythmid.identify.inverse_dynamics.motion import (
     motion_of,
     stretches,
 )
+from rhythmid.identify.inverse_dynamics.reference_path import changed_by
 from rhythmid.identify.noise import runs
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.record.record import Record
@@ -165,6 +166,42 @@ class Balance:
             ]
         )
 
+    @property
+    def by_reference(self) -> bool:
+        """Whether the effort was not recorded, but is what a controller makes of its reference."""
+        return self.motions[0].reference is not None
+
+    def later(self, model: Model, alignment: float = 0.0) -> float:
+        """By how much later [s] than the rows the motion shows the effort, `alignment` [s] beyond the model's delays. What is computed from the
+        motion is not later than it: of an effort by a reference, this alone is late, see `moved`."""
+        return 0.0 if self.by_reference else self.shift(model) + alignment
+
+    def moved(self, model: Model, alignment: float) -> list[Array]:
+        """Change (n,) of the compared effort along each motion where its reference acts `alignment` [s] later; none for a recorded effort."""
+        if not self.by_reference or alignment == 0.0:
+            return []
+        late = self.shift(model)
+        return [
+            self._asked(index, model, late) - one.reference.force(model, one, late + alignment)
+            for index, one in enumerate(self.motions)
+            if one.reference is not None
+        ]
+
+    def with_moved(self, rows: Array, model: Model, alignment: float) -> Array:
+        """Rows (n,) of a required effort with its reference acting `alignment` [s] later."""
+        changes = self.moved(model, alignment)
+        return rows + self.rows(changes) if changes else rows
+
+    def _asked(self, index: int, model: Model, late: float) -> Array:
+        """Force (n,) that the controller asks for by its reference; kept, for most refits do not change the command path."""
+        key = (index, "asked", changed_by(model), late)
+        found = self._forces.get(key)
+        if found is None:
+            motion = self.motions[index]
+            assert motion.reference is not None
+            self._forces[key] = found = motion.reference.force(model, motion, late)
+        return found
+
     def shift(self, model: Model) -> float:
         """By how much later [s] than the stamps of the effort the motion shows it, as the model's delays say."""
         slots = MEASUREMENT if controlled(model) else ("command", *MEASUREMENT)
@@ -189,7 +226,8 @@ class Balance:
 
     def predicted(self, model: Model, alignment: float = 0.0) -> Array:
         """The effort (rows,) that the model predicts, `alignment` [s] beyond the model's own delays."""
-        return self.rows(self.required(model), self.shift(model) + alignment)
+        rows = self.rows(self.required(model), self.later(model, alignment))
+        return self.with_moved(rows, model, alignment)
 
     def estimated(self, model: Model) -> list[str]:
         """The free parameters that the effort can tell of: the inertia, forces, and the actuator."""
@@ -227,7 +265,9 @@ class Balance:
         if self.motions[0].driven_by_base or term.element.kernel is None:
             return False
         return slot == "actuator" or (
-            slot == "command" and term.element.acts != "feedback" and not controlled(model)
+            slot == "command"
+            and term.element.acts != "feedback"
+            and (self.by_reference or not controlled(model))
         )
 
     def _required(self, index: int, model: Model, by: Inversions) -> Array:
@@ -254,10 +294,12 @@ class Balance:
             required = required - sum(self._along(motion, t, model, zero, leg, zero) for t in late)
         elif late:
             required = self._with_load(motion, late, model, required, leg, by)
-        for slot in ("actuator", "command"):
+        for slot in ("actuator",) if self.by_reference else ("actuator", "command"):
             for term in reversed([t for t in model.terms if t.element.slot == slot]):
                 if self._counts(term, model):
                     required = self._before(motion, term, model, required, leg, by)
+        if self.by_reference:  # what the command path changes stands on this side: the rows stay the same for all models
+            required = required + motion.effort - self._asked(index, model, self.shift(model))
         return required
 
     def _with_load(

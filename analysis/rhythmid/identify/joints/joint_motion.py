@@ -25,6 +25,7 @@ from rhythmid.identify.inverse_dynamics.bandwidth import (
     bandwidth_of_motion,
 )
 from rhythmid.identify.inverse_dynamics.motion import FINER, Motion, Stretch, low_pass
+from rhythmid.identify.inverse_dynamics.reference_path import Reference
 from rhythmid.identify.joints.joint_stretch import JointStretch, joint_stretches
 from rhythmid.model import Model, Term
 from rhythmid.record.joint_record import JointRecord, Taken
@@ -35,7 +36,6 @@ Array = NDArray[np.float64]
 # flights between contacts)
 CLEAR = 1.5
 SHORT = 400  # samples of a stretch, up to which its filter is a matrix
-SAME_CLOCK = 1e-3  # of a sample: by how much motion and an effort that was made from it may be out
 FAINT = 1e-3  # of a joint's effort, below which what a link does to it is not looked at
 
 
@@ -112,15 +112,13 @@ class JointBalances:
         for joint in machine.joints:
             seen = alike.links(joint) if alike else _links(machine, joint, names, columns, bodies)
             rotors = alike.rotors(joint) if alike else _rotors(machine, joint, seen, names, columns, bodies)
-            models[joint] = joint_model(machine, joint, records[0].taken, seen, rotors)
+            computed = joint in stretches[0].reference  # what a controller asks for goes into its actuator
+            taken = "before_actuator" if computed else records[0].taken
+            models[joint] = joint_model(machine, joint, taken, seen, rotors)
             made = []
             for body, column in zip(bodies, columns, strict=True):
                 own = {link: column[:, :, names.index(link)] for link in seen}
-                motion = _motion(machine, models[joint], joint, body, own)
-                if joint in body.stretch.reference:
-                    asked = controller_effort(models[joint], joint, motion, body, 0.0)
-                    motion = replace(motion, effort=asked)
-                made.append(motion)
+                made.append(_motion(machine, models[joint], joint, body, own))
             motions[joint] = made
         period = max(one.period for one in stretches)
         bandwidths = (
@@ -170,31 +168,18 @@ class JointBalances:
     def balance(self, joint: str, late: float = 0.0) -> Balance:
         """The balance of one joint; a reference acts there `late` [s] after its stamp. Raises InputError where too few samples are
         left."""
-        motions, period = self.motions[joint], self.period
-        if joint in self.computed:
-            period *= SAME_CLOCK
-            model = self.models[joint]
-            motions = [
-                replace(motion, effort=controller_effort(model, joint, motion, body, late))
-                for motion, body in zip(motions, self.bodies, strict=True)
-            ]
-        return JointBalance.of_motions(motions, self.bandwidths[joint], period, CLEAR)
+        motions = self.motions[joint]
+        if late != 0.0:
+            motions = [_later(motion, self.models[joint], late) for motion in motions]
+        return JointBalance.of_motions(motions, self.bandwidths[joint], self.period, CLEAR)
 
 
-def controller_effort(model: Model, joint: str, motion: Motion, body: BodyMotion, late: float) -> Array:
-    """Force (n,) that a controller with known gains has asked for."""
-    stretch = body.stretch
-    held = 0.5 * stretch.period  # what is held from sample to sample is on average so much older
-    asked = np.interp(stretch.time - late - held, stretch.time, stretch.reference[joint])
-    asked = low_pass(asked, stretch.period, 1.0 / (FINER * stretch.period * body.every))[:: body.every]
-    total = np.zeros(len(motion.time))
-    for term in model.terms:
-        if term.element.acts == "feedback" and term.element.kernel is not None:
-            values = term.numbers
-            total = term.element.kernel(asked, motion.position, motion.velocity, motion.time, **values)
-    if joint in stretch.forward:
-        total = total + stretch.forward[joint][:: body.every]
-    return total
+def _later(motion: Motion, model: Model, late: float) -> Motion:
+    """A motion whose reference acts `late` [s] later; one without a reference as it is."""
+    if motion.reference is None:
+        return motion
+    reference = replace(motion.reference, age=motion.reference.age + late)
+    return replace(motion, reference=reference, effort=reference.force(model, motion))
 
 
 def joint_model(
@@ -204,7 +189,7 @@ def joint_model(
     actuator where the effort was recorded behind that. An inertia that does what the rotor's does, one of `rotors`, may be less than given by
     more than the whole rotor: any other change is the rotor's, of which files of robots know little."""
     path = machine.paths[joint]
-    terms = [t for t in path.terms if not (taken == "after_actuator" and t.element.slot == "actuator")]
+    terms = [t for t in path.terms if taken != "after_actuator" or t.element.slot != "actuator"]
     known, values = machine.body.parameters, {}
     for link in links:
         said = machine.inertial.get(link)
@@ -305,10 +290,30 @@ def _motion(
     others = {
         name: body.rate[:, machine.body.joints[name].velocity] for name in machine.joints if name != joint
     }
-    return Motion(
+    motion = Motion(
         stretch.record, stretch.name, body.time, x, v, a, x, v, effort, body.period,
         coupling=body.force[:, own.velocity] - model.mass.value * a, links=found, others=others,
     )  # fmt: skip
+    if joint not in stretch.reference:
+        return motion
+    motion = replace(motion, reference=_reference(machine, joint, body))
+    return _later(motion, model, 0.0)
+
+
+def _reference(machine: Machine, joint: str, body: BodyMotion) -> Reference:
+    """The reference of a joint's controller, which works at the body's step."""
+    stretch, step = body.stretch, machine.body.step
+    held = 0.0 if joint in stretch.smooth else stretch.period
+    forward = stretch.forward.get(joint)
+    return Reference(
+        stretch.time,
+        stretch.reference[joint],
+        None if forward is None else _decimated(body, forward),
+        0.5 * (held - step),
+        step,
+        1.0 / (FINER * body.period),
+        body.every,
+    )
 
 
 def _decimated(body: BodyMotion, signal: Array) -> Array:

@@ -28,7 +28,7 @@ MOST = (
 class JointStretch:
     """One stretch of a record: time (n,) [s], pose (n, nv) of the whole body, and by joint (n, joints) the effort, where that was
     recorded or is the command, and the reference of its controller with what the controller adds to its force. `held` are
-    the references that are held while the effort was recorded in step with them."""
+    the references that are held while the effort was recorded in step with them, `smooth` the joints whose references go on between their stamps."""
 
     record: int
     name: str
@@ -39,6 +39,7 @@ class JointStretch:
     forward: dict[str, Array]
     period: float
     held: dict[str, HeldReference] = field(default_factory=dict)
+    smooth: frozenset[str] = frozenset()
 
 
 def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[JointStretch]:
@@ -59,6 +60,10 @@ def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[Jo
         held = {
             joint: one for joint in machine.joints if (one := _held(machine, record, joint, grid)) is not None
         }
+        smooth = frozenset(
+            joint for joint in machine.joints
+            if (one := record.joints[joint]).reference is None and one.hold != "zero"
+        )  # fmt: skip
         ends = np.flatnonzero(np.diff(np.concatenate([[0], (valid & flying).astype(int), [0]])))
         for first, end in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
             if end - first < SHORTEST:
@@ -73,6 +78,7 @@ def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[Jo
                     {joint: one[2][part] for joint, one in driven.items() if one[2] is not None},
                     period,
                     {joint: replace(one, between=one.between[part]) for joint, one in held.items()},
+                    smooth,
                 )
             )  # fmt: skip
     if not found:
