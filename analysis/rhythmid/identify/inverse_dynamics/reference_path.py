@@ -6,14 +6,15 @@ force for that step: its reference is on average half a step younger than its st
 before, half a step old (the steps of a symplectic Euler method, as MuJoCo takes them).
 """
 
-from dataclasses import dataclass
+from collections.abc import Hashable
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from rhythmid.model import Model
+from rhythmid.model import Model, Term
 from rhythmid.simulation.effect import Path, effect_along
 
 if TYPE_CHECKING:
@@ -21,15 +22,65 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 ON_TICK = 1e-9  # [s] within which a command that has arrived counts as there
+KEPT = 16  # references behind a path that are kept: those of the steps of one fit
+PROBED = (0.0, 0.0137, 0.3711, 1.9173)  # [s] stamps, in no ratio, at which a delay is looked at for whether it varies
+
+
+@dataclass(frozen=True, eq=False)
+class Commanded:
+    """The reference of a joint over a whole record, before the command path: (m,) stamps [s] and values there. The path remembers, so it is passed from
+    the record's begin on, where the joint is at `start`."""
+
+    time: Array
+    value: Array
+    start: float
+    _passed: dict[Hashable, Array] = field(default_factory=dict, repr=False)
+
+    def passed(self, model: Model) -> Array:
+        """The reference (m,) behind the command path, but for its constant delays; the last ones are kept."""
+        key = changed_by(model)
+        if key not in self._passed:
+            if len(self._passed) >= KEPT:
+                self._passed.clear()
+            self._passed[key] = self._through(model)
+        return self._passed[key]
+
+    def _through(self, model: Model) -> Array:
+        command, signal = [term for term in model.terms if term.element.slot == "command"], self.value
+        for term in command:
+            if term.element.delay is None:
+                continue
+            delays = term.element.delay(self.time, **term.numbers)
+            if np.ptp(delays) > 0.0:
+                signal = _held(self.time, signal, delays)
+        for term in command:
+            if term.element.acts == "leg" and term.element.kernel is not None:
+                still = np.full(len(signal), self.start)
+                path = Path(self.time, still, 0.0 * still, signal, 0.0 * still, signal)
+                signal = signal + effect_along(term.element, term.numbers, model, path)
+        return signal
+
+    def late(self, model: Model) -> float:
+        """The constant delays [s] of the command path."""
+        found = [t.element.delay(self.time[:2], **t.numbers) for t in model.terms if _constant(t)]
+        return float(sum(one[0] for one in found))
+
+
+def _constant(term: Term) -> bool:
+    """Whether a term delays commands by one time."""
+    element = term.element
+    if element.slot != "command" or element.delay is None:
+        return False
+    return float(np.ptp(element.delay(np.array(PROBED), **term.numbers))) == 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """A controller's reference on the samples of its record, before the command path.
+    """A controller's reference along one motion.
 
     Attributes
     ----------
-    time, value : (m,) [s] and the reference there.
+    commanded : over the whole record, of which the motion is that `part`.
     forward : (n,) force that is added behind the controller, at the samples of the motion; None where there is none.
     age : by how much older [s] than its stamp a reference is on average when it acts, beside the delays of the path.
     step : [s] for which the controller holds its force.
@@ -37,8 +88,8 @@ class Reference:
     every : samples of the record for one of the motion.
     """
 
-    time: Array
-    value: Array
+    commanded: Commanded
+    part: slice
     forward: Array | None
     age: float
     step: float
@@ -50,28 +101,14 @@ class Reference:
         from rhythmid.identify.inverse_dynamics.motion import low_pass
 
         command = [term for term in model.terms if term.element.slot == "command"]
-        signal, shift = self.value, self.age + late
-        for term in command:
-            if term.element.delay is None:
-                continue
-            delays = term.element.delay(self.time, **term.numbers)
-            if np.ptp(delays) == 0.0:
-                shift += float(delays[0])
-            else:
-                signal = _held(self.time, signal, delays)
-        for term in command:
-            if term.element.acts == "leg" and term.element.kernel is not None:
-                still = np.full(len(signal), motion.position[0])
-                path = Path(self.time, still, 0.0 * still, signal, 0.0 * still, signal)
-                signal = signal + effect_along(term.element, term.numbers, model, path)
-        asked = np.interp(self.time - shift, self.time, signal)
-        asked = low_pass(asked, float(self.time[1] - self.time[0]), self.cut)[:: self.every]
+        shift, time = self.age + self.commanded.late(model) + late, self.commanded.time
+        asked = np.interp(time[self.part] - shift, time, self.commanded.passed(model))
+        asked = low_pass(asked, float(time[1] - time[0]), self.cut)[:: self.every]
         position, velocity = motion.position, motion.velocity - 0.5 * self.step * motion.acceleration
         total = np.zeros(len(position))
         for term in command:
             if term.element.acts == "observation":
-                ago = motion.time - term.numbers[term.element.dead_time]
-                ago = np.maximum(ago, motion.time[0])
+                ago = np.maximum(motion.time - term.numbers[term.element.dead_time], motion.time[0])
                 position, velocity = (CubicSpline(motion.time, one)(ago) for one in (position, velocity))
         for term in command:
             if term.element.acts == "feedback" and term.element.kernel is not None:

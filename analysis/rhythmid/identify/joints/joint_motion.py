@@ -306,8 +306,8 @@ def _reference(machine: Machine, joint: str, body: BodyMotion) -> Reference:
     held = 0.0 if joint in stretch.smooth else stretch.period
     forward = stretch.forward.get(joint)
     return Reference(
-        stretch.time,
         stretch.reference[joint],
+        stretch.part,
         None if forward is None else _decimated(body, forward),
         0.5 * (held - step),
         step,
