@@ -171,7 +171,7 @@ def run(number: int, seed: int, bodies: Sequence[str], computed: bool = False) -
     if effect != "none":
         speed = float(np.abs(np.gradient(given[joint], time)).max())
         plant, size = concealed(machine, joint, effect, float(np.std(channel.value)), speed, rng)
-    held = bool(rng.uniform() < HELD)
+    held = bool(rng.uniform() < HELD) or effect == "command_hold"  # which holds what is held
     record = recorded(plant, given, time, rng, held=held, with_effort=not computed)
     without = recorded(
         machine, given, time, np.random.default_rng([seed, number, 1]), held=held, with_effort=not computed

@@ -27,6 +27,9 @@ STIFFNESS = 0.1  # of the effort for the motion's size, that a spring is tried a
 # how an answer names what is wrong with a link
 OF_LINKS = {MASS: "link_mass", TURNING: "link_inertia", PAYLOAD: "payload"}
 GAINS = (0.9, 1.1)  # at which it is tried whether an actuator gives less or more than is asked of it
+# standard deviations of a joint's speed at which a limit of its reference's rate is tried: a reference that the limit keeps back most of the time
+# moves at that rate, so that the joint does
+RATES = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +61,8 @@ def joint_catalogue(catalogue: Catalogue) -> Catalogue:
                 for rest in (s.low, s.centre, s.high)
             ],
         )
+    if (limit := found.get("reference_rate_limit")) is not None:
+        found[limit.name] = replace(limit, starts=lambda s: [{"rate": one * s.velocity} for one in RATES])
     # what the joints of a simulated robot have
     if (friction := found.get("soft_constraint_friction")) is not None:
         found[friction.name] = replace(friction, candidate=True)
