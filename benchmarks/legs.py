@@ -160,7 +160,9 @@ def run(number: int, seed: int, bodies: Sequence[str], computed: bool = False) -
     given = asked(body, machine, time, rng)
     joint = str(rng.choice(machine.joints))
     there = {family(term.element.name) for term in machine.paths[joint].terms}
-    lacking = [name for name in (*EFFECTS, *(COMMANDS if computed else ())) if family(name) not in there]  # what a path has, a fit takes in
+    lacking = [
+        name for name in (*EFFECTS, *(COMMANDS if computed else ())) if family(name) not in there
+    ]  # what a path has, a fit takes in
     if not carried_at(machine, joint):
         lacking.remove("payload")
     effect = "none" if rng.uniform() < NULLS else str(rng.choice(lacking))

@@ -25,9 +25,7 @@ def asked_of(machine: Machine, hold: str = "zero", delays: dict[str, float] | No
     )
     middles = {joint: (-1.2 if joint == "knee" else 0.3, 0.3) for joint in machine.joints}
     asked = references(middles, TIME, rng, (0.4, 3.0))
-    made = recorded(
-        plant, asked, TIME, rng, jitter=0.0, lost=0.0, with_effort=False, held=hold == "zero"
-    )
+    made = recorded(plant, asked, TIME, rng, jitter=0.0, lost=0.0, with_effort=False, held=hold == "zero")
     return replace(made, joints={name: replace(one, hold=hold) for name, one in made.joints.items()})
 
 

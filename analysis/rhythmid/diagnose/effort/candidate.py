@@ -66,7 +66,10 @@ def starts_of(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
 
 def _seen(element: Element, balance: Balance) -> bool:
     """Whether the balance of effort can tell of an element: of one without a kernel, which delays, where a reference is known."""
-    if element.slot not in (SEEN_BY_REFERENCE if balance.by_reference else SEEN) or element.acts == "feedback":
+    if (
+        element.slot not in (SEEN_BY_REFERENCE if balance.by_reference else SEEN)
+        or element.acts == "feedback"
+    ):
         return False
     if element.slot == "command" and element.acts in ("leg", "observation"):
         return element.kernel is not None or element.delay is not None
@@ -127,7 +130,9 @@ def extended(model: Model, start: Start, factor: float = 1.0) -> tuple[Model, st
         values[name] = float(np.clip(value, low + margin if low > -math.inf else low, high))
     grown = model.with_element(element, values)
     label = grown.terms[-1].label
-    if element.clock:  # its ticks hang on it all over the record: it is one of the usual ones, or found by no descent
+    if (
+        element.clock
+    ):  # its ticks hang on it all over the record: it is one of the usual ones, or found by no descent
         own = f"{label}.{element.clock}"
         grown = grown.with_parameters({own: replace(grown.parameters[own], fixed=True)})
     return (_alone(grown, element) if element.acts == "constraint" else grown), label

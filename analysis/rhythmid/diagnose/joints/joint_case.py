@@ -34,12 +34,14 @@ RATES = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 
 @dataclass(frozen=True, eq=False)
 class JointResult:
-    """What was found at one joint; `late` [s] by how much later a reference acts where the effort was made from it."""
+    """What was found at one joint; `late` [s] by how much later a reference acts where the effort was made from it, `rotors` the links' masses and
+    inertias that the joint feels as it does its rotor's."""
 
     joint: str
     case: Case
     late: float
     result: EffortResult
+    rotors: tuple[str, ...] = ()
 
     @property
     def by_reference(self) -> bool:
@@ -89,7 +91,7 @@ def diagnose_joint(
     found = effort_run(
         case, _applicable(balance, model), MOST_EFFECTS, other, PROMISING, len(balances.models)
     )
-    return JointResult(joint, case, late, found)
+    return JointResult(joint, case, late, found, balances.rotors(joint))
 
 
 def _applicable(balance: Balance, model: Model) -> Applicability:

@@ -7,6 +7,7 @@ from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
 from rhythmid.diagnose.constants import STATED
 from rhythmid.diagnose.hypothesis import Verdict
+from rhythmid.diagnose.joints.equivalents import shared_among
 from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, name_of
 from rhythmid.diagnose.joints.wrong_link import WrongLink
@@ -68,7 +69,7 @@ def compose_machine(
         unknown=unknown,
         undecided=undecided,
         indistinguishable=tuple(
-            tuple(f"{joint}: {name_of(joint, name, found[joint].by_reference)[0]}" for name in group)
+            tuple(f"{joint}: {name}" for name in group)
             for joint, one in answers.items()
             if joint in named or joint in undecided
             for group in one.indistinguishable
@@ -107,7 +108,7 @@ def _effect(one: JointResult, answer: Diagnosis, label: str) -> JointEffect:
         slot,
         equation,
         decision.shares[label],
-        decision.probability[label],
+        decision.probability[label] / shared_among(one, label),
         parameters,
         gain,
     )

@@ -18,6 +18,7 @@ from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import STATED
 from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.joints.equivalents import equivalent_names, equivalents
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
@@ -219,7 +220,8 @@ def stated_at(one: JointResult) -> tuple[str, ...]:
     known = all(label == INERTIA or name_of(one.joint, label)[0] != label for label in own)
     if not known:  # another value of the path is its author's to check
         return ()
-    return decision.named if alike else tuple(n for n in decision.named if decision.probability[n] >= STATED)
+    named = tuple(label for label in decision.named if _differs(one, label))
+    return named if alike else tuple(label for label in named if decision.probability[label] >= STATED)
 
 
 def _own_labels(one: JointResult) -> list[str]:
@@ -229,8 +231,9 @@ def _own_labels(one: JointResult) -> list[str]:
 
 
 def _different(one: JointResult) -> bool:
-    """Whether all values that were chosen at a joint have come out other than they were."""
-    return all(_differs(one, label) for label in _own_labels(one))
+    """Whether anything was chosen at a joint but values that have come out as they were, or nothing explains it."""
+    own, chosen = _own_labels(one), one.result.selection.chosen
+    return len(own) < max(len(chosen.elements), 1) or any(_differs(one, label) for label in own)
 
 
 def _held_by_alike(one: JointResult) -> float:
@@ -239,7 +242,7 @@ def _held_by_alike(one: JointResult) -> float:
     decision, chosen = one.result.decision, one.result.selection.chosen
     if len(chosen.elements) != 1:
         return 0.0
-    names = {chosen.names[0], *(name for group in decision.equivalent for name in group)}
+    names = {chosen.names[0], *(name for group in equivalents(one) for name in group)}
     rivals = [h for h in one.result.contest.hypotheses if len(h.elements) == 1 and h.names[0] in names]
     return sum(decision.weights.get(rival.key, 0.0) for rival in rivals)
 
@@ -273,7 +276,7 @@ def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, J
 
 
 def _answer(one: JointResult) -> Diagnosis:
-    return compose_effort(one.case, one.result, ())
+    return replace(compose_effort(one.case, one.result, ()), indistinguishable=equivalent_names(one))
 
 
 def _augmented(best: _Explained) -> Machine:

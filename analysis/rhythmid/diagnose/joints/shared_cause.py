@@ -108,7 +108,7 @@ def _change(felt: list[_Felt]) -> float:
     change = 0.0
     for _ in range(ROUNDS):
         pull = strength = 0.0
-        parts: list[tuple[Array, Array, Array, Array]] = []
+        parts: list[tuple[Array, Array]] = []
         for one, error in zip(felt, left, strict=True):
             scale = scale_of(error)
             lasts = autocorrelation_time(error, one.one.result.search.balance.record)
@@ -121,9 +121,9 @@ def _change(felt: list[_Felt]) -> float:
             residual, column = (both - one.jacobian @ solved).T
             pull += float(column @ (weight * residual))
             strength += float(column @ (weight * column))
-            parts.append((residual, column, weight, solved))
+            parts.append((residual, column))
         change = -pull / strength if strength > 0.0 else 0.0
-        left = [residual + change * column for residual, column, _, _ in parts]
+        left = [residual + change * column for residual, column in parts]
     return change
 
 
@@ -145,6 +145,4 @@ def _with_choice(one: JointResult, label: str, evidence: float) -> JointResult:
     decision = decide(result.contest, selection, result.detectable, {})
     probability = 1.0 / (1.0 + math.exp(-min(evidence, 700.0)))
     decision = replace(decision, named=(label,), probability={label: probability})
-    return replace(
-        one, result=replace(result, selection=selection, decision=decision, chosen=chosen)
-    )
+    return replace(one, result=replace(result, selection=selection, decision=decision, chosen=chosen))

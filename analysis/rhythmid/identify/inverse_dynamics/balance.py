@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
+from rhythmid.identify.inverse_dynamics.balance_rows import sampled, stuck
 from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
 from rhythmid.identify.inverse_dynamics.inversion import Inversions
 from rhythmid.identify.inverse_dynamics.motion import (
@@ -25,14 +26,12 @@ from rhythmid.identify.inverse_dynamics.motion import (
     stretches,
 )
 from rhythmid.identify.inverse_dynamics.reference_path import changed_by
-from rhythmid.identify.noise import runs
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.record.record import Record
 from rhythmid.simulation.effect import MAX_STEP, Path, effect_along, load_along
 from rhythmid.simulation.transport import MEASUREMENT, delays
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 STICK = 0.03  # of the fast speed, below which dry friction is set-valued: any force up to the friction (six arm joints, an axis, a frame)
 FAST = 0.95  # quantile of the speed that is called fast
 DECIMATED = 2.5  # rows a period of the cut-off: the Nyquist rate and a quarter for the filter's slope (Gautier et al.)
@@ -42,7 +41,6 @@ QUARTER = 0.25  # of the shortest period of the effort, up to which a gap is bri
 LEAST_ROWS = 40  # rows without which nothing is estimated
 SUBSTEPS = 4  # of an element's own states in a sample of the motion, whose bandwidth has ten
 INVISIBLE = 1e-4  # of a signal that is left by a filter that it does not pass
-NEIGHBOURS = np.arange(-2, 4)  # samples from which a value between two is interpolated (Lagrange)
 TESTED = 64  # samples on which it is found out whether an element's force depends on the effort
 
 
@@ -122,7 +120,7 @@ class Balance:
         """Signals, one (n,) or (n, p) for each motion, filtered, at the rows, `shift` [s] later; (rows,) or (rows, p)."""
         return np.concatenate(
             [
-                _sampled(self.filtered(one, motion.period), places, shift / motion.period)
+                sampled(self.filtered(one, motion.period), places, shift / motion.period)
                 for one, motion, places in zip(signals, self.motions, self.places, strict=True)
             ]
         )
@@ -298,7 +296,9 @@ class Balance:
             for term in reversed([t for t in model.terms if t.element.slot == slot]):
                 if self._counts(term, model):
                     required = self._before(motion, term, model, required, leg, by)
-        if self.by_reference:  # what the command path changes stands on this side: the rows stay the same for all models
+        if (
+            self.by_reference
+        ):  # what the command path changes stands on this side: the rows stay the same for all models
             required = required + motion.effort - self._asked(index, model, self.shift(model))
         return required
 
@@ -385,32 +385,3 @@ def _bridged(records: Sequence[Record], model: Model) -> tuple[list[Stretch], Ba
         return raw, chosen
     chosen = bandwidth_of(longer, model)
     return stretches(records, model, QUARTER / chosen.effort), chosen
-
-
-def stuck(slow: Mask, memory: float) -> Mask:
-    """Samples (n,) to leave out: all `slow` ones, and within half the filter's `memory` [samples] of a rest as long as that, for
-    what the friction did meanwhile has come there through the filter."""
-    out, half = slow.copy(), math.ceil(0.5 * memory)
-    for part in runs(slow):
-        first, end = part.start, part.stop
-        if end - first >= memory:
-            out[max(first - half, 0) : end + half] = True
-    return out
-
-
-def _sampled(signal: Array, places: NDArray[np.int64], shift: float) -> Array:
-    """Values of (n,) or (n, p) at places moved by `shift` samples."""
-    whole = math.floor(shift)
-    if shift == whole:
-        return signal[np.clip(places + whole, 0, len(signal) - 1)]
-    between = shift - whole
-    weights = [
-        math.prod(
-            (between - other) / (node - other) for other in NEIGHBOURS.tolist() if other != node
-        )
-        for node in NEIGHBOURS.tolist()
-    ]  # fmt: skip
-    total = np.zeros((len(places), *signal.shape[1:]))
-    for node, weight in zip(NEIGHBOURS.tolist(), weights, strict=True):
-        total += weight * signal[np.clip(places + whole + node, 0, len(signal) - 1)]
-    return total

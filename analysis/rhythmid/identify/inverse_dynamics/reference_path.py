@@ -23,7 +23,12 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ON_TICK = 1e-9  # [s] within which a command that has arrived counts as there
 KEPT = 16  # references behind a path that are kept: those of the steps of one fit
-PROBED = (0.0, 0.0137, 0.3711, 1.9173)  # [s] stamps, in no ratio, at which a delay is looked at for whether it varies
+PROBED = (
+    0.0,
+    0.0137,
+    0.3711,
+    1.9173,
+)  # [s] stamps, in no ratio, at which a delay is looked at for whether it varies
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,16 +67,16 @@ class Commanded:
 
     def late(self, model: Model) -> float:
         """The constant delays [s] of the command path."""
-        found = [t.element.delay(self.time[:2], **t.numbers) for t in model.terms if _constant(t)]
-        return float(sum(one[0] for one in found))
+        return sum((_constant(term) for term in model.terms), 0.0)
 
 
-def _constant(term: Term) -> bool:
-    """Whether a term delays commands by one time."""
+def _constant(term: Term) -> float:
+    """The one time [s] by which a term delays all commands; 0 where it varies or does not."""
     element = term.element
     if element.slot != "command" or element.delay is None:
-        return False
-    return float(np.ptp(element.delay(np.array(PROBED), **term.numbers))) == 0.0
+        return 0.0
+    delays = element.delay(np.array(PROBED), **term.numbers)
+    return float(delays[0]) if np.ptp(delays) == 0.0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -132,7 +132,9 @@ def shared(joints: dict[str, Delay], period: float) -> ReferenceDelay:
     weights = 1.0 / variances
     middle = float(weights[some] @ values[some] / weights[some].sum())
     spread = float((weights[some] * (values[some] - middle) ** 2).sum()) / max(int(some.sum()) - 1, 1)
-    std = np.sqrt(max(spread, 1.0) / weights[some].sum())  # as wide as they scatter (R. T. Birge, Phys. Rev. 40 (1932) 207)
+    std = np.sqrt(
+        max(spread, 1.0) / weights[some].sum()
+    )  # as wide as they scatter (R. T. Birge, Phys. Rev. 40 (1932) 207)
     chance = None
     if len(names) > 1:
         mean = float(weights @ values / weights.sum())
