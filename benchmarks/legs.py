@@ -1,10 +1,11 @@
 """Effects concealed at one joint of machines of several joints, and found again from messy logs.
 
-    python benchmarks/legs.py [--cases N] [--seed S] [--bodies leg,arm,quadruped] [--json FILE]
+    python benchmarks/legs.py [--cases N] [--seed S] [--bodies leg,arm,quadruped] [--computed] [--json FILE]
 
 Every case draws a body, and a joint and an effect or none; the plant has the effect, the diagnosis has not. Logs have stamps that jitter by
 0.3 ms, an encoder's steps, noise of 1 % on the torque and lost messages; in half of the cases the reference is held from stamp to stamp and the
-torque is that of the instant, in the others it goes on smoothly, and nothing is told of which. Counted with Wilson's 95 % intervals: joint right
+torque is that of the instant, in the others it goes on smoothly, and nothing is told of which. With --computed no torque is recorded, but the
+references and positions only: the torque is computed from the controllers, and effects of the command path are concealed, too. Counted with Wilson's 95 % intervals: joint right
 (something is named there; marked: named, undecided or unknown), joint and effect right (the effect, one that the answer lists as
 indistinguishable from it, or one of its family), both also where the effect's share of what the refitted nominal path misses of the joint's effort, by power, is above 10 %, and joints without an
 effect at which something was named.
@@ -40,6 +41,9 @@ LASTS = {"leg": 18.0, "arm": 20.0, "quadruped": 16.0}  # [s]
 # sizes as shares of the rms of the joint's effort (N m), or of what they multiply
 EFFECTS = ("coulomb_friction", "actuator_lag", "actuator_gain", "actuator_delay", "constant_force", "linear_spring",
            "link_mass", "payload", "armature", "actuator_deadband", "stribeck_friction")  # fmt: skip
+# effects of the command path, which a recorded torque does not show
+COMMANDS = ("input_delay", "command_lag", "command_hold", "reference_rate_limit")
+DELAYS = ("actuator_delay", "input_delay")
 
 
 @dataclass(frozen=True)
@@ -65,10 +69,16 @@ class Case:
     seconds: float
 
 
-def concealed(machine: Machine, joint: str, effect: str, effort: float, rng: np.random.Generator):
-    """The plant with the effect at the joint, its size drawn, and that size."""
+def concealed(
+    machine: Machine, joint: str, effect: str, effort: float, speed: float, rng: np.random.Generator
+):
+    """The plant with the effect at the joint, its size drawn, and that size; `effort` is the rms of the joint's, `speed` the largest of its
+    reference."""
     catalogue = load_catalogue()
     share = float(rng.uniform(0.08, 0.25))
+    if effect == "input_delay":
+        late = float(rng.uniform(0.008, 0.015))
+        return machine.with_values({f"{joint}.input_delay.delay": late}), late
     if effect == "link_mass":
         links = [name for name in machine.body.links if machine.body.joint_of(name) == joint]
         name = f"{links[-1]}.mass"
@@ -95,6 +105,9 @@ def concealed(machine: Machine, joint: str, effect: str, effort: float, rng: np.
         "constant_force": {"force": share * effort},
         "linear_spring": {"stiffness": 4.0 * share * effort, "rest_length": float(rng.uniform(-0.5, 0.5))},
         "actuator_deadband": {"threshold": share * effort},
+        "command_lag": {"time_constant": float(rng.uniform(0.008, 0.015))},
+        "command_hold": {"period": float(rng.uniform(0.02, 0.03))},
+        "reference_rate_limit": {"rate": float(rng.uniform(0.4, 0.6)) * speed},
     }[effect]  # fmt: skip
     element = catalogue[effect]
     return machine.with_element(joint, element, values), next(iter(values.values()))
@@ -123,7 +136,7 @@ def family(name: str) -> str:
 
 
 def share_of(
-    machine: Machine, plant: Machine, joint: str, record: JointRecord, without: JointRecord
+    machine: Machine, plant: Machine, joint: str, effect: str, record: JointRecord, without: JointRecord
 ) -> float:
     """By how much of its power what the nominal path misses of the joint's effort falls where the path has the effect, both refitted.
 
@@ -134,13 +147,12 @@ def share_of(
         balances = likely_readings(balances_of(one, [of]), [of])[0]
         return fit_effort(balances.balance(joint), balances.models[joint]).error
 
-    late = any(term.element.name == "actuator_delay" for term in plant.paths[joint].terms)
-    least = missed(machine, without) if late else missed(plant, record)
+    least = missed(machine, without) if effect in DELAYS else missed(plant, record)
     return 1.0 - (least / missed(machine, record)) ** 2
 
 
-def run(number: int, seed: int, bodies: Sequence[str]) -> Case:
-    """One case."""
+def run(number: int, seed: int, bodies: Sequence[str], computed: bool = False) -> Case:
+    """One case; with `computed` no effort is recorded."""
     rng = np.random.default_rng([seed, number])
     body = bodies[number % len(bodies)]
     machine = Machine.load(MODELS / f"{body}.yaml")
@@ -148,7 +160,9 @@ def run(number: int, seed: int, bodies: Sequence[str]) -> Case:
     given = asked(body, machine, time, rng)
     joint = str(rng.choice(machine.joints))
     there = {family(term.element.name) for term in machine.paths[joint].terms}
-    lacking = [name for name in EFFECTS if family(name) not in there]  # what a path has, a fit takes in
+    lacking = [
+        name for name in (*EFFECTS, *(COMMANDS if computed else ())) if family(name) not in there
+    ]  # what a path has, a fit takes in
     if not carried_at(machine, joint):
         lacking.remove("payload")
     effect = "none" if rng.uniform() < NULLS else str(rng.choice(lacking))
@@ -157,11 +171,14 @@ def run(number: int, seed: int, bodies: Sequence[str]) -> Case:
     assert channel is not None
     plant, size = machine, 0.0
     if effect != "none":
-        plant, size = concealed(machine, joint, effect, float(np.std(channel.value)), rng)
-    held = bool(rng.uniform() < HELD)
-    record = recorded(plant, given, time, rng, held=held)
-    without = recorded(machine, given, time, np.random.default_rng([seed, number, 1]), held=held)
-    share = 0.0 if effect == "none" else share_of(machine, plant, joint, record, without)
+        speed = float(np.abs(np.gradient(given[joint], time)).max())
+        plant, size = concealed(machine, joint, effect, float(np.std(channel.value)), speed, rng)
+    held = bool(rng.uniform() < HELD) or effect == "command_hold"  # which holds what is held
+    record = recorded(plant, given, time, rng, held=held, with_effort=not computed)
+    without = recorded(
+        machine, given, time, np.random.default_rng([seed, number, 1]), held=held, with_effort=not computed
+    )
+    share = 0.0 if effect == "none" else share_of(machine, plant, joint, effect, record, without)
     began = clock.process_time()
     answer = diagnose_machine([record], machine).diagnosis
     named = tuple((one.joint, one.element) for one in answer.missing)
@@ -228,12 +245,13 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--bodies", default=",".join(BODIES))
+    parser.add_argument("--computed", action="store_true")
     parser.add_argument("--json", type=Path)
     given = parser.parse_args()
     cases: list[Case] = []
     for number in range(given.first, given.first + given.cases):
         try:
-            cases.append(run(number, given.seed, given.bodies.split(",")))
+            cases.append(run(number, given.seed, given.bodies.split(","), given.computed))
         except InputError as error:
             print(f"{number}: {error}", flush=True)
             continue

@@ -126,9 +126,11 @@ def effort_runs(
 
 def _along(balance: Balance, fitted: Fitted) -> list[Array]:
     """The effort (n,) that a fit predicts at every sample of each stretch."""
-    model, late = fitted.fit.model, balance.shift(fitted.fit.model) + fitted.fit.alignment
-    made = []
-    for motion, required in zip(balance.motions, balance.required(model), strict=True):
+    model, alignment = fitted.fit.model, fitted.fit.alignment
+    late, made = balance.later(model, alignment), []
+    changes = balance.moved(model, alignment) or len(balance.motions) * [0.0]
+    for motion, required, change in zip(balance.motions, balance.required(model), changes, strict=True):
+        required = required + change
         signal = balance.filtered(required, motion.period)
         made.append(np.interp(motion.time + late, motion.time, signal))
     return made

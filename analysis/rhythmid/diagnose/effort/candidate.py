@@ -21,6 +21,8 @@ from rhythmid.simulation.transport import INPUT_DELAY
 
 Array = NDArray[np.float64]
 SEEN = ("force", "actuator")  # slots whose elements the balance of effort sees
+# and where the effort is what a controller makes of its reference
+SEEN_BY_REFERENCE = (*SEEN, "command")
 LARGEST = 30.0  # times its first guess that an effect is started at, at most
 LEAST_START = 0.05  # of its first guess, at least: at nothing a shape has no derivative
 
@@ -49,9 +51,7 @@ def starts_of(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
     found: list[Start] = []
     driven = any(motion.driven_by_base for motion in balance.motions)
     for element, values in candidates(catalogue.within(sizes), model.setting, sizes).tried:
-        if element.slot not in SEEN or element.kernel is None or element.acts == "feedback":
-            continue
-        if element.history:
+        if not _seen(element, balance):
             continue
         if driven and (element.slot == "actuator" or element.acts == "drive"):
             continue
@@ -64,14 +64,28 @@ def starts_of(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balanc
     return found
 
 
-def not_tried(catalogue: Catalogue, model: Model, sizes: Scales) -> dict[str, str]:
+def _seen(element: Element, balance: Balance) -> bool:
+    """Whether the balance of effort can tell of an element: of one without a kernel, which delays, where a reference is known."""
+    if (
+        element.slot not in (SEEN_BY_REFERENCE if balance.by_reference else SEEN)
+        or element.acts == "feedback"
+    ):
+        return False
+    if element.slot == "command" and element.acts in ("leg", "observation"):
+        return element.kernel is not None or element.delay is not None
+    return element.kernel is not None and not element.history
+
+
+def not_tried(catalogue: Catalogue, model: Model, sizes: Scales, balance: Balance) -> dict[str, str]:
     """Why candidates of the catalogue take no part, by name: those that the model or the motion rules out, and those that the
     balance of effort cannot see, which are all that commands, sensors and clocks do."""
     reasons = dict(candidates(catalogue.within(sizes), model.setting, sizes).not_tried)
     for element in catalogue.values():
-        if element.candidate and element.slot not in SEEN:
+        if not element.candidate or _seen(element, balance):
+            continue
+        if element.slot not in SEEN:
             reasons[element.name] = f"it acts in the {element.slot} path, which the effort does not show"
-        elif element.candidate and element.history:
+        elif element.history:
             reasons[element.name] = (
                 "it acts on past values, which the balance of effort at one instant does not contain"
             )
@@ -106,7 +120,7 @@ def extended(model: Model, start: Start, factor: float = 1.0) -> tuple[Model, st
     if start.element is None:
         return (with_freed(model, [start.name]) if start.kind == "freed_value" else model), start.name
     element, values = start.element, dict(start.values)
-    if element.size and math.isfinite(element.absent):
+    if element.size and math.isfinite(element.absent) and not element.clock:
         name = element.size
         low, high = element.parameter(name).bounds
         if abs(factor) < LEAST_START:
@@ -116,6 +130,11 @@ def extended(model: Model, start: Start, factor: float = 1.0) -> tuple[Model, st
         values[name] = float(np.clip(value, low + margin if low > -math.inf else low, high))
     grown = model.with_element(element, values)
     label = grown.terms[-1].label
+    if (
+        element.clock
+    ):  # its ticks hang on it all over the record: it is one of the usual ones, or found by no descent
+        own = f"{label}.{element.clock}"
+        grown = grown.with_parameters({own: replace(grown.parameters[own], fixed=True)})
     return (_alone(grown, element) if element.acts == "constraint" else grown), label
 
 
@@ -159,7 +178,9 @@ def screen(balance: Balance, parent: EffortFit, starts: Sequence[Start]) -> list
         if strength < 1e-8 * raw:
             continue
         factor = -float(change @ left) / strength
-        gain = 0.5 * factor**2 * strength
+        if start.element is not None and start.element.clock:
+            factor = 1.0
+        gain = -factor * float(change @ left) - 0.5 * factor**2 * strength
         if start.element is not None and start.element.forbids(start.values, factor):
             gain = 0.0
         one = Screened(start, gain, factor)
@@ -196,13 +217,13 @@ def late_start(balance: Balance, parent: EffortFit) -> tuple[Alignment, float]:
     most = max(LONGEST_DELAY / balance.bandwidth.dominant, 2.0 * balance.period)
     usual = Alignment.of(balance)
     required = balance.required(parent.model)
-    shift = balance.shift(parent.model)
     weight = weights_of(parent.residual, parent.scale) / parent.scale**2
     root = np.sqrt(weight)
     basis = orthonormal(parent.jacobian[:, 1:] * root[:, None]) if parent.names else np.zeros((len(root), 0))
     best, place = math.inf, parent.alignment
     for late in np.linspace(0.0, most, 1 + min(60, math.ceil(2.0 * most / balance.period))):
-        error = root * (balance.rows(required, shift + float(late)) - balance.measured)
+        rows = balance.rows(required, balance.later(parent.model, float(late)))
+        error = root * (balance.with_moved(rows, parent.model, float(late)) - balance.measured)
         error = error - basis @ (basis.T @ error)
         if float(error @ error) < best:
             best, place = float(error @ error), float(late)

@@ -47,7 +47,7 @@ def map_columns(balance: Balance, fitted: Fitted, free: Map) -> Array:
     """Columns (n, q) of a free map at the rows of a balance."""
     loads = balance.required(fitted.fit.model)
     made = (free.columns(motion, load) for motion, load in zip(balance.motions, loads, strict=True))
-    return balance.rows(made, balance.shift(fitted.fit.model) + fitted.fit.alignment)
+    return balance.rows(made, balance.later(fitted.fit.model, fitted.fit.alignment))
 
 
 def _with_map(balance: Balance, fitted: Fitted, ridge: float, free: Map, columns: Array) -> Mapped:

@@ -130,7 +130,7 @@ def search_effort(
         search.reduce(one)
     beyond = reference_of(balance, chosen, search.blocks)
     return EffortSearch(
-        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, not_tried(catalogue, model, scales_of(balance, model)) | search.cut, len(search.tried), bool(search.cut),
+        balance, search.blocks, nominal, tuple(search.found), search.set_aside, chosen, reference, beyond, not_tried(catalogue, model, scales_of(balance, model), balance) | search.cut, len(search.tried), bool(search.cut),
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from pydantic import TypeAdapter
 
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate, FitQuality, Scored
 from rhythmid.diagnose.hypothesis import Verdict
+from rhythmid.identify.joints.reference_delay import ReferenceDelay
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,8 @@ class MachineDiagnosis:
     """The answer to: which physics does the model of this machine lack, and at which joint?
 
     `joints` holds the whole answer at each joint, `unknown` the joints whose mismatch no name of the catalogue explains, `undecided`
-    those at which the evidence does not separate several names, `not_judged` why a joint could not be judged.
+    those at which the evidence does not separate several names, `not_judged` why a joint could not be judged. `reference_delay` is by how much
+    later than the model says the references act, where efforts are made from them.
     """
 
     verdict: Verdict
@@ -67,6 +69,7 @@ class MachineDiagnosis:
     not_judged: dict[str, str] = field(default_factory=dict)
     assumptions: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    reference_delay: ReferenceDelay | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The diagnosis as plain JSON data; a number that is not finite is null."""

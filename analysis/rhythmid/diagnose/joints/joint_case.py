@@ -27,16 +27,26 @@ STIFFNESS = 0.1  # of the effort for the motion's size, that a spring is tried a
 # how an answer names what is wrong with a link
 OF_LINKS = {MASS: "link_mass", TURNING: "link_inertia", PAYLOAD: "payload"}
 GAINS = (0.9, 1.1)  # at which it is tried whether an actuator gives less or more than is asked of it
+# standard deviations of a joint's speed at which a limit of its reference's rate is tried: a reference that the limit keeps back most of the time
+# moves at that rate, so that the joint does
+RATES = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 
 
 @dataclass(frozen=True, eq=False)
 class JointResult:
-    """What was found at one joint; `late` [s] by how much later a reference acts where the effort was made from it."""
+    """What was found at one joint; `late` [s] by how much later a reference acts where the effort was made from it, `rotors` the links' masses and
+    inertias that the joint feels as it does its rotor's."""
 
     joint: str
     case: Case
     late: float
     result: EffortResult
+    rotors: tuple[str, ...] = ()
+
+    @property
+    def by_reference(self) -> bool:
+        """Whether the joint's effort is what its controller makes of its reference."""
+        return self.result.search.balance.by_reference
 
 
 def joint_catalogue(catalogue: Catalogue) -> Catalogue:
@@ -53,6 +63,8 @@ def joint_catalogue(catalogue: Catalogue) -> Catalogue:
                 for rest in (s.low, s.centre, s.high)
             ],
         )
+    if (limit := found.get("reference_rate_limit")) is not None:
+        found[limit.name] = replace(limit, starts=lambda s: [{"rate": one * s.velocity} for one in RATES])
     # what the joints of a simulated robot have
     if (friction := found.get("soft_constraint_friction")) is not None:
         found[friction.name] = replace(friction, candidate=True)
@@ -79,7 +91,7 @@ def diagnose_joint(
     found = effort_run(
         case, _applicable(balance, model), MOST_EFFECTS, other, PROMISING, len(balances.models)
     )
-    return JointResult(joint, case, late, found)
+    return JointResult(joint, case, late, found, balances.rotors(joint))
 
 
 def _applicable(balance: Balance, model: Model) -> Applicability:
@@ -91,14 +103,14 @@ def _applicable(balance: Balance, model: Model) -> Applicability:
     )
 
 
-def name_of(joint: str, label: str) -> tuple[str, str]:
+def name_of(joint: str, label: str, by_reference: bool = False) -> tuple[str, str]:
     """What was found wrong at a joint, and where, of a label that is no element's: a link's mass, its inertia, its payload, the rotor's
-    inertia, a delay."""
+    inertia, a delay: of the actuator, or where the effort is made `by_reference` of that."""
     if label == INERTIA:
         return "armature", joint
     if label.startswith(f"{BODY}."):
         link, kind = split(label.removeprefix(f"{BODY}."))
         return OF_LINKS[kind], link
     if label == INPUT_DELAY:
-        return "actuator_delay", joint
+        return "input_delay" if by_reference else "actuator_delay", joint
     return label, joint

@@ -7,11 +7,13 @@ from rhythmid.body.machine import Machine
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate
 from rhythmid.diagnose.constants import STATED
 from rhythmid.diagnose.hypothesis import Verdict
+from rhythmid.diagnose.joints.equivalents import shared_among
 from rhythmid.diagnose.joints.joint_answer import JointEffect, JointLocation, MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, name_of
 from rhythmid.diagnose.joints.wrong_link import WrongLink
 from rhythmid.elements.places import SENTENCES
 from rhythmid.identify.inverse_dynamics.estimate import size_of
+from rhythmid.identify.joints.reference_delay import ReferenceDelay
 from rhythmid.model import INERTIA
 from rhythmid.report.quantity import in_words
 from rhythmid.simulation.transport import INPUT_DELAY
@@ -22,6 +24,7 @@ EQUATIONS = {  # of what is no element: its slot, what it says, and the name of 
     "link_inertia": ("body", "J → J′ about the centre of mass, along the joint's axis", "inertia"),
     "payload": ("body", "point mass m at the end of the link", "mass"),
     "actuator_delay": ("actuator", "f(t) → f(t − τ)", "delay"),
+    "input_delay": ("command", "r(t) → r(t − τ)", "delay"),
 }
 IN_CONTACT = (
     "What was recorded in contact with the ground, or near it, is left out: the contact's force is not known."
@@ -37,6 +40,7 @@ def compose_machine(
     links: Mapping[str, WrongLink],
     refused: Mapping[str, str],
     notes: Sequence[str] = (),
+    delay: ReferenceDelay | None = None,
 ) -> MachineDiagnosis:
     """The diagnosis; `links` are those whose masses, inertias or payloads were put right, `stated` the labels by which the answer at each joint stands."""
     missing = [
@@ -65,7 +69,7 @@ def compose_machine(
         unknown=unknown,
         undecided=undecided,
         indistinguishable=tuple(
-            tuple(f"{joint}: {name_of(joint, name)[0]}" for name in group)
+            tuple(f"{joint}: {name}" for name in group)
             for joint, one in answers.items()
             if joint in named or joint in undecided
             for group in one.indistinguishable
@@ -83,6 +87,7 @@ def compose_machine(
         not_judged=dict(refused),
         assumptions=_assumptions(machine, found, answers),
         notes=tuple(notes),
+        reference_delay=delay,
     )
 
 
@@ -94,7 +99,7 @@ def _effect(one: JointResult, answer: Diagnosis, label: str) -> JointEffect:
         parameters = {name: answer.parameters[f"{label}.{name}"] for name in known.values}
         element, slot, equation = known.element.name, known.element.slot, known.element.equation
     else:
-        element, _ = name_of(one.joint, label)
+        element, _ = name_of(one.joint, label, one.by_reference)
         slot, equation, own = EQUATIONS[element]
         parameters = {own: _value(one, answer, label)}
     return JointEffect(
@@ -103,7 +108,7 @@ def _effect(one: JointResult, answer: Diagnosis, label: str) -> JointEffect:
         slot,
         equation,
         decision.shares[label],
-        decision.probability[label],
+        decision.probability[label] / shared_among(one, label),
         parameters,
         gain,
     )
@@ -205,7 +210,7 @@ def _assumptions(
     said = list(next(iter(answers.values())).assumptions)
     if machine.body.contacts:
         said.append(IN_CONTACT)
-    late = [joint for joint, one in found.items() if one.late > 0.0]
+    late = [joint for joint, one in found.items() if one.by_reference]
     if late:
         said.append(COMPUTED.format(", ".join(late)))
     return tuple(said)

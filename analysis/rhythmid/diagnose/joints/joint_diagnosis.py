@@ -17,17 +17,20 @@ from rhythmid.diagnose.answer.compose_effort import compose_effort
 from rhythmid.diagnose.answer.result import Diagnosis
 from rhythmid.diagnose.case import Budget
 from rhythmid.diagnose.constants import STATED
+from rhythmid.diagnose.effort.fitted import Fitted
+from rhythmid.diagnose.joints.equivalents import equivalent_names, equivalents
 from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.misfit import misfits
+from rhythmid.diagnose.joints.shared_cause import shared_cause
 from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.identify.joints.held_reference import balances_of, likely_readings
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.joints.joint_plausibility import check_joints
-from rhythmid.identify.joints.reference_delay import reference_delay
+from rhythmid.identify.joints.reference_delay import ReferenceDelay, reference_delay
 from rhythmid.identify.joints.reference_lead import told_of
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
@@ -116,20 +119,25 @@ def diagnose_machine(
     answers = {joint: _answer(one) for joint, one in best.found.items()}
     told = () if records[0].sampled else tuple(told_of(best.leads))
     put_right = (one.beside(machine) for one in best.links.values())
-    notes = (*machine.body.notes, *said, *of_holdout, *told, *put_right, *misfits(answers))
-    diagnosis = compose_machine(machine, best.found, answers, best.stated, best.links, best.refused, notes)
+    late = () if best.delay is None else (best.delay.told,)
+    notes = (*machine.body.notes, *said, *of_holdout, *told, *late, *put_right, *misfits(answers))
+    diagnosis = compose_machine(
+        machine, best.found, answers, best.stated, best.links, best.refused, notes, best.delay
+    )
     return MachineAnswer(diagnosis, _augmented(best), best.found)
 
 
 @dataclass(frozen=True, eq=False)
 class _Explained:
-    """What was found at the joints: the machine with the links' parameters that are put right, and the `leads` [s] that were allowed for."""
+    """What was found at the joints: the machine with the links' parameters that are put right, and the `leads` [s] and
+    the `delay` of references that were allowed for."""
 
     machine: Machine
     found: Mapping[str, JointResult]
     refused: Mapping[str, str]
     links: Mapping[str, WrongLink]
     leads: Mapping[str, float]
+    delay: ReferenceDelay | None
 
     @property
     def stated(self) -> dict[str, tuple[str, ...]]:
@@ -155,29 +163,38 @@ def _explained(
     """Search every joint, put a link's mass or inertia right where one is found, and search again what feels it."""
     links: dict[str, WrongLink] = {}
     unseen = JointBalances.of(machine, holdout, balances) if holdout else None
-    found, refused = _searched(balances, unseen, machine.joints, catalogue, tell, budget)
+    delay = reference_delay(balances, balances.computed) if balances.computed else None
+    found, refused = _searched(balances, unseen, machine.joints, catalogue, tell, budget, delay)
     for _ in range(max(MOST_LINKS, len(machine.body.links))):
+        if budget.spent:
+            break
         best = _heaviest(found, set(links))
-        if best is None or budget.spent:
+        if best is None:
+            stated = {joint: stated_at(one) for joint, one in found.items()}
+            cause = shared_cause(balances, found, stated, links)
+            best = None if cause is None else (cause.parameter, cause.shown)
+        if best is None:
             break
         link, result = best
+        found = {**found, result.joint: result}
         links[link] = wrong_link(balances, records, found, link, result)
         machine = links[link].put_right(machine)
         balances = JointBalances.of(machine, records, balances)
         unseen = JointBalances.of(machine, holdout, balances) if holdout else None
         again = [joint for joint in machine.joints if link in balances.links(joint)]
-        better, refused = _searched(balances, unseen, again, catalogue, tell, budget)
+        delay = reference_delay(balances, balances.computed) if balances.computed else None
+        better, refused = _searched(balances, unseen, again, catalogue, tell, budget, delay)
         found = {**found, **better}
-    return _Explained(machine, found, refused, links, balances.leads)
+    return _Explained(machine, found, refused, links, balances.leads, delay)
 
 
 def _searched(
     balances: JointBalances, unseen: JointBalances | None, joints: Sequence[str], catalogue: Catalogue,
-    tell: Tell, budget: Budget,
+    tell: Tell, budget: Budget, delay: ReferenceDelay | None,
 ) -> tuple[dict[str, JointResult], dict[str, str]]:  # fmt: skip
     found: dict[str, JointResult] = {}
     refused: dict[str, str] = {}
-    late = reference_delay(balances, balances.computed) if balances.computed else 0.0
+    late = 0.0 if delay is None else delay.shared.value
     for joint in joints:
         tell(f"joint {joint}")
         try:
@@ -203,7 +220,8 @@ def stated_at(one: JointResult) -> tuple[str, ...]:
     known = all(label == INERTIA or name_of(one.joint, label)[0] != label for label in own)
     if not known:  # another value of the path is its author's to check
         return ()
-    return decision.named if alike else tuple(n for n in decision.named if decision.probability[n] >= STATED)
+    named = tuple(label for label in decision.named if _differs(one, label))
+    return named if alike else tuple(label for label in named if decision.probability[label] >= STATED)
 
 
 def _own_labels(one: JointResult) -> list[str]:
@@ -213,8 +231,9 @@ def _own_labels(one: JointResult) -> list[str]:
 
 
 def _different(one: JointResult) -> bool:
-    """Whether all values that were chosen at a joint have come out other than they were."""
-    return all(_differs(one, label) for label in _own_labels(one))
+    """Whether anything was chosen at a joint but values that have come out as they were, or nothing explains it."""
+    own, chosen = _own_labels(one), one.result.selection.chosen
+    return len(own) < max(len(chosen.elements), 1) or any(_differs(one, label) for label in own)
 
 
 def _held_by_alike(one: JointResult) -> float:
@@ -223,7 +242,7 @@ def _held_by_alike(one: JointResult) -> float:
     decision, chosen = one.result.decision, one.result.selection.chosen
     if len(chosen.elements) != 1:
         return 0.0
-    names = {chosen.names[0], *(name for group in decision.equivalent for name in group)}
+    names = {chosen.names[0], *(name for group in equivalents(one) for name in group)}
     rivals = [h for h in one.result.contest.hypotheses if len(h.elements) == 1 and h.names[0] in names]
     return sum(decision.weights.get(rival.key, 0.0) for rival in rivals)
 
@@ -257,7 +276,7 @@ def _heaviest(found: Mapping[str, JointResult], known: set[str]) -> tuple[str, J
 
 
 def _answer(one: JointResult) -> Diagnosis:
-    return compose_effort(one.case, one.result, ())
+    return replace(compose_effort(one.case, one.result, ()), indistinguishable=equivalent_names(one))
 
 
 def _augmented(best: _Explained) -> Machine:
@@ -281,8 +300,17 @@ def _augmented(best: _Explained) -> Machine:
             free = label.startswith(f"{BODY}.") and label in adopted and link not in best.links
             if free and std < spreads.get(link, math.inf):
                 inertial[link], spreads[link] = fitted.model.value(label), std
-        machine = machine.with_path(joint, _without_body(fitted.model, path))
+        machine = machine.with_path(joint, _without_body(_with_delay(one, fitted), path))
     return machine.with_inertial(inertial) if inertial else machine
+
+
+def _with_delay(one: JointResult, fitted: Fitted) -> Model:
+    """A joint's fitted path with the whole delay of its reference, where the effort was made from that and the path has a delay."""
+    model = fitted.model
+    if not one.by_reference or INPUT_DELAY not in model.parameters or model.parameters[INPUT_DELAY].fixed:
+        return model
+    late = model.value(INPUT_DELAY) + one.late + fitted.fit.alignment
+    return model.with_values({INPUT_DELAY: max(late, 0.0)})
 
 
 def _without_body(model: Model, path: Model) -> Model:

@@ -98,7 +98,7 @@ def _rows(balances: JointBalances, joint: str, model: Model, late: float, link: 
     balance = balances.balance(joint, late)
     fit = fit_effort(balance, model)
     made = [body.inertial_columns(link, b.pose, b.rate, b.acceleration)[:, own] for b in balances.bodies]
-    columns = balance.rows(made, balance.shift(fit.model) + fit.alignment)
+    columns = balance.rows(made, balance.later(fit.model, fit.alignment))
     return _Rows(fit.residual, columns, fit.jacobian, balance.record)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
+from rhythmid.identify.inverse_dynamics.balance_rows import sampled, stuck
 from rhythmid.identify.inverse_dynamics.bandwidth import Bandwidth, bandwidth_of
 from rhythmid.identify.inverse_dynamics.inversion import Inversions
 from rhythmid.identify.inverse_dynamics.motion import (
@@ -24,14 +25,13 @@ from rhythmid.identify.inverse_dynamics.motion import (
     motion_of,
     stretches,
 )
-from rhythmid.identify.noise import runs
+from rhythmid.identify.inverse_dynamics.reference_path import changed_by
 from rhythmid.model import INERTIA, Model, Term
 from rhythmid.record.record import Record
 from rhythmid.simulation.effect import MAX_STEP, Path, effect_along, load_along
 from rhythmid.simulation.transport import MEASUREMENT, delays
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 STICK = 0.03  # of the fast speed, below which dry friction is set-valued: any force up to the friction (six arm joints, an axis, a frame)
 FAST = 0.95  # quantile of the speed that is called fast
 DECIMATED = 2.5  # rows a period of the cut-off: the Nyquist rate and a quarter for the filter's slope (Gautier et al.)
@@ -41,7 +41,6 @@ QUARTER = 0.25  # of the shortest period of the effort, up to which a gap is bri
 LEAST_ROWS = 40  # rows without which nothing is estimated
 SUBSTEPS = 4  # of an element's own states in a sample of the motion, whose bandwidth has ten
 INVISIBLE = 1e-4  # of a signal that is left by a filter that it does not pass
-NEIGHBOURS = np.arange(-2, 4)  # samples from which a value between two is interpolated (Lagrange)
 TESTED = 64  # samples on which it is found out whether an element's force depends on the effort
 
 
@@ -121,7 +120,7 @@ class Balance:
         """Signals, one (n,) or (n, p) for each motion, filtered, at the rows, `shift` [s] later; (rows,) or (rows, p)."""
         return np.concatenate(
             [
-                _sampled(self.filtered(one, motion.period), places, shift / motion.period)
+                sampled(self.filtered(one, motion.period), places, shift / motion.period)
                 for one, motion, places in zip(signals, self.motions, self.places, strict=True)
             ]
         )
@@ -165,6 +164,42 @@ class Balance:
             ]
         )
 
+    @property
+    def by_reference(self) -> bool:
+        """Whether the effort was not recorded, but is what a controller makes of its reference."""
+        return self.motions[0].reference is not None
+
+    def later(self, model: Model, alignment: float = 0.0) -> float:
+        """By how much later [s] than the rows the motion shows the effort, `alignment` [s] beyond the model's delays. What is computed from the
+        motion is not later than it: of an effort by a reference, this alone is late, see `moved`."""
+        return 0.0 if self.by_reference else self.shift(model) + alignment
+
+    def moved(self, model: Model, alignment: float) -> list[Array]:
+        """Change (n,) of the compared effort along each motion where its reference acts `alignment` [s] later; none for a recorded effort."""
+        if not self.by_reference or alignment == 0.0:
+            return []
+        late = self.shift(model)
+        return [
+            self._asked(index, model, late) - one.reference.force(model, one, late + alignment)
+            for index, one in enumerate(self.motions)
+            if one.reference is not None
+        ]
+
+    def with_moved(self, rows: Array, model: Model, alignment: float) -> Array:
+        """Rows (n,) of a required effort with its reference acting `alignment` [s] later."""
+        changes = self.moved(model, alignment)
+        return rows + self.rows(changes) if changes else rows
+
+    def _asked(self, index: int, model: Model, late: float) -> Array:
+        """Force (n,) that the controller asks for by its reference; kept, for most refits do not change the command path."""
+        key = (index, "asked", changed_by(model), late)
+        found = self._forces.get(key)
+        if found is None:
+            motion = self.motions[index]
+            assert motion.reference is not None
+            self._forces[key] = found = motion.reference.force(model, motion, late)
+        return found
+
     def shift(self, model: Model) -> float:
         """By how much later [s] than the stamps of the effort the motion shows it, as the model's delays say."""
         slots = MEASUREMENT if controlled(model) else ("command", *MEASUREMENT)
@@ -189,7 +224,8 @@ class Balance:
 
     def predicted(self, model: Model, alignment: float = 0.0) -> Array:
         """The effort (rows,) that the model predicts, `alignment` [s] beyond the model's own delays."""
-        return self.rows(self.required(model), self.shift(model) + alignment)
+        rows = self.rows(self.required(model), self.later(model, alignment))
+        return self.with_moved(rows, model, alignment)
 
     def estimated(self, model: Model) -> list[str]:
         """The free parameters that the effort can tell of: the inertia, forces, and the actuator."""
@@ -227,7 +263,9 @@ class Balance:
         if self.motions[0].driven_by_base or term.element.kernel is None:
             return False
         return slot == "actuator" or (
-            slot == "command" and term.element.acts != "feedback" and not controlled(model)
+            slot == "command"
+            and term.element.acts != "feedback"
+            and (self.by_reference or not controlled(model))
         )
 
     def _required(self, index: int, model: Model, by: Inversions) -> Array:
@@ -254,10 +292,14 @@ class Balance:
             required = required - sum(self._along(motion, t, model, zero, leg, zero) for t in late)
         elif late:
             required = self._with_load(motion, late, model, required, leg, by)
-        for slot in ("actuator", "command"):
+        for slot in ("actuator",) if self.by_reference else ("actuator", "command"):
             for term in reversed([t for t in model.terms if t.element.slot == slot]):
                 if self._counts(term, model):
                     required = self._before(motion, term, model, required, leg, by)
+        if (
+            self.by_reference
+        ):  # what the command path changes stands on this side: the rows stay the same for all models
+            required = required + motion.effort - self._asked(index, model, self.shift(model))
         return required
 
     def _with_load(
@@ -343,32 +385,3 @@ def _bridged(records: Sequence[Record], model: Model) -> tuple[list[Stretch], Ba
         return raw, chosen
     chosen = bandwidth_of(longer, model)
     return stretches(records, model, QUARTER / chosen.effort), chosen
-
-
-def stuck(slow: Mask, memory: float) -> Mask:
-    """Samples (n,) to leave out: all `slow` ones, and within half the filter's `memory` [samples] of a rest as long as that, for
-    what the friction did meanwhile has come there through the filter."""
-    out, half = slow.copy(), math.ceil(0.5 * memory)
-    for part in runs(slow):
-        first, end = part.start, part.stop
-        if end - first >= memory:
-            out[max(first - half, 0) : end + half] = True
-    return out
-
-
-def _sampled(signal: Array, places: NDArray[np.int64], shift: float) -> Array:
-    """Values of (n,) or (n, p) at places moved by `shift` samples."""
-    whole = math.floor(shift)
-    if shift == whole:
-        return signal[np.clip(places + whole, 0, len(signal) - 1)]
-    between = shift - whole
-    weights = [
-        math.prod(
-            (between - other) / (node - other) for other in NEIGHBOURS.tolist() if other != node
-        )
-        for node in NEIGHBOURS.tolist()
-    ]  # fmt: skip
-    total = np.zeros((len(places), *signal.shape[1:]))
-    for node, weight in zip(NEIGHBOURS.tolist(), weights, strict=True):
-        total += weight * signal[np.clip(places + whole + node, 0, len(signal) - 1)]
-    return total

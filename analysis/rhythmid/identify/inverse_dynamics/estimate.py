@@ -120,12 +120,14 @@ def linearise(balance: Balance, model: Model, names: Sequence[str], alignment: f
     signals = [
         np.column_stack([old, *(column[index] for column in moved)]) for index, old in enumerate(required)
     ]
-    shift = balance.shift(model) + alignment
-    rows = balance.rows(signals, shift)
-    late = 0.25 * balance.period
-    first = [signal[:, 0] for signal in signals]
-    slope = (balance.rows(first, shift + late) - balance.rows(first, shift - late)) / (2.0 * late)
-    return rows[:, 0] - balance.measured, np.column_stack([slope, rows[:, 1:]])
+    rows = balance.rows(signals, balance.later(model, alignment))
+    first, late = [signal[:, 0] for signal in signals], 0.25 * balance.period
+    after, before = (
+        balance.with_moved(balance.rows(first, balance.later(model, at)), model, at)
+        for at in (alignment + late, alignment - late)
+    )
+    residual = balance.with_moved(rows[:, 0], model, alignment) - balance.measured
+    return residual, np.column_stack([(after - before) / (2.0 * late), rows[:, 1:]])
 
 
 def fit_effort(

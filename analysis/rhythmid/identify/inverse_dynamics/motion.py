@@ -19,6 +19,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
+from rhythmid.identify.inverse_dynamics.reference_path import Reference
 from rhythmid.identify.noise import runs
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
@@ -46,7 +47,7 @@ class Motion:
     moves. `coupling` (n,) is, at a joint of several, the force beside its own inertia times its acceleration that the body asks
     for; `links` are its derivatives with respect to the body's parameters, by name, and the values at which they were taken.
     `bridged` are the gaps, from and until [s], across which nothing was recorded but interpolated: no row of effort lies there. `others`
-    are the speeds of the other joints, by name.
+    are the speeds of the other joints, by name. Where the effort was not recorded, `reference` is what a controller makes it of.
     """
 
     record: int
@@ -64,6 +65,7 @@ class Motion:
     links: Mapping[str, tuple[float, Array]] = field(default_factory=dict)
     bridged: tuple[tuple[float, float], ...] = ()
     others: Mapping[str, Array] = field(default_factory=dict)
+    reference: Reference | None = None
 
     def recorded(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
         """Those of the rows that lie in no gap."""

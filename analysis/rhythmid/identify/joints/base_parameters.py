@@ -69,7 +69,7 @@ def estimate_inertia(
     parts, targets = [], []
     for joint, (balance, fit) in fits.items():
         own = body.joints[joint].velocity
-        shift = balance.shift(fit.model) + fit.alignment
+        shift = balance.later(fit.model, fit.alignment)
         made = balance.rows([np.ascontiguousarray(one[:, own]) for one in columns], shift) * sizes
         residual, jacobian = linearise(balance, fit.model, _paths(fit), fit.alignment)
         left = _without(np.column_stack([made, residual]), jacobian) / (fit.scale * np.sqrt(fit.correlation))

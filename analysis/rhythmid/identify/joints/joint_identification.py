@@ -17,7 +17,13 @@ from rhythmid.body.body import BODY
 from rhythmid.body.machine import Machine
 from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.balance import Balance
-from rhythmid.identify.inverse_dynamics.estimate import EffortFit, fit_effort, size_of
+from rhythmid.identify.inverse_dynamics.estimate import (
+    FARTHEST,
+    Alignment,
+    EffortFit,
+    fit_effort,
+    size_of,
+)
 from rhythmid.identify.joint import POOR_MOTION
 from rhythmid.identify.joints.base_parameters import InertialEstimate, estimate_inertia
 from rhythmid.identify.joints.correlation import Correlations
@@ -25,7 +31,7 @@ from rhythmid.identify.joints.held_reference import balances_of, not_told
 from rhythmid.identify.joints.joint_motion import JointBalances
 from rhythmid.identify.joints.joint_plausibility import check_joints
 from rhythmid.identify.joints.output_error import Knowledge, free_runs, refine
-from rhythmid.identify.joints.reference_delay import reference_delay
+from rhythmid.identify.joints.reference_delay import ReferenceDelay, reference_delay
 from rhythmid.model import INERTIA, Model
 from rhythmid.progress import Tell
 from rhythmid.record.cleaning import cleaned_joints
@@ -46,7 +52,6 @@ RELATIVE = 0.3  # of its value, the same at least
 EXPECTED = (
     0.02  # of the motion, that a right model's free run errs by (measured: machines in the air 1 to 3 %)
 )
-DELAY_STD = 1.0  # samples: of a reference's delay that inverse dynamics found
 
 
 @dataclass(frozen=True)
@@ -89,6 +94,7 @@ class MachineIdentification(Result):
     not_identified: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
     fits: Mapping[str, tuple[Balance, Model, EffortFit]] = field(default_factory=dict, repr=False)
+    reference_delay: ReferenceDelay | None = None
 
     @property
     def usable(self) -> bool:
@@ -138,6 +144,7 @@ class MachineIdentification(Result):
                 "not_identified": list(self.not_identified),
             },
             "notes": list(self.notes),
+            "reference_delay": None if self.reference_delay is None else asdict(self.reference_delay),
         }
 
 
@@ -175,12 +182,12 @@ def identify_machine(
     common = reference_delay(balances, balances.computed) if balances.computed else None
     for joint in machine.joints:
         tell(f"joint {joint}")
-        late = common if joint in balances.computed else None
+        late = None if common is None or joint not in balances.computed else common.shared.value
         balance = balances.balance(joint, late or 0.0)
-        fit = fit_effort(balance, balances.models[joint])
+        fit = fit_effort(balance, balances.models[joint], aligned=_aligned(balance, joint, common))
         fits[joint] = balance, fit
         errors[joint] = fit.error / size_of(balance)
-        identified = _with_fit(identified, machine, joint, fit, late, balances.period, found)
+        identified = _with_fit(identified, machine, joint, fit, late, found)
         correlations.append(Correlations.of_fit(joint, fit))
     inertia = None
     if not balances.computed:
@@ -188,6 +195,8 @@ def identify_machine(
         inertia = estimate_inertia(balances, fits)
     tell("free runs")
     runs, notes = {}, [*machine.body.notes, *said, *of_holdout]
+    if common is not None:
+        notes.append(common.told)
     others = JointBalances.of(machine, unseen, balances)
     try:
         made = free_runs(machine, others, unseen)
@@ -210,7 +219,7 @@ def identify_machine(
     return MachineIdentification(
         identified, found, told, (*_not_separable(told, balances.computed), *not_told(balances, seen)), inertia, errors,
         runs, True, worse, poor_joints(errors, runs.get("identified")), tuple(notes),
-        {joint: (balance, balances.models[joint], fit) for joint, (balance, fit) in fits.items()},
+        {joint: (balance, balances.models[joint], fit) for joint, (balance, fit) in fits.items()}, common,
     )  # fmt: skip
 
 
@@ -259,7 +268,7 @@ def rotor_freed(model: Model, armature: float) -> Model:
 
 
 def _with_fit(
-    machine: Machine, given: Machine, joint: str, fit: EffortFit, late: float | None, period: float,
+    machine: Machine, given: Machine, joint: str, fit: EffortFit, late: float | None,
     found: dict[str, JointEstimate],
 ) -> Machine:  # fmt: skip
     """The machine with one joint's fit in it, which is added to what was found."""
@@ -279,9 +288,26 @@ def _with_fit(
             found[f"{joint}.{name}"] = JointEstimate(value.value, std, value.unit)
     delay = f"{joint}.input_delay.delay"
     if late is not None and delay in machine.parameters and not machine.parameters[delay].fixed:
-        machine = machine.with_values({delay: late})
-        found[delay] = JointEstimate(late, DELAY_STD * period, "s")
+        whole = max(machine.value(delay) + late + fit.alignment, 0.0)
+        machine = machine.with_values({delay: whole})
+        found[delay] = JointEstimate(whole, float(fit.std[0]), "s")
     return machine
+
+
+def _aligned(balance: Balance, joint: str, common: ReferenceDelay | None) -> Alignment | None:
+    """What is known of the delay of a joint's reference about the shared one; None where its effort was recorded.
+
+    As well as the shared one is where the joints agree; else a sample wide, as stamps are, or as wide as that joint's own says.
+    """
+    if common is None or joint not in common.joints:
+        return None
+    own, most = common.joints[joint], FARTHEST * balance.period
+    if common.equal:
+        return Alignment(common.shared.std, -most, most)
+    if joint in common.agree:
+        return Alignment.of(balance)
+    apart = own.value - common.shared.value
+    return Alignment(max(own.std, balance.period), apart - most, apart + most, apart)
 
 
 def _known(machine: Machine, found: dict[str, JointEstimate]) -> dict[str, Knowledge]:

@@ -5,7 +5,6 @@ inverse dynamics of the whole body (M. Gautier, W. Khalil, Int. J. Robot. Res. 1
 parameters). So each joint is balanced as the one of a machine of one axis, with the same elements.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -25,6 +24,7 @@ from rhythmid.identify.inverse_dynamics.bandwidth import (
     bandwidth_of_motion,
 )
 from rhythmid.identify.inverse_dynamics.motion import FINER, Motion, Stretch, low_pass
+from rhythmid.identify.inverse_dynamics.reference_path import Reference
 from rhythmid.identify.joints.joint_stretch import JointStretch, joint_stretches
 from rhythmid.model import Model, Term
 from rhythmid.record.joint_record import JointRecord, Taken
@@ -35,7 +35,6 @@ Array = NDArray[np.float64]
 # flights between contacts)
 CLEAR = 1.5
 SHORT = 400  # samples of a stretch, up to which its filter is a matrix
-SAME_CLOCK = 1e-3  # of a sample: by how much motion and an effort that was made from it may be out
 FAINT = 1e-3  # of a joint's effort, below which what a link does to it is not looked at
 
 
@@ -79,7 +78,8 @@ class JointBalances:
     """The balances of effort of all joints: of each its path as a model of one axis, and its motions.
 
     `computed` are the joints whose effort is what their controller's known gains make of the reference; `leads` [s] of others are what the
-    references in their recorded efforts were ahead by, and are not in the motions.
+    references in their recorded efforts were ahead by, and are not in the motions. `rotor_like` are by joint the parameters of links that
+    do there what the rotor's inertia does, with how much of that [kg m²] a unit of each is.
     """
 
     machine: Machine
@@ -90,6 +90,7 @@ class JointBalances:
     period: float
     computed: tuple[str, ...]
     leads: Mapping[str, float] = field(default_factory=dict)
+    rotor_like: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -109,18 +110,19 @@ class JointBalances:
         columns = [machine.body.columns(names, one.pose, one.rate, one.acceleration) for one in bodies]
         models: dict[str, Model] = {}
         motions: dict[str, list[Motion]] = {}
+        rotor_like = dict(alike.rotor_like) if alike else {}
         for joint in machine.joints:
             seen = alike.links(joint) if alike else _links(machine, joint, names, columns, bodies)
-            rotors = alike.rotors(joint) if alike else _rotors(machine, joint, seen, names, columns, bodies)
-            models[joint] = joint_model(machine, joint, records[0].taken, seen, rotors)
+            if not alike:
+                rotor_like[joint] = _rotors(machine, joint, seen, names, columns, bodies)
+            rotors = rotor_like[joint]
+            computed = joint in stretches[0].reference  # what a controller asks for goes into its actuator
+            taken = "before_actuator" if computed else records[0].taken
+            models[joint] = joint_model(machine, joint, taken, seen, rotors)
             made = []
             for body, column in zip(bodies, columns, strict=True):
                 own = {link: column[:, :, names.index(link)] for link in seen}
-                motion = _motion(machine, models[joint], joint, body, own)
-                if joint in body.stretch.reference:
-                    asked = controller_effort(models[joint], joint, motion, body, 0.0)
-                    motion = replace(motion, effort=asked)
-                made.append(motion)
+                made.append(_motion(machine, models[joint], joint, body, own))
             motions[joint] = made
         period = max(one.period for one in stretches)
         bandwidths = (
@@ -129,7 +131,7 @@ class JointBalances:
             else {joint: _bandwidth(motions[joint], cut, dominant) for joint in machine.joints}
         )
         computed = tuple(joint for joint in machine.joints if joint in stretches[0].reference)
-        made = cls(machine, models, motions, bandwidths, bodies, period, computed)
+        made = cls(machine, models, motions, bandwidths, bodies, period, computed, rotor_like=rotor_like)
         return made.with_leads(alike.leads) if alike else made
 
     def with_leads(self, leads: Mapping[str, float]) -> "JointBalances":
@@ -153,9 +155,8 @@ class JointBalances:
         return tuple(name.removeprefix(f"{BODY}.") for name in self.motions[joint][0].links)
 
     def rotors(self, joint: str) -> tuple[str, ...]:
-        """The inertias of links among them that a joint feels as it does its rotor's, which are bounded above."""
-        values = self.models[joint].parameters
-        return tuple(one for one in self.links(joint) if math.isfinite(values[f"{BODY}.{one}"].bounds[1]))
+        """Those parameters of links that a joint feels as it does its rotor's inertia, which are bounded above."""
+        return tuple(self.rotor_like[joint])
 
     @property
     def cut(self) -> float:
@@ -170,45 +171,32 @@ class JointBalances:
     def balance(self, joint: str, late: float = 0.0) -> Balance:
         """The balance of one joint; a reference acts there `late` [s] after its stamp. Raises InputError where too few samples are
         left."""
-        motions, period = self.motions[joint], self.period
-        if joint in self.computed:
-            period *= SAME_CLOCK
-            model = self.models[joint]
-            motions = [
-                replace(motion, effort=controller_effort(model, joint, motion, body, late))
-                for motion, body in zip(motions, self.bodies, strict=True)
-            ]
-        return JointBalance.of_motions(motions, self.bandwidths[joint], period, CLEAR)
+        motions = self.motions[joint]
+        if late != 0.0:
+            motions = [_later(motion, self.models[joint], late) for motion in motions]
+        return JointBalance.of_motions(motions, self.bandwidths[joint], self.period, CLEAR)
 
 
-def controller_effort(model: Model, joint: str, motion: Motion, body: BodyMotion, late: float) -> Array:
-    """Force (n,) that a controller with known gains has asked for."""
-    stretch = body.stretch
-    held = 0.5 * stretch.period  # what is held from sample to sample is on average so much older
-    asked = np.interp(stretch.time - late - held, stretch.time, stretch.reference[joint])
-    asked = low_pass(asked, stretch.period, 1.0 / (FINER * stretch.period * body.every))[:: body.every]
-    total = np.zeros(len(motion.time))
-    for term in model.terms:
-        if term.element.acts == "feedback" and term.element.kernel is not None:
-            values = term.numbers
-            total = term.element.kernel(asked, motion.position, motion.velocity, motion.time, **values)
-    if joint in stretch.forward:
-        total = total + stretch.forward[joint][:: body.every]
-    return total
+def _later(motion: Motion, model: Model, late: float) -> Motion:
+    """A motion whose reference acts `late` [s] later; one without a reference as it is."""
+    if motion.reference is None:
+        return motion
+    reference = replace(motion.reference, age=motion.reference.age + late)
+    return replace(motion, reference=reference, effort=reference.force(model, motion))
 
 
 def joint_model(
-    machine: Machine, joint: str, taken: Taken, links: Sequence[str], rotors: Sequence[str]
+    machine: Machine, joint: str, taken: Taken, links: Sequence[str], rotors: Mapping[str, float]
 ) -> Model:
     """The path of a joint as a model of one axis, with masses, inertias and payloads of links as parameters of a term `body`; without its
-    actuator where the effort was recorded behind that. An inertia that does what the rotor's does, one of `rotors`, may be less than given by
+    actuator where the effort was recorded behind that. A mass or an inertia that does what the rotor's does, one of `rotors`, may be less than given by
     more than the whole rotor: any other change is the rotor's, of which files of robots know little."""
     path = machine.paths[joint]
-    terms = [t for t in path.terms if not (taken == "after_actuator" and t.element.slot == "actuator")]
+    terms = [t for t in path.terms if taken != "after_actuator" or t.element.slot != "actuator"]
     known, values = machine.body.parameters, {}
     for link in links:
         said = machine.inertial.get(link)
-        most = max(known[link] - known[f"{joint}.armature"], 0.0) if link in rotors else np.inf
+        most = max(known[link] - known[f"{joint}.armature"] / rotors[link], 0.0) if link in rotors else np.inf
         values[link] = said or Value(known[link], described(link).unit, True, (0.0, most))
     parameters = tuple(replace(described(link), name=link) for link in links)
     element = Element(
@@ -260,16 +248,19 @@ def _links(
 def _rotors(
     machine: Machine, joint: str, links: Sequence[str], names: Sequence[str], columns: Sequence[Array],
     bodies: Sequence[BodyMotion],
-) -> tuple[str, ...]:  # fmt: skip
-    """The inertias among these links' parameters that a joint feels as it does its rotor's."""
+) -> dict[str, float]:  # fmt: skip
+    """Those among these parameters that a joint feels as it does its rotor's inertia, and how much of that a unit of each is."""
     own = machine.body.joints[joint].velocity
     whole, made = _felt(machine, joint, names, columns, bodies)
     rotor = np.concatenate([one.acceleration[:, own] for one in bodies])
-    beyond = made - np.outer(rotor, rotor @ made / max(float(rotor @ rotor), 1e-300))
-    alike = np.sqrt(np.mean(beyond**2, axis=0)) <= FAINT * whole
-    return tuple(
-        n for n, one in zip(names, alike, strict=True) if one and n in links and split(n)[1] == TURNING
-    )
+    shares = rotor @ made / max(float(rotor @ rotor), 1e-300)
+    alike = np.sqrt(np.mean((made - np.outer(rotor, shares)) ** 2, axis=0)) <= FAINT * whole
+    alike &= shares > 0.0
+    return {
+        name: float(share) / _unit(machine, name)
+        for name, share, one in zip(names, shares, alike, strict=True)
+        if one and name in links
+    }
 
 
 def _felt(
@@ -277,16 +268,16 @@ def _felt(
 ) -> tuple[float, Array]:
     """Size (rms) of the force that the body asks of a joint, and what links do to that (n, p): a mass and a payload as heavy as their link, an
     inertia as large as that about the hinge."""
-    own, body = machine.body.joints[joint].velocity, machine.body
-    known = body.parameters
-
-    def size(name: str) -> float:
-        link, kind = split(name)
-        return body.about_hinge(link) if kind == TURNING else known[f"{link}.{MASS}"]
-
+    own = machine.body.joints[joint].velocity
     whole = np.concatenate([one.force[:, own] for one in bodies])
-    made = np.concatenate([one[:, own] for one in columns]) * [size(name) for name in names]
+    made = np.concatenate([one[:, own] for one in columns]) * [_unit(machine, name) for name in names]
     return float(np.sqrt(np.mean(whole**2))), made
+
+
+def _unit(machine: Machine, name: str) -> float:
+    """The size at which a parameter of a link is looked at."""
+    link, kind = split(name)
+    return machine.body.about_hinge(link) if kind == TURNING else machine.body.parameters[f"{link}.{MASS}"]
 
 
 def _motion(
@@ -305,10 +296,30 @@ def _motion(
     others = {
         name: body.rate[:, machine.body.joints[name].velocity] for name in machine.joints if name != joint
     }
-    return Motion(
+    motion = Motion(
         stretch.record, stretch.name, body.time, x, v, a, x, v, effort, body.period,
         coupling=body.force[:, own.velocity] - model.mass.value * a, links=found, others=others,
     )  # fmt: skip
+    if joint not in stretch.reference:
+        return motion
+    motion = replace(motion, reference=_reference(machine, joint, body))
+    return _later(motion, model, 0.0)
+
+
+def _reference(machine: Machine, joint: str, body: BodyMotion) -> Reference:
+    """The reference of a joint's controller, which works at the body's step."""
+    stretch, step = body.stretch, machine.body.step
+    held = 0.0 if joint in stretch.smooth else stretch.period
+    forward = stretch.forward.get(joint)
+    return Reference(
+        stretch.reference[joint],
+        stretch.part,
+        None if forward is None else _decimated(body, forward),
+        0.5 * (held - step),
+        step,
+        1.0 / (FINER * body.period),
+        body.every,
+    )
 
 
 def _decimated(body: BodyMotion, signal: Array) -> Array:

@@ -11,6 +11,7 @@ from rhythmid.body.machine import FREE, Machine
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
 from rhythmid.identify.inverse_dynamics.motion import SHORTEST
+from rhythmid.identify.inverse_dynamics.reference_path import Commanded
 from rhythmid.identify.joints.reference_lead import HeldReference, held_reference
 from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord
@@ -27,18 +28,21 @@ MOST = (
 @dataclass(frozen=True, eq=False)
 class JointStretch:
     """One stretch of a record: time (n,) [s], pose (n, nv) of the whole body, and by joint (n, joints) the effort, where that was
-    recorded or is the command, and the reference of its controller with what the controller adds to its force. `held` are
-    the references that are held while the effort was recorded in step with them."""
+    recorded or is the command, and the reference of its controller over the whole record, of which the stretch is that `part`, with what the
+    controller adds to its force. `held` are
+    the references that are held while the effort was recorded in step with them, `smooth` the joints whose references go on between their stamps."""
 
     record: int
     name: str
     time: Array
     pose: Array
     effort: dict[str, Array]
-    reference: dict[str, Array]
+    reference: dict[str, Commanded]
     forward: dict[str, Array]
     period: float
     held: dict[str, HeldReference] = field(default_factory=dict)
+    smooth: frozenset[str] = frozenset()
+    part: slice = field(default_factory=lambda: slice(None))
 
 
 def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[JointStretch]:
@@ -59,20 +63,31 @@ def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[Jo
         held = {
             joint: one for joint in machine.joints if (one := _held(machine, record, joint, grid)) is not None
         }
+        smooth = frozenset(
+            joint for joint in machine.joints
+            if (one := record.joints[joint]).reference is None and one.hold != "zero"
+        )  # fmt: skip
+        driven = {j: _drives(machine.paths[j], record.joints[j], columns[j]) for j in machine.joints}
+        asked = {
+            joint: Commanded(grid, one[1], float(columns[joint].output[0]))
+            for joint, one in driven.items()
+            if one[1] is not None
+        }
         ends = np.flatnonzero(np.diff(np.concatenate([[0], (valid & flying).astype(int), [0]])))
         for first, end in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
             if end - first < SHORTEST:
                 continue
             part = slice(first, end)
-            driven = {j: _drives(machine.paths[j], record.joints[j], columns[j]) for j in machine.joints}
             found.append(
                 JointStretch(
                     number, record.name, grid[part], pose[part],
                     {joint: one[0][part] for joint, one in driven.items() if one[0] is not None},
-                    {joint: one[1][part] for joint, one in driven.items() if one[1] is not None},
+                    asked,
                     {joint: one[2][part] for joint, one in driven.items() if one[2] is not None},
                     period,
                     {joint: replace(one, between=one.between[part]) for joint, one in held.items()},
+                    smooth,
+                    part,
                 )
             )  # fmt: skip
     if not found:

@@ -1,44 +1,143 @@
-"""By how much later than its stamp a controller's reference acts, where the effort is made from it and the controller's gains."""
+"""By how much later than their stamps controllers' references act, where the efforts are made from them and the controllers' gains.
 
-import math
+The delay of each joint is a parameter of its balance of effort, with an interval. References of several joints usually come in one message, so
+that all have one delay: the one that most joints agree with is shared, and a test says whether all do.
+"""
+
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from rhythmid.errors import InputError
-from rhythmid.identify.inverse_dynamics.estimate import fit_effort
+from rhythmid.identify.inverse_dynamics.balance import Balance
+from rhythmid.identify.inverse_dynamics.estimate import FARTHEST, Alignment, EffortFit, fit_effort
 from rhythmid.identify.joints.joint_motion import JointBalances
+from rhythmid.identify.least_squares import orthonormal
+from rhythmid.identify.student import weights_of
+from rhythmid.statistics import NORMAL_95
 
+Array = NDArray[np.float64]
 LONGEST = 0.1  # [s] in which a reference acts at the latest
-COARSE = 2.0  # samples between the delays that are tried first
-STEPS = 2  # of a fit at each of them: the parameters are nearly linear
+FIRST = 3  # Gauss-Newton steps of the fit about which delays are scanned: the parameters are nearly linear
+# of a sample: what jitter of stamps and interpolation add to the standard deviation of a joint's delay (measured: delays of joints with one bus
+# scatter by 0.01 to 0.02 of a sample, their standard deviations by the noise alone are smaller)
+ROUGH = 0.03
+AGREES = 0.5  # of a sample: standard deviation within which joints count as agreeing, as a missing effect may turn the phase of one
+EQUAL = 0.01  # probability of so unequal delays by chance, below which not all joints have the shared one
+
+
+@dataclass(frozen=True)
+class Delay:
+    """A delay [s] with its standard deviation."""
+
+    value: float
+    std: float
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval."""
+        return self.value - NORMAL_95 * self.std, self.value + NORMAL_95 * self.std
+
+
+@dataclass(frozen=True)
+class ReferenceDelay:
+    """The delay [s] that references have beyond the model's: of each joint, and the one that is shared by those that `agree`.
+
+    `chance` is the probability of delays as unequal as these where all joints have the same one; None of one joint.
+    """
+
+    shared: Delay
+    joints: dict[str, Delay]
+    agree: tuple[str, ...]
+    chance: float | None
+
+    @cached_property
+    def equal(self) -> bool:
+        """Whether the records contradict one delay for all joints."""
+        return self.chance is None or self.chance >= EQUAL
+
+    @property
+    def told(self) -> str:
+        """The shared delay and the test of equality, in one sentence."""
+        value, std = 1e3 * self.shared.value, 1e3 * self.shared.std
+        said = f"the references act {value:.2f} ± {std:.2g} ms later than the model says"
+        if self.chance is None:
+            return said
+        if self.equal:
+            return f"{said}, at all joints alike (test of equality: p = {self.chance:.2g})"
+        others = [
+            f"{joint} {1e3 * one.value:.2f} ± {1e3 * one.std:.2g} ms"
+            for joint, one in self.joints.items()
+            if joint not in self.agree
+        ]
+        of = ", ".join(self.agree)
+        beside = f"; otherwise at {', '.join(others)}" if others else ""
+        return f"{said} at {of}{beside} (test of equality: p = {self.chance:.2g})"
 
 
 @threadpool_limits.wrap(limits=1)
-def reference_delay(balances: JointBalances, joints: Sequence[str]) -> float:
-    """The delay [s] at which the paths of these joints, their free parameters fitted, predict the efforts best; to a tenth of a sample.
+def reference_delay(balances: JointBalances, joints: Sequence[str]) -> ReferenceDelay:
+    """The delays at which the paths of these joints, their free parameters fitted, predict the efforts best.
 
-    One delay for all: their references come in one message. By one joint alone it could not be told from the rotor's inertia. What a
-    missing effect of all joints does like a delay, such as a lag, is in it. Raises InputError where too little of motion was recorded.
-    """
+    Raises InputError where no joint can be fitted."""
+    found: dict[str, Delay] = {}
+    why = ""
+    for joint in joints:
+        try:
+            fit = delay_fit(balances.balance(joint), balances, joint)
+        except InputError as error:
+            why = str(error)
+            continue
+        found[joint] = Delay(fit.alignment, float(np.hypot(fit.std[0], ROUGH * balances.period)))
+    if not found:
+        raise InputError(f"no joint shows the delay of its reference: {why}")
+    return shared(found, balances.period)
 
-    def cost(late: float) -> float:
-        fits = [fit_effort(balances.balance(one, late), balances.models[one], steps=STEPS) for one in joints]
-        return sum(math.log(max(fit.error, 1e-300)) for fit in fits)
 
-    tried = np.arange(0.0, LONGEST, COARSE * balances.period)
-    costs: list[float] = []
+def delay_fit(balance: Balance, balances: JointBalances, joint: str) -> EffortFit:
+    """The fit of a joint's path with the delay of its reference free, from the best of a scan."""
+    model = balances.models[joint]
+    wide = Alignment(LONGEST, -FARTHEST * balance.period, LONGEST)
+    first = fit_effort(balance, model, steps=FIRST)
+    weight = weights_of(first.residual, first.scale) / first.scale**2
+    root = np.sqrt(weight)
+    basis = orthonormal(first.jacobian[:, 1:] * root[:, None]) if first.names else np.zeros((len(root), 0))
+    required = balance.rows(balance.required(first.model), balance.later(first.model))
+    tried = np.arange(wide.low, wide.high, balance.period)
+    costs = []
     for late in tried:
-        costs.append(cost(float(late)))
-        if costs[-1] > min(costs) and len(costs) - 1 - int(np.argmin(costs)) >= 2:
-            break  # it has risen twice
+        error = root * (balance.with_moved(required, first.model, float(late)) - balance.measured)
+        error = error - basis @ (basis.T @ error)
+        costs.append(float(error @ error))
     if not np.isfinite(costs).all():
         raise InputError("the joints cannot be fitted: their motion holds too little")
-    best = int(np.argmin(costs))
-    low, high = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
-    while high - low > 0.2 * balances.period:  # golden section (J. Kiefer, Proc. AMS 4 (1953) 502)
-        span = 0.381966 * (high - low)
-        first, second = low + span, high - span
-        low, high = (low, second) if cost(float(first)) < cost(float(second)) else (first, high)
-    return float(0.5 * (low + high))
+    return fit_effort(balance, model, aligned=wide, alignment=float(tried[int(np.argmin(costs))]))
+
+
+def shared(joints: dict[str, Delay], period: float) -> ReferenceDelay:
+    """The delay that most joints agree with; of as many on either side the shorter one, for an element more makes a reference later."""
+    names = list(joints)
+    values = np.array([one.value for one in joints.values()])
+    variances = np.array([one.std**2 for one in joints.values()])
+    apart = np.abs(values[:, None] - values)
+    near = apart <= 2.0 * np.sqrt(variances[:, None] + variances + (AGREES * period) ** 2)
+    counts = near.sum(axis=1)
+    first = min(np.flatnonzero(counts == counts.max()), key=lambda place: values[place])
+    some = near[first]
+    weights = 1.0 / variances
+    middle = float(weights[some] @ values[some] / weights[some].sum())
+    spread = float((weights[some] * (values[some] - middle) ** 2).sum()) / max(int(some.sum()) - 1, 1)
+    std = np.sqrt(
+        max(spread, 1.0) / weights[some].sum()
+    )  # as wide as they scatter (R. T. Birge, Phys. Rev. 40 (1932) 207)
+    chance = None
+    if len(names) > 1:
+        mean = float(weights @ values / weights.sum())
+        chance = float(chi2.sf(float(weights @ (values - mean) ** 2), len(names) - 1))
+    agree = tuple(name for name, one in zip(names, some, strict=True) if one)
+    return ReferenceDelay(Delay(middle, float(std)), dict(joints), agree, chance)

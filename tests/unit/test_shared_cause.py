@@ -1,0 +1,58 @@
+"""A payload of an arm that hardly moves: at each joint it looks like a constant force, at both together only like itself."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from legged import recorded, references
+
+from rhythmid.body.machine import Machine
+from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
+from rhythmid.elements.catalogue import load_catalogue
+
+ARM = """<robot name="two">
+  <link name="base"/>
+  <link name="upper"><inertial><origin xyz="0 0 -0.2"/><mass value="2"/>
+    <inertia ixx="0.03" iyy="0.03" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="lower"><inertial><origin xyz="0 0 -0.15"/><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.012" izz="0.004" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="one" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="3" effort="50" velocity="10"/></joint>
+  <joint name="two" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0 0 -0.4"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="3" effort="50" velocity="10"/></joint>
+</robot>
+"""
+PATH = (
+    "{command: [{input_delay: {delay: 0.0}}, {position_control: {proportional: {value: 80, fixed: true}, "
+    "derivative: {value: 2.0, fixed: true}}}], force: [{viscous_damper: {damping: 0.1}}]}"
+)
+CARRIED = 0.1  # kg
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Machine:
+    (tmp_path / "two.urdf").write_text(ARM)
+    (tmp_path / "two.yaml").write_text(
+        f"body: {{urdf: two.urdf, contacts: false}}\njoints:\n  one: {PATH}\n  two: {PATH}\n"
+    )
+    return Machine.load(tmp_path / "two.yaml")
+
+
+def diagnosed(plant: Machine, nominal: Machine):
+    time, rng = np.arange(0.0, 5.0, 0.002), np.random.default_rng(4)
+    asked = references({"one": (0.5, 0.01), "two": (0.7, 0.01)}, time, rng, (0.3, 2.0))
+    return diagnose_machine([recorded(plant, asked, time, rng)], nominal).diagnosis
+
+
+def test_one_payload_is_named_in_the_place_of_a_constant_force_at_every_joint(arm: Machine):
+    (one,) = diagnosed(arm.with_inertial({"lower.payload": CARRIED}), arm).missing
+    assert (one.element, one.link, one.joint) == ("payload", "lower", "two")
+    assert one.parameters["mass"].value == pytest.approx(CARRIED, rel=0.15)
+    assert one.probability > 0.8
+
+
+def test_constant_forces_that_no_payload_makes_stay_what_they_are(arm: Machine):
+    constant = load_catalogue()["constant_force"]
+    plant = arm.with_element("one", constant, {"force": 0.4}).with_element("two", constant, {"force": -0.3})
+    found = diagnosed(plant, arm).missing
+    assert {(one.joint, one.element) for one in found} == {("one", "constant_force"), ("two", "constant_force")}
