@@ -35,7 +35,6 @@ from rhythmid.report.quantity import (
     pretty_unit,
     rounded,
     sentence,
-    with_unit,
 )
 from rhythmid.report.robot_figure import DrawnJoint, robot_svg
 from rhythmid.report.sections import reproduce_section
@@ -138,10 +137,12 @@ def _joint(result: Mapping[str, Any], joint: str, effort: IdentifiedEffort | Non
     blocks: list[Block] = []
     if own:
         rows = tuple(
-            (pretty_name(name), with_unit(rounded(v["value"], v["std"]), v["unit"]), number(v["std"], 2))
+            (pretty_name(name), rounded(v["value"], v["std"]), number(v["std"], 2), pretty_unit(v["unit"]))
             for name, v in own.items()
         )
-        blocks.append(Table(f"Parameters of {joint}", ("parameter", "value", "standard deviation"), rows))
+        blocks.append(
+            Table(f"Parameters of {joint}", ("parameter", "value", "standard deviation", "unit"), rows)
+        )
     if effort is not None:
         blocks += _effort(joint, effort)
     names = result["correlations"]["names"]
