@@ -9,10 +9,10 @@ UPLOT    := analysis/rhythmid/report/vendor/uplot
 UPLOT_VERSION := 1.6.32
 
 .DEFAULT_GOAL := help
-.PHONY: help install test lint format demo docs picture benchmark naming docker dist vendor lock clean
+.PHONY: help install test lint format demo demo-leg docs picture benchmark naming docker dist vendor lock clean
 
 help: ## Show this list
-	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
 install: $(VENV)/.warm ## Create .venv with the locked requirements and all packages (PYTHON=python3.12 to choose)
 
@@ -57,6 +57,9 @@ format: install ## Format the code
 demo: install ## Run the real graph, identify it from its bag; then conceal an effect, and find it
 	$(BIN)/python docs/demo.py
 	$(BIN)/python docs/demo_concealed.py
+
+demo-leg: install ## Conceal an effect at a joint of a leg, and find joint and effect from its records
+	$(BIN)/python docs/demo_leg.py
 
 benchmark: install ## Compare the simulator with scipy and MuJoCo
 	$(BIN)/python benchmarks/simulator.py

@@ -1,5 +1,6 @@
 """The report of a machine of several joints, looked at in a real browser."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from rhythmid.body.machine import Machine
 from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
 from rhythmid.diagnose.joints.joint_present import present_machine
 from rhythmid.elements.catalogue import load_catalogue
+from rhythmid.identify.joints.joint_identification import identify_machine
+from rhythmid.identify.joints.joint_present import present_identified
 from rhythmid.record.joint_messages import write_joint_bag
 from rhythmid.record.joint_record import load_joint_records
 from rhythmid.report.page import write_page
@@ -35,6 +38,8 @@ def report(tmp_path_factory: pytest.TempPathFactory, browser) -> Path:
     answer = diagnose_machine(records, nominal, [], catalogue)
     page = folder / "report.html"
     write_page(page, present_machine(answer, nominal, "leg.yaml with bag", "rhythmid diagnose bag"))
+    fitted = replace(identify_machine(records, nominal, free=False), not_identified=("knee",))
+    write_page(folder / "identified.html", present_identified(fitted, nominal, "leg.yaml with bag"))
     return page
 
 
@@ -63,6 +68,33 @@ def test_the_robot_and_the_efforts_are_drawn_and_legible(browser, report: Path, 
         assert one["width"] > 250 and one["height"] > 50, one
         assert one["outside"] == 0 and one["touching"] == [], one
         assert one["size"] >= 9.0, one
+
+
+@pytest.mark.parametrize(("width", "dark"), [(1200, True), (320, False)])
+def test_the_page_of_an_identification_fits_the_screen_and_marks_what_is_not_identified(
+    browser, report: Path, width: int, dark: bool
+) -> None:
+    page = report.parent / "identified.html"
+    browser.open(page, width, dark)
+    assert browser.messages == [] and browser.requests == [page.as_uri()]
+    assert browser.evaluate("document.querySelector('h1').innerText") == "Not identified: knee"
+    assert browser.evaluate("document.querySelectorAll('.slot.faulty').length") == 1
+    browser.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
+    assert browser.evaluate("document.documentElement.scrollWidth") <= width
+    assert browser.evaluate(OVER_THE_EDGE) == []
+    assert browser.evaluate(FAINT) == []
+    browser.evaluate("document.querySelector('.drawings').click()")
+    for one in browser.evaluate(DRAWINGS):
+        assert one["outside"] == 0 and one["touching"] == [], one
+    figures = browser.evaluate("[...document.querySelectorAll('figure')].map(f => f.innerText)")
+    for joint in ("hip", "knee"):
+        for title in (
+            f"Effort at {joint}",
+            f"Measured against predicted at {joint}",
+            f"What is left at {joint} over frequency",
+        ):
+            assert any(title in one for one in figures), title
+    assert sum("Correlation of the parameters" in one for one in figures) == 2
 
 
 def test_the_faulty_joint_alone_is_marked(browser, report: Path) -> None:

@@ -60,8 +60,13 @@ def test_friction_that_was_concealed_in_a_knee_is_named_there(bags: Path):
     assert friction["parameters"]["force"]["value"] == pytest.approx(0.3, abs=0.02)
     assert friction["probability"] > 0.8 and friction["heldout_gain"] > 0.02
     assert found["joints"]["hip"]["verdict"] == "consistent"
+    (family,) = found["families"]["knee"]
+    assert list(found["families"]) == ["knee"] and family["family"] == "friction"
+    assert friction["probability"] - 1e-9 <= family["probability"] <= 1.0
+    assert "coulomb_friction" in family["laws"] and "knee: some form of friction" in printed
     page = (bags / "report.html").read_text()
     assert "Missing physics: Coulomb friction at knee" in page
+    assert "probability of a law of it" in page and "friction" in page
     assert page.count('class="slot faulty"') == 1 and "Parameters at knee" in page
     assert "Effort at knee over time" in page and "hip: consistent" in page
     assert "knee" in printed and "coulomb_friction" in better.read_text()
@@ -71,8 +76,11 @@ def test_a_leg_is_identified_from_its_bag(bags: Path):
     answer = bags / "identified.json"
     called(
         "identify", str(bags / "rough"), "--model", str(bags / "rough.yaml"), "--signals", str(bags / "signals.yaml"),
-        "--json", str(answer),
+        "--json", str(answer), "--report", str(bags / "identified.html"),
     )  # fmt: skip
+    page = (bags / "identified.html").read_text()
+    assert "Measured against predicted at knee" in page and "What is left at hip over frequency" in page
+    assert "Parameters of knee" in page and "Correlation of the parameters" in page
     found = json.loads(answer.read_text())
     assert found["parameters"]["knee.coulomb_friction.force"]["value"] == pytest.approx(0.3, abs=0.02)
     assert found["parameters"]["body.knee.armature"]["value"] == pytest.approx(0.006, abs=0.0005)

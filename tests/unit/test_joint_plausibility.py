@@ -124,6 +124,20 @@ def test_joints_without_recorded_efforts_are_judged_by_their_controllers(leg):
     assert found is not None and "degrees" in found and "under 'output:' and 'input:'" in found
 
 
+@pytest.mark.parametrize(
+    ("role", "said"), [("input", "reference of knee is 5"), ("output", "position of knee is 5")]
+)
+def test_a_reference_in_another_unit_than_the_position_that_follows_it_is_told(leg, role: str, said: str):
+    machine, _ = leg
+    record = played(machine, {"hip": (0.6, 0.3), "knee": (-1.2, 0.3)}, 3.0, effort=False)
+    one = record.joints["knee"]
+    channel = getattr(one, role)
+    wrong = replace(one, **{role: replace(channel, value=DEGREES * channel.value)})
+    found = likely_joint_mend(machine, [replace(record, joints={**record.joints, "knee": wrong})])
+    assert found is not None and said in found
+    assert f"scale: {{knee: 0.0174533}}  under '{role}:'" in found
+
+
 def test_a_slide_in_millimetres_is_told(tmp_path: Path):
     (tmp_path / "crane.xml").write_text(
         '<mujoco><worldbody><body name="cart"><joint name="slide" type="slide" axis="1 0 0"/>'

@@ -10,6 +10,7 @@ import xml.etree.ElementTree as tree
 from collections.abc import Collection, Mapping, Sequence
 from itertools import combinations_with_replacement
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,7 @@ def save_machine(machine: Machine, path: Path) -> tuple[str, ...]:
         write_text(path, mjcf_of(machine, path.parent))
         return tuple(f"{joint}: {line}" for joint in machine.joints for line in unexpressed(machine, joint))
     if path.suffix == URDF:
-        write_text(path, urdf_of(machine))
+        write_text(path, urdf_of(machine, path.parent))
         own = (f"{one}.armature" for one in machine.joints if machine.body.parameters[f"{one}.armature"])
         return tuple(f"not expressed: {one}" for one in (*own, *_beyond_losses(machine)))
     machine.save(path)
@@ -130,13 +131,24 @@ def _values(root: tree.Element, machine: Machine, step: float) -> None:
             own.set(WRITTEN[name], " ".join(repr(float(value)) for value in values))
     for joint in (one for one in world.iter("joint") if one.get("name") in body.joints):
         name = str(joint.get("name"))
-        joint.set("armature", repr(float(model.dof_armature[body.joints[name].velocity])))
+        dof = body.joints[name].velocity
+        joint.set("armature", repr(float(model.dof_armature[dof])))
+        # a spring that the file gives by its time constant would follow the identified inertia
+        spring = float(model.jnt_stiffness[model.joint(name).id])
+        joint.set(
+            "stiffness", mjcf.polynomial(spring, *_higher(model, "jnt_stiffnesspoly", model.joint(name).id))
+        )
         if name in machine.paths:
-            weight = float(model.dof_invweight0[body.joints[name].velocity])
+            weight = float(model.dof_invweight0[dof])
             described = _described(machine, name)
-            joint.set("damping", repr(described.damping))
+            joint.set("damping", mjcf.polynomial(described.damping, *_higher(model, "dof_dampingpoly", dof)))
             for word, value in mjcf.friction(described, weight, step).items():
                 joint.set(word, value)
+
+
+def _higher(model: Any, coefficients: str, place: int) -> list[float]:
+    """The coefficients beyond the linear one of a spring or a damper, which stay in the body; MuJoCo before 4.0 has none."""
+    return [float(one) for one in getattr(model, coefficients, {place: ()})[place]]
 
 
 def _section(root: tree.Element, name: str) -> tree.Element:
@@ -240,8 +252,8 @@ def _beyond_mass(body: MujocoBody, given: MujocoBody, link: str) -> Array:
     return now.ten - before.ten * (now.mass / before.mass)
 
 
-def urdf_of(machine: Machine) -> str:
-    """The body's URDF with the machine's values. Raises InputError where the body's file is no URDF."""
+def urdf_of(machine: Machine, folder: Path) -> str:
+    """The body's URDF with the machine's values, as one that stands in `folder`. Raises InputError where the body's file is no URDF."""
     if machine.kind != "urdf":
         raise InputError(
             f"{machine.body.path}: is no URDF, so none can be written from it; write .xml (MJCF)"
@@ -262,6 +274,11 @@ def urdf_of(machine: Machine) -> str:
     for link, place in body.ends.items():
         if payload := known[f"{link}.{PAYLOAD}"]:
             _attach(document.getroot(), link, payload, place.tolist())
+    for mesh in document.iter("mesh"):  # relative to the file that is written
+        file = mesh.get("filename", "")
+        if file and "://" not in file:
+            known_at = machine.body.path.resolve().parent / file
+            mesh.set("filename", os.path.relpath(known_at, folder.resolve()))
     for joint in document.iter("joint"):
         if (name := str(joint.get("name"))) not in machine.paths:
             continue

@@ -65,9 +65,9 @@ def _body(world: tree.Element, joint: Joint) -> None:
         "type": "hinge" if joint.rotational else "slide",
         "axis": vector(link.axis),
         "armature": number(0.0),
-        "damping": _polynomial(joint.damping, joint.quadratic_damping),
+        "damping": polynomial(joint.damping, joint.quadratic_damping),
         **friction(joint, 1.0 / joint.inertia),
-        "stiffness": _polynomial(joint.stiffness, joint.quadratic_stiffness, joint.cubic_stiffness),
+        "stiffness": polynomial(joint.stiffness, joint.quadratic_stiffness, joint.cubic_stiffness),
         "springref": number(joint.spring_reference),
     }
     add(body, "joint", **attributes)
@@ -85,7 +85,7 @@ def friction(joint: Joint, weight: float, step: float = TIMESTEP) -> dict[str, s
     return words
 
 
-def _polynomial(linear: float, *higher: float) -> str:
+def polynomial(linear: float, *higher: float) -> str:
     """The linear coefficient alone, where the others are zero: what older versions read."""
     return vector((linear, *higher)) if any(higher) else number(linear)
 

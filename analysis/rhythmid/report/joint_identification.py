@@ -27,13 +27,22 @@ from rhythmid.report.blocks import (
 from rhythmid.report.chart import Chart, Curve
 from rhythmid.report.correlation import Correlation, correlation_figure
 from rhythmid.report.page import Page
-from rhythmid.report.quantity import NONE, number, percent, pretty_unit, sentence
+from rhythmid.report.quantity import (
+    NONE,
+    number,
+    percent,
+    pretty_name,
+    pretty_unit,
+    rounded,
+    sentence,
+)
 from rhythmid.report.robot_figure import DrawnJoint, robot_svg
-from rhythmid.report.sections import parameters_table, reproduce_section
+from rhythmid.report.sections import reproduce_section
 
 Array = NDArray[np.float64]
 SHOWN = 3.0  # [s] of a record that are drawn
 SEGMENTS = 4  # of a stretch whose spectrum is taken, at least
+BRIDGED = 10.0  # samples of a gap in it, at most
 FEWEST = 64  # samples of a stretch that has a spectrum
 WORDS = "Circles are revolute joints, squares prismatic ones. At red joints the values are not to be used."
 
@@ -107,8 +116,8 @@ def _table(result: Mapping[str, Any]) -> Table:
         rows.append((joint, str(count), percent(error), *moved))
         if joint in (*quality["not_identified"], *quality["worse"]):
             marked.append(place)
-    columns = ("joint", "parameters", "effort missed", "motion missed, as given", "motion missed, identified")
-    caption = "All joints; the motion is that of free runs over data that no fit has seen"
+    columns = ("joint", "parameters", "effort", "motion, given", "motion, fitted")
+    caption = "All joints: shares that are missed, of the effort by the fit, of the motion by free runs with the given and the fitted values over data that no fit has seen"
     return Table(caption, columns, tuple(rows), tuple(marked))
 
 
@@ -127,7 +136,13 @@ def _joint(result: Mapping[str, Any], joint: str, effort: IdentifiedEffort | Non
     own = {_short(n, joint): result["parameters"][n] for n in _own(result["parameters"], joint)}
     blocks: list[Block] = []
     if own:
-        blocks.append(parameters_table(own, caption=f"Parameters of {joint} with 95 % intervals"))
+        rows = tuple(
+            (pretty_name(name), rounded(v["value"], v["std"]), number(v["std"], 2), pretty_unit(v["unit"]))
+            for name, v in own.items()
+        )
+        blocks.append(
+            Table(f"Parameters of {joint}", ("parameter", "value", "standard deviation", "unit"), rows)
+        )
     if effort is not None:
         blocks += _effort(joint, effort)
     names = result["correlations"]["names"]
@@ -185,19 +200,20 @@ def _against(joint: str, one: IdentifiedEffort, unit: str) -> Drawing:
 
 
 def _spectrum(joint: str, one: IdentifiedEffort, unit: str) -> Drawing | None:
-    """Amplitude density of the effort and of what is left of it, over the longest stretch without a gap; P. D. Welch, IEEE Trans. Audio
-    Electroacoust. 15 (1967) 70."""
+    """Amplitude density of the effort and of what is left of it, over the longest stretch without a long gap; P. D. Welch, IEEE Trans. Audio
+    Electroacoust. 15 (1967) 70. The samples at rest that a fit leaves out are bridged by straight lines."""
     steps = np.diff(one.time)
     period = float(np.median(steps))
-    breaks = np.flatnonzero(steps > 1.5 * period) + 1
+    breaks = np.flatnonzero(steps > BRIDGED * period) + 1
     bounds = [0, *breaks.tolist(), len(one.time)]
     begin, end = max(zip(bounds, bounds[1:]), key=lambda pair: pair[1] - pair[0])
-    if end - begin < FEWEST:
+    grid = np.arange(one.time[begin], one.time[end - 1], period)
+    if len(grid) < FEWEST:
         return None
-    length = max(FEWEST, (end - begin) // SEGMENTS)
+    length = max(FEWEST, len(grid) // SEGMENTS)
 
     def density(values: Array) -> tuple[Array, Array]:
-        frequency, power = welch(values[begin:end], 1.0 / period, nperseg=length)
+        frequency, power = welch(np.interp(grid, one.time, values), 1.0 / period, nperseg=length)
         return frequency[1:], np.sqrt(power[1:])
 
     curves = (
@@ -223,7 +239,7 @@ def _links(result: Mapping[str, Any]) -> list[Section]:
     rows = []
     for link, values in inertia["links"].items():
         mass = values["m"]
-        centre = ", ".join(number(values[name] / mass, 3) for name in ("mx", "my", "mz"))
+        centre = ", ".join(f"{values[name] / mass + 0.0:.4f}" for name in ("mx", "my", "mz"))
         rows.append((link, f"{number(mass, 4)}\u202fkg", f"({centre})\u202fm"))
     caption = (
         "Physically consistent inertias of the links, as close to those of the file as the efforts allow"

@@ -75,7 +75,11 @@ def joints_page(
         tiles=Tiles(()),
         sections=(
             Section("Where", (_robot(robot), _table(result))),
-            *([Section("What is missing", tuple(_missing(result)))] if result["missing"] else []),
+            *(
+                [Section("What is missing", (*_missing(result), *_families(result)))]
+                if result["missing"] or result["families"]
+                else []
+            ),
             Section("Measured and predicted", tuple(_efforts(result, curves))),
             Section("The next experiment", (Paragraph(sentence(plain(result["next_experiment"])), "lead"),)),
             *_remarks(result),
@@ -129,6 +133,28 @@ def _missing(result: Mapping[str, Any]) -> list[Block]:
             Table(f"Parameters at {one['joint']}", ("parameter", "value", "standard deviation"), tuple(rows))
         )
     return blocks
+
+
+def _families(result: Mapping[str, Any]) -> list[Block]:
+    """At each joint the kinds of physics that are missing, whose laws share their evidence."""
+    rows = [
+        (
+            joint,
+            str(one["family"]),
+            probability(one["probability"]),
+            percent(one["share"]),
+            ", ".join(map(pretty_name, one["laws"])),
+        )
+        for joint, families in result["families"].items()
+        for one in families
+    ]
+    if not rows:
+        return []
+    caption = (
+        "Laws of one family share their evidence, so that the family may be certain where the law is not."
+    )
+    columns = ("joint", "family", "probability of a law of it", "share of the mismatch", "laws that are open")
+    return [Table(caption, columns, tuple(rows))]
 
 
 def _efforts(result: Mapping[str, Any], curves: Mapping[str, JointCurves]) -> list[Block]:

@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from rhythmid.diagnose.answer.result import Diagnosis, Estimate, FitQuality, Scored
+from rhythmid.diagnose.family import MissingFamily
 from rhythmid.diagnose.hypothesis import Verdict
 from rhythmid.identify.joints.reference_delay import ReferenceDelay
 
@@ -50,8 +51,9 @@ class MachineDiagnosis:
     """The answer to: which physics does the model of this machine lack, and at which joint?
 
     `joints` holds the whole answer at each joint, `unknown` the joints whose mismatch no name of the catalogue explains, `undecided`
-    those at which the evidence does not separate several names, `not_judged` why a joint could not be judged. `reference_delay` is by how much
-    later than the model says the references act, where efforts are made from them.
+    those at which the evidence does not separate several names, `not_judged` why a joint could not be judged. `families` are by joint the
+    kinds of what is missing, which may be certain where the law is not. `reference_delay` is by how much later than the model says the
+    references act, where efforts are made from them.
     """
 
     verdict: Verdict
@@ -67,6 +69,7 @@ class MachineDiagnosis:
     scoring: Scored
     joints: dict[str, Diagnosis]
     not_judged: dict[str, str] = field(default_factory=dict)
+    families: dict[str, tuple[MissingFamily, ...]] = field(default_factory=dict)
     assumptions: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     reference_delay: ReferenceDelay | None = None

@@ -85,6 +85,7 @@ def compose_machine(
         scoring=next(iter(answers.values())).scoring,
         joints=dict(answers),
         not_judged=dict(refused),
+        families={joint: one.families for joint, one in answers.items() if one.families},
         assumptions=_assumptions(machine, found, answers),
         notes=tuple(notes),
         reference_delay=delay,

@@ -21,6 +21,12 @@ def show_diagnosis(found: MachineDiagnosis, console: Console) -> None:
         for name, value in one.parameters.items():
             std = "" if value.std is None else f" ± {value.std:.2g}"
             console.print(f"  {name}: {rounded(value.value, value.std)}{std} {escape(value.unit)}")
+    for joint, families in found.families.items():
+        for one in families:
+            console.print(
+                f"{escape(joint)}: some form of {one.family} (probability {one.probability:.2f}, {number(100.0 * one.share, 3)} % of the "
+                f"joint's mismatch): {', '.join(one.laws)}"
+            )
     for group in found.indistinguishable:
         console.print(f"indistinguishable here: {escape(', '.join(group))}")
     rows = []

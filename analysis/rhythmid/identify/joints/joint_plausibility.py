@@ -19,6 +19,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.channel_change import DEGREE, NAMED, UNITS
 from rhythmid.identify.joint import POOR_MOTION
 from rhythmid.identify.joints.joint_reading import Balanced, Reading, RecordedMotion
+from rhythmid.identify.joints.reference_unit import reference_mend
 from rhythmid.identify.plausibility import BETTER_UNIT, LEAST_UNIT_FACTOR
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.report.quantity import number
@@ -41,6 +42,10 @@ def likely_joint_mend(machine: Machine, records: Sequence[JointRecord]) -> str |
     if not records:
         return None
     record = max(records, key=_moved)
+    known = machine.body.joints
+    turning = [joint not in known or known[joint].rotational for joint in record.joints]
+    if (mend := reference_mend(record, turning)) is not None:
+        return mend
     for touching in (False, True) if machine.body.contacts else (False,):
         motion = RecordedMotion(machine, record, touching)
         declared = motion.balanced(motion.as_declared)

@@ -1,0 +1,48 @@
+"""References in another unit than the positions that follow them: told by the size of both motions, without any model of the body."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rhythmid.identify.channel_change import DEGREE, NAMED
+from rhythmid.record.joint_record import JointRecord
+from rhythmid.record.record import Record
+
+FOLLOWS = 0.7  # correlation of reference and position, from which a joint follows its reference
+FACTORS = {True: (DEGREE, "degrees are of radians"), False: (1e-3, "millimetres are of metres")}
+
+
+def reference_mend(record: JointRecord, rotational: Sequence[bool]) -> str | None:
+    """What of the references seems to be declared in another unit, and what to write, in one line; None where they are as the positions.
+
+    Parameters
+    ----------
+    rotational : of each joint of the record, whether it turns.
+    """
+    for (joint, one), turns in zip(record.joints.items(), rotational, strict=True):
+        factor, unit = FACTORS[turns]
+        ratio = _ratio(one)
+        if ratio is None:
+            continue
+        for role, other, size in (("reference", "position", ratio), ("position", "reference", 1.0 / ratio)):
+            if abs(size * factor - 1.0) < NAMED:
+                key = "input" if role == "reference" else "output"
+                return (
+                    f"{record.name}: the {role} of {joint} is {size:.0f} times as large as its {other}, as {unit}; write  "
+                    f"scale: {{{joint}: {factor:.6g}}}  under '{key}:' in signals.yaml"
+                )
+    return None
+
+
+def _ratio(record: Record) -> float | None:
+    """Size of the reference's motion over that of the position; None where there is none that the position follows."""
+    given = record.reference or (record.input if record.input_kind == "reference" else None)
+    if given is None:
+        return None
+    time, position = record.output.time, record.output.value
+    asked = np.interp(time, given.time, given.value)
+    if np.ptp(asked) == 0.0 or np.ptp(position) == 0.0:
+        return None
+    if np.corrcoef(asked, position)[0, 1] < FOLLOWS:
+        return None
+    return float(np.std(asked) / np.std(position))
