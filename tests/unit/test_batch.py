@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import shutil
 import signal
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -153,6 +154,24 @@ def test_estimates_without_a_standard_deviation_do_not_count(tmp_path):
     (gain,) = made_up(tmp_path, [1.0, 2.0, None, 3.0], stds=[1.0, 1.0, None, None]).agreements
     assert len(gain.runs) == 2 and gain.left_out == 2
     assert made_up(tmp_path, [1.0] * 4, stds=[0.0] * 4).agreements == ()
+
+
+def test_a_copy_of_a_recording_under_another_name_is_told_and_counts_once(tmp_path, command):
+    write_files(tmp_path)
+    for number in range(2):
+        write_run(tmp_path / f"{number}.csv", seed=number)
+    shutil.copy(tmp_path / "1.csv", tmp_path / "again.csv")
+    entries = [{"bags": ["0.csv", "1.csv"], "group": "A"}, {"bags": ["again.csv"], "group": "B"}]
+    manifest = {"command": "identify", "model": "model.yaml", "signals": "signals.yaml", "entries": entries}
+    (tmp_path / "week.yaml").write_text(json.dumps(manifest))
+    said = command("batch", "week.yaml", "--out", "out", "--jobs", "1", "--json", "told.json")
+    assert said.code == 0 and "3 answered, 1 of them a copy of another recording" in said.out
+    assert "copy: again.csv holds the same samples as 1.csv" in said.out
+    told = json.loads((tmp_path / "told.json").read_text())
+    assert [one["copy_of"] for one in told["answers"]] == ["", "", "1.csv"]
+    assert {one["runs"] for one in told["agreement"] if one["std"]} == {2}
+    assert {one["groups"] for one in told["agreement"]} <= {0, 1}
+    assert "is a copy of" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
 
 
 def test_a_recording_that_kills_its_process_is_a_failure_and_the_others_are_answered(tmp_path):

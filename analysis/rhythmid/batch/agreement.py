@@ -84,11 +84,13 @@ class Agreement:
 
 
 def agreements(answers: Iterable[tuple[Task, Answered]]) -> tuple[Agreement, ...]:
-    """Every estimated parameter of the answers, compared; answers that were not identified do not count."""
+    """Every estimated parameter of the answers, compared; answers that were not identified do not count, nor do copies of a recording."""
+    answers = tuple(answers)
+    twice = copies(answers)
     runs: dict[tuple[str, str, str], list[Run]] = defaultdict(list)
     without: dict[tuple[str, str, str], int] = defaultdict(int)
     for task, answered in answers:
-        if task.command == "check" or answered.failure:
+        if task.command == "check" or answered.failure or task in twice:
             continue
         for one in answered.values:
             key = (subject(task, answered), one.name, one.unit)
@@ -102,6 +104,20 @@ def agreements(answers: Iterable[tuple[Task, Answered]]) -> tuple[Agreement, ...
     keys = dict.fromkeys([*runs, *without])
     made = [_compared(key, runs[key], without[key]) for key in sorted(keys, key=lambda key: key[0])]
     return _judged(made)
+
+
+def copies(answers: Iterable[tuple[Task, Answered]]) -> dict[Task, Task]:
+    """Answers to a recording that was answered already under another name, each with the first one to the same content and question."""
+    first: dict[tuple[object, ...], Task] = {}
+    found: dict[Task, Task] = {}
+    for task, answered in answers:
+        if not answered.content or answered.failure:
+            continue
+        question = (answered.content, task.command, task.labels, task.joint, task.variant)
+        original = first.setdefault(question, task)
+        if original is not task:
+            found[task] = original
+    return found
 
 
 def subject(task: Task, answered: Answered) -> str:

@@ -26,6 +26,7 @@ from rhythmid.record.bag_report import BagReport, quality_report
 from rhythmid.record.joint_record import JointRecord, JointSignals, load_joint_records
 from rhythmid.record.read import load_records
 from rhythmid.record.record import Record
+from rhythmid.record.same_recording import content_digest
 from rhythmid.record.signals import Signals
 from rhythmid.record.time_origin import CALENDAR
 from rhythmid.report.page import Page, render
@@ -60,6 +61,7 @@ class Answered:
     seconds : that the answer took.
     memory : the most that its process held [bytes].
     values : what was estimated or measured.
+    content : digest of what the recordings measured: answers that share it are of one recording and its copies.
     result : the content of the command's `--json`.
     page : its report as HTML; not part of the JSON.
     """
@@ -72,6 +74,7 @@ class Answered:
     seconds: float = 0.0
     memory: float = 0.0
     values: tuple[Value, ...] = ()
+    content: str = ""
     result: Mapping[str, Any] | None = None
     page: str = ""
 
@@ -178,6 +181,7 @@ def _identified(task: Task) -> Answered:
         headline=found.headline,
         verdict="identified" if found.usable else "not identified",
         time=_began(records),
+        content=content_digest(records),
         values=_values(found.estimates),
         result=found.to_dict(),
         page=render(present(found, command_line(task), _name(task))),
@@ -192,6 +196,7 @@ def _identified_machine(task: Task, machine: Machine) -> Answered:
         headline=headline,
         verdict="identified" if found.usable else "not identified",
         time=_began(one for record in records for one in record.joints.values()),
+        content=content_digest(records),
         values=_values(found.parameters),
         result=found.to_dict(),
         page=render(_plain(task, headline, _values(found.parameters), found.notes, found.machine.to_yaml())),
@@ -213,6 +218,7 @@ def _diagnosed(task: Task) -> Answered:
         verdict=diagnosis.verdict,
         missing=tuple(sorted(one.element for one in diagnosis.missing)) if found.stands else (),
         time=_began(records),
+        content=content_digest(records),
         values=_values(diagnosis.parameters),
         result=found.to_dict(),
         page=render(present(found, model, records, unseen, command_line(task), _name(task))),
@@ -232,6 +238,7 @@ def _diagnosed_machine(task: Task, machine: Machine) -> Answered:
         verdict=found.verdict,
         missing=tuple(sorted(f"{one.joint}: {one.element}" for one in found.missing)),
         time=_began(one for record in records for one in record.joints.values()),
+        content=content_digest(records),
         values=values,
         result=found.to_dict(),
         page=render(_plain(task, found.summary, values, notes, answer.machine.to_yaml())),
@@ -251,6 +258,7 @@ def _checked(task: Task) -> Answered:
         headline=headline,
         verdict="usable",
         values=tuple(value for report in reports for value in _measures(report)),
+        content=content_digest([report.record for report in reports if report.record is not None]),
         result={"records": [report.to_dict() for report in reports]},
         page=render(_plain(task, headline, (), lines, None)),
     )

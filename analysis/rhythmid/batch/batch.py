@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rhythmid.batch.agreement import LEVEL, Agreement, agreements
+from rhythmid.batch.agreement import LEVEL, Agreement, agreements, copies
 from rhythmid.batch.answered import Answered
 from rhythmid.batch.kept import Kept, brief
 from rhythmid.batch.manifest import Manifest
@@ -50,10 +50,17 @@ class Batch(Result):
         return {task: one.failure for task, one in self.answers if one.failure}
 
     @property
+    def copies(self) -> dict[Task, Task]:
+        """Answers to a copy of a recording, each with the answer that counts instead."""
+        return copies(self.answers)
+
+    @property
     def headline(self) -> str:
         """How many were answered, and which parameters do not agree."""
         count, failed = len(self.answers), len(self.failures)
         answered = f"{count - failed} of {count} answered" if failed else f"{count} answered"
+        if twice := len(self.copies):
+            answered += f", {twice} of them {'a copy' if twice == 1 else 'copies'} of another recording, which count{'s' * (twice == 1)} once"
         compared = [one for one in self.agreements if one.verdict != "too few runs"]
         if not compared:
             return f"{answered}; no parameter was estimated twice"
@@ -67,10 +74,14 @@ class Batch(Result):
 
     def tables(self) -> Mapping[str, Sequence[Row]]:
         """`values`, a row for each number of each answer and one for each failure; `agreement`; `answers`."""
+        twice = self.copies
         return {
             "values": [row for task, one in self.answers for row in _value_rows(task, one)],
             "agreement": [_agreement_row(one) for one in self.agreements],
-            "answers": [_answer_row(task, one) for task, one in self.answers],
+            "answers": [
+                {**_answer_row(task, one), "copy_of": twice[task].name if task in twice else ""}
+                for task, one in self.answers
+            ],
         }
 
     def to_dict(self) -> dict[str, Any]:
@@ -150,7 +161,7 @@ def batch(
     >>> import tempfile, numpy as np, rhythmid as rh
     >>> folder, t = tempfile.mkdtemp(), np.arange(0.0, 2.0, 0.01)
     >>> for run in ("a", "b"):
-    ...     swing = np.column_stack([t, 0.3 * np.cos(5 * t)])
+    ...     swing = np.column_stack([t, 0.3 * np.cos(5 * t + ord(run))])
     ...     np.savetxt(f"{folder}/{run}.csv", swing, delimiter=",", header="t,angle", comments="")
     >>> _ = open(f"{folder}/signals.yaml", "w").write("time: {column: t}\\noutput: {column: angle, unit: rad}\\n")
     >>> made = rh.batch({"command": "check", "signals": f"{folder}/signals.yaml", "entries": [{"bags": f"{folder}/*.csv"}]}, f"{folder}/out")

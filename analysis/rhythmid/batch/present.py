@@ -40,6 +40,7 @@ def present(found: "Batch", link: Link, command: str = "") -> Page:
     answered = [pair for pair in found.answers if not pair[1].failure]
     sections = [
         *_failed(found.failures),
+        *_copied(found.copies),
         *_agreement(found.agreements),
         *_over_runs(found.agreements, link),
         *_verdicts(answered),
@@ -103,6 +104,19 @@ def _failed(failures: Mapping[Task, str]) -> list[Section]:
     return [
         Section(
             "Not answered", (Paragraph(said), Table("Each with its reason.", ("recording", "reason"), rows))
+        )
+    ]
+
+
+def _copied(copies: Mapping[Task, Task]) -> list[Section]:
+    if not copies:
+        return []
+    rows = tuple((task.name, original.name) for task, original in copies.items())
+    said = "They hold the same samples as another recording and tell nothing more: only that one is compared."
+    return [
+        Section(
+            "Copies",
+            (Paragraph(said), Table("Each with the one that counts.", ("recording", "is a copy of"), rows)),
         )
     ]
 

@@ -22,6 +22,9 @@ def show(found: "Batch", console: Console) -> None:
         rows = [_row(one) for one in found.agreements if one.subject == subject and one.runs]
         if rows:
             print_table(console, f"{subject}: p-values", HEADS, rows, right=("runs",))
+    for task, original in found.copies.items():
+        told = f"copy: {task.name} holds the same samples as {original.name}, which alone is compared"
+        console.print(escape(told), highlight=False, soft_wrap=True)
     for task, reason in found.failures.items():
         console.print(f"failed: {escape(task.name)}: {escape(reason)}", highlight=False, soft_wrap=True)
 

@@ -39,7 +39,6 @@ from rhythmid.identify.series import prepare
 from rhythmid.model import Model
 from rhythmid.parallel import cores
 from rhythmid.progress import Tell
-from rhythmid.record.angle_wrap import told_of_wraps
 from rhythmid.record.record import Record
 from rhythmid.record.same_recording import check_held_out
 from rhythmid.report.quantity import in_words
@@ -220,7 +219,7 @@ def diagnose(
     check_free(model)
     given = admitted(records, holdout, model)
     # the matrices are tall and thin, and workers run side by side: threads inside linear algebra only get in the way
-    with told_of_wraps(given.whole_records), threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
+    with threadpool_limits(1), ThreadPoolExecutor(cores()) as pool:
         known = catalogue or load_catalogue()
         case = Case(model, given.records, given.holdout, known, pool, tell, Budget(budget))
         whole = replace(case, records=given.whole_records, holdout=given.whole_holdout)

@@ -41,7 +41,6 @@ from rhythmid.ltp.nonparametric import HtfMethod, harmonic_transfer_functions, s
 from rhythmid.ltp.pumping import Pumping, pumping_of
 from rhythmid.model import Model
 from rhythmid.progress import Tell, counted, silent
-from rhythmid.record.angle_wrap import told_of_wraps
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.gaps import cut_at_gaps
 from rhythmid.record.record import Record
@@ -189,8 +188,7 @@ def identify(
     drives += early_outputs(fitted)
     cut = [note for one in fitted for note in cut_at_gaps(one).notes]
     unseen, said = admitted_unseen(cast(tuple[Record, ...], judged), fitted, machine)
-    with told_of_wraps(fitted):
-        found = _identified(fitted, model, harmonics, method, forcing, offset, htf, tell)
+    found = _identified(fitted, model, harmonics, method, forcing, offset, htf, tell)
     balanced = None if found.usable else effort_note(fitted, machine, found.quality["nrmse"])
     said = (*said, *(() if balanced is None else (balanced,)))
     notes = (*still, *(note for one in clean for note in one.notes), *drives, *cut, *said, *found.notes)

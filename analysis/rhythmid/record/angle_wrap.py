@@ -1,17 +1,36 @@
-"""An angle that is read within one turn, or half of one, and jumps from one end to the other where it passes the end."""
+"""An angle that is read within one turn, or half of one, and jumps from one end to the other where it passes the end: the jumps taken out."""
 
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rhythmid.errors import InputError
-from rhythmid.record.record import Record
+from rhythmid.record.record import Channel, Record
 
 Array = NDArray[np.float64]
 TURNS = {"2π": 2.0 * math.pi, "π": math.pi}  # rad: half a turn is what an arc tangent of a ratio tells
+
+
+def unwrapped(record: Record) -> Record:
+    """The record with an output that goes on where it jumped by a turn, and references that jump like it likewise."""
+    turn = turn_of(record)
+    if turn == 0.0:
+        return record
+    output = _unwrapped(record.output, turn)
+    found = replace(record, output=output)
+    reference = record.input if record.input_kind == "reference" else record.reference
+    if reference is None or reference.unit != record.output.unit or not len(_wraps(reference.value, turn)):
+        return found
+    asked = _unwrapped(reference, turn)
+    # a reference is of the turn in which the machine is
+    apart = float(np.median(np.interp(asked.time, output.time, output.value) - asked.value))
+    asked = replace(asked, value=asked.value + turn * np.rint(apart / turn))
+    return replace(found, **{"input" if record.input_kind == "reference" else "reference": asked})
+
+
+def _unwrapped(channel: Channel, turn: float) -> Channel:
+    return replace(channel, value=np.unwrap(channel.value, period=turn))
 
 
 def wrap_notes(record: Record) -> tuple[str, ...]:
@@ -21,30 +40,23 @@ def wrap_notes(record: Record) -> tuple[str, ...]:
 
 
 def wraps_of(record: Record) -> str | None:
-    """By what an output jumps that is read within a turn or half of one, and what to do, in one sentence; None where it does not."""
-    if record.output_kind != "position" or record.output.unit != "rad":
+    """By what an output jumps that is read within a turn or half of one, in one sentence; None where it does not."""
+    turn = turn_of(record)
+    if turn == 0.0:
         return None
-    value = record.output.value
-    found = next(((name, at) for name, turn in TURNS.items() if len(at := _wraps(value, turn))), None)
-    if found is None:
-        return None
-    name, at = found
+    name = next(name for name, one in TURNS.items() if one == turn)
+    at = _wraps(record.output.value, turn)
     return (
         f"it jumps by {name} rad {len(at)} times, the first at t = {record.output.time[at[0] + 1]:.6g} s, as an angle does that is "
-        "read within a turn: a model takes that for a motion; unwrap it (numpy.unwrap, MATLAB's unwrap), or  use:  a part without a jump"
+        "read within a turn: it is unwrapped"
     )
 
 
-@contextmanager
-def told_of_wraps(records: Sequence[Record]) -> Iterator[None]:
-    """Errors of a fit to these records say, too, what may be their cause, where an output jumps by a turn."""
-    try:
-        yield
-    except InputError as error:
-        found = next((f"{one.name}: {note}" for one in records for note in wrap_notes(one)), None)
-        if found is None:
-            raise
-        raise InputError(f"{error}. {found}") from error
+def turn_of(record: Record) -> float:
+    """The turn [rad] by which an output jumps that is read within one; 0 where it does not."""
+    if record.output_kind != "position" or record.output.unit != "rad":
+        return 0.0
+    return next((turn for turn in TURNS.values() if len(_wraps(record.output.value, turn))), 0.0)
 
 
 def _wraps(value: Array, turn: float) -> NDArray[np.intp]:

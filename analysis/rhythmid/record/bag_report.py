@@ -209,8 +209,8 @@ def quality_report(
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             notes += [note for note in one.quality.notes if note not in notes]
             assumed += one.quality.assumed
-            notes += [f"{begin}{note}" for note in (*copy_notes(one), *unsigned_notes(one), *wrap_notes(one))]
-            notes += [f"{begin}{note}" for note in rest_notes(one) if begin]
+            notes += [f"{begin}{note}" for note in (*copy_notes(one), *unsigned_notes(one))]
+            notes += [f"{begin}{note}" for note in (*wrap_notes(one), *rest_notes(one)) if begin]
             if begin and (still := standstill(one)) is not None:
                 notes.append(f"{begin}output: {still}")
         duration = max(one.duration for one in parts.values())

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rhythmid.errors import InputError
-from rhythmid.record.angle_wrap import wrap_notes
+from rhythmid.record.angle_wrap import unwrapped, wrap_notes
 from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.outlier import outlying_samples, repeated_samples
 from rhythmid.record.quality import clipped_samples
@@ -84,12 +84,13 @@ class Cleaned:
 
 
 def cleaned(record: Record) -> Cleaned:
-    """The record without outliers, repeated and clipped samples of the output.
+    """The record without outliers, repeated and clipped samples of the output, and without jumps of an angle that is read within a turn.
 
     An acceleration keeps its outliers: impacts do make such peaks there. With clipped samples go their neighbours, which are often
     half clipped by the sensor's own averaging. Raises InputError when most of the record is clipped.
     """
     total, found, wraps = len(record.output), [], wrap_notes(record)
+    record = unwrapped(record)
     for reason, find in FINDERS:
         channel = record.output
         bad = find(channel.value)

@@ -25,6 +25,7 @@ from rhythmid.record.other_lengths import length_notes, unequal_arrays
 from rhythmid.record.signals import Clock
 from rhythmid.record.table import SUFFIXES, WIDEST, Table, table_suffix
 from rhythmid.record.table_clock import COUNTER, is_even, is_further_time, is_time, table_clock
+from rhythmid.record.told_rate import told_rate
 from rhythmid.record.two_clocks import clock_notes, trusted_clock
 
 Array = NDArray[np.float64]
@@ -143,7 +144,11 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
     unequal = [(name, value) for name, value in columns if len(value) != count]
     columns = [(name, value) for name, value in columns if len(value) == count]
     notes = (*table.notes, *length_notes(table, count))
-    if rate is not None:
+    told = None if rate is not None else told_rate(table, columns)
+    if told is not None:
+        rate, reason = told
+        clock, every = Clock("rate", rate=rate), np.arange(count) / rate
+    elif rate is not None:
         clock, reason, every = Clock("rate", rate=rate), "as given with --rate", np.arange(count) / rate
     else:
         clock, reason = table_clock(table.path, columns, unequal)

@@ -57,8 +57,33 @@ def _lists(name: str, value: Any) -> Iterator[tuple[str, Any]]:
         if len(value) > 1 and all(key.isdecimal() for key in value):  # a list by the numbers of its rows
             yield from _columns(name, list(value.values()))
             return
+        if (named := _named_columns(value)) is not None:
+            yield from ((_path(name, key), column) for key, column in named.items())
+            return
         for key, inner in value.items():
             yield from _lists(_path(name, key), inner)
+
+
+def _named_columns(value: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The columns of rows whose names stand in a list of their own beside them, as pandas writes them; None where there are no such."""
+    rows = [
+        one
+        for one in value.values()
+        if isinstance(one, list) and one and all(isinstance(row, list) for row in one)
+    ]
+    heads = [
+        one
+        for one in value.values()
+        if isinstance(one, list) and one and all(isinstance(cell, str) for cell in one)
+    ]
+    if len(rows) != 1 or len(heads) != 1 or {len(row) for row in rows[0]} != {len(heads[0])}:
+        return None
+    cells = zip(*rows[0], strict=True)
+    return {
+        key: column
+        for name, own in zip(heads[0], cells, strict=True)
+        for key, column in _columns(name, list(own))
+    }
 
 
 def _columns(name: str, rows: Sequence[Any]) -> Iterator[tuple[str, Any]]:

@@ -1,5 +1,6 @@
-"""Recordings that are given twice: one that is fitted cannot be held out too."""
+"""Recordings that are given twice: one that is fitted cannot be held out too, and one that is answered twice counts once."""
 
+import hashlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,6 +17,18 @@ def check_held_out(fitted: Sequence[Record | JointRecord], holdout: Sequence[Rec
             raise InputError(
                 f"{one.name}: is fitted and held out; a record judges only where no fit has seen it, so leave it out of one of the two"
             )
+
+
+def content_digest(records: Sequence[Record | JointRecord]) -> str:
+    """A digest of what was measured, in hexadecimal digits: recordings that have the same are copies, whatever they are called."""
+    digest = hashlib.sha256()
+    for record in records:
+        for one in _outputs(record):
+            digest.update(
+                np.rint(1e9 * one.output.time).astype(np.int64).tobytes()
+            )  # stamps have nanoseconds
+            digest.update(one.output.value.tobytes())
+    return digest.hexdigest()
 
 
 def _same(one: Record | JointRecord, other: Record | JointRecord) -> bool:

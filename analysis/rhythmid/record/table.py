@@ -27,8 +27,12 @@ from rhythmid.record.text_file import COMPRESSED
 from rhythmid.record.text_table import TEXT, text_table
 
 HDF5 = (".h5", ".hdf5")
-SUFFIXES = (".mat", *HDF5, ".npz", ".parquet", *JSON, *TEXT)
+SUFFIXES = (".mat", *HDF5, ".npz", ".npy", ".parquet", *JSON, *TEXT)
 WIDEST = 64  # columns of an array beyond which it is an image or a scan, not joints
+LABELLED = (
+    ("label", "values"),
+    ("Name", "Data"),
+)  # fields of a struct: what a channel is called, and its numbers
 ONE_OF_MANY = re.compile(r"(.+)\[(\d+)\]")  # dof_pos[3]: one column of an array
 
 
@@ -57,14 +61,14 @@ class Table:
     def load(cls, path: Path) -> "Table":
         """Read a table. Raises InputError when the file is missing, damaged or of an unknown kind."""
         readers = {
-            ".mat": _mat, ".npz": _npz, ".parquet": _parquet, **dict.fromkeys(HDF5, read_hdf5), **dict.fromkeys(JSON, read_json),
+            ".mat": _mat, ".npz": _npz, ".npy": _npy, ".parquet": _parquet, **dict.fromkeys(HDF5, read_hdf5), **dict.fromkeys(JSON, read_json),
             **dict.fromkeys(TEXT, text_table),
         }  # fmt: skip
         read = readers.get(table_suffix(path))
         if read is None:
             refuse_foreign(path)
             raise InputError(
-                f"{path}: is not a table; .mat, {', '.join(HDF5)}, .npz, .parquet, {', '.join((*JSON, *TEXT))} can be read"
+                f"{path}: is not a table; .mat, {', '.join(HDF5)}, .npz, .npy, .parquet, {', '.join((*JSON, *TEXT))} can be read"
             )
         try:
             check_content(path)
@@ -203,6 +207,7 @@ def _first(texts: NDArray[Any]) -> str:
 
 def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
     """Arrays in structs within structs, by the path to them, as MATLAB writes it: `data.q`, `runs[0].q` in a struct array."""
+    struct = _with_label(struct)
     for name, value in struct.items():
         if isinstance(value, dict):
             yield from _flat(value, f"{above}{name}.")
@@ -216,6 +221,15 @@ def _flat(struct: dict[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
                 yield f"{above}{name}[{number}]", np.atleast_1d(np.asarray(one))
         else:
             yield above + name, np.atleast_1d(np.asarray(value))
+
+
+def _with_label(struct: dict[str, Any]) -> dict[str, Any]:
+    """A struct whose numbers are called by the label that stands beside them: Simulink's `label` of `values`, dSPACE's `Name` of `Data`."""
+    for label, numbers in LABELLED:
+        name = struct.get(label)
+        if isinstance(name, str) and name.strip() and numbers in struct and name not in struct:
+            return {name.strip() if key == numbers else key: value for key, value in struct.items()}
+    return struct
 
 
 def _is_cell(value: Any) -> bool:
@@ -238,6 +252,19 @@ def _npz(path: Path) -> dict[str, Any]:
             raise ValueError("it is no archive of arrays")
         _check_size(path, sum(member.file_size for member in file.zip.infolist()))
         return {name: file[name] for name in file.files}
+
+
+def _npy(path: Path) -> dict[str, Any]:
+    """The columns of an array by their numbers, those of records by their names."""
+    array = np.array(
+        np.load(path, allow_pickle=False, mmap_mode="r")
+    )  # which refuses what claims to be longer than its file
+    if array.dtype.names:
+        return {name: array[name] for name in array.dtype.names}
+    array = _upright(array)
+    if array.ndim != 2 or array.shape[1] > WIDEST:
+        raise ValueError(f"its array has the shape {array.shape}; rows and columns are expected")
+    return {str(number): column for number, column in enumerate(array.T)}
 
 
 def _check_size(path: Path, size: int) -> None:

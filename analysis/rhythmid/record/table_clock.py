@@ -1,6 +1,7 @@
 """Which column of a table holds the times, and how many seconds one of its units is."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +93,19 @@ def is_even(value: Array) -> bool:
     return in_any_unit and float(np.mean(np.abs(step - usual) <= NEAR * usual)) >= USUAL
 
 
+def has_time(columns: Sequence[tuple[str, Array]]) -> bool:
+    """Whether one of the columns of numbers is taken for the time."""
+    return any(is_time(name, value) for name, value in columns) or any(
+        _is_untold_time(*one) for one in columns
+    )
+
+
+def _is_untold_time(name: str, value: Array) -> bool:
+    """Whether a column that is not called a time is one by its steps; whole numbers that count the rows only where it has no name."""
+    untold = COUNTER.fullmatch(name) is None and not heading_of(name).unit
+    return untold and is_even(value) and (name.isdigit() or not bool((np.diff(value) == 1.0).all()))
+
+
 def table_clock(
     path: Path, columns: list[tuple[str, Array]], unequal: list[tuple[str, Array]]
 ) -> tuple[Clock, str]:
@@ -102,13 +116,11 @@ def table_clock(
         if is_time(name, value):
             return named_clock(name, value)
     for name, value in columns:
-        untold = COUNTER.fullmatch(name) is None and not heading_of(name).unit
-        if untold and is_even(value):
-            if name.isdigit() or not (np.diff(value) == 1.0).all():
-                scale, why = _guessed_scale(value)
-                return Clock(
-                    "column", column=name, scale=scale
-                ), f"the first column that goes forward by steps of one size; {why}"
+        if _is_untold_time(name, value):
+            scale, why = _guessed_scale(value)
+            return Clock(
+                "column", column=name, scale=scale
+            ), f"the first column that goes forward by steps of one size; {why}"
     names = ", ".join(name for name, _ in columns[:MOST_NAMED])
     if len(columns) > MOST_NAMED:
         names += f" and {len(columns) - MOST_NAMED} more"

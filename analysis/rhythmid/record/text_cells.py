@@ -12,6 +12,7 @@ MISSING = frozenset(
     "nan n/a na #n/a null none undefined - -- --- -nan -nan(ind) nan(ind) 1.#qnan -1.#ind #num! #div/0!".split()
 )
 INFINITE = {"∞": np.inf, "+∞": np.inf, "-∞": -np.inf}  # beyond its range, as an oscilloscope writes it
+HEXADECIMAL = re.compile(r"0[xX][0-9a-fA-F]+")  # of a register or a counter
 THOUSANDS = re.compile(
     r"[+-]?\d{1,3}(?:,\d{3})+\.\d+"
 )  # 5,000.00; without decimals it could be a decimal comma
@@ -48,7 +49,7 @@ def number_of(cell: str, decimal: str) -> float | None:
     elif THOUSANDS.fullmatch(cell):
         cell = cell.replace(",", "")
     try:
-        return float(cell)
+        return float(int(cell, 16)) if HEXADECIMAL.fullmatch(cell) else float(cell)
     except ValueError:
         return INFINITE.get(cell)
 

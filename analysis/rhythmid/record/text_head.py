@@ -30,10 +30,22 @@ def names_of(above: Sequence[Sequence[str]], count: int) -> list[str] | None:
         return list(above[-1])
     last, *before = fitting
     if before and is_units(last) and len(set(before[0])) > 1:
-        return with_units(before[0], last)
+        return with_units(_told_by(before[0], before[1:]), last)
     if before and is_units(before[0]) and not is_units(last):
-        return with_units(last, before[0])
-    return list(last)
+        return with_units(_told_by(last, before[1:]), before[0])
+    return _told_by(last, before)
+
+
+def _told_by(names: Sequence[str], above: Sequence[Sequence[str]]) -> list[str]:
+    """Names, of which those that are empty or stand twice are told by the lines above, the nearest first: `Rotation.X`, `Position.X`."""
+    found = list(names)
+    for line in above:
+        unclear = [not name or found.count(name) > 1 for name in found]
+        found = [
+            ".".join(part for part in (upper.strip(), name) if part) if open_ else name
+            for name, upper, open_ in zip(found, line, unclear, strict=True)
+        ]
+    return found
 
 
 def is_units(cells: Sequence[str]) -> bool:

@@ -18,9 +18,11 @@ from rhythmid.errors import InputError
 from rhythmid.record.broken_lines import unbroken
 from rhythmid.record.clock_time import seconds
 from rhythmid.record.codesys_trace import is_trace, read_trace
+from rhythmid.record.heading import heading_of
 from rhythmid.record.labelled_rows import labels_of, read_labelled
 from rhythmid.record.list_cells import list_of, lists_of
 from rhythmid.record.lvm_head import lvm_head
+from rhythmid.record.measured_cells import is_measured, measured
 from rhythmid.record.text_cells import COMMENTS, cells_of, content, is_missing, is_number, number_of
 from rhythmid.record.text_file import opened
 from rhythmid.record.text_head import names_of
@@ -87,15 +89,19 @@ def text_table(path: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
     unnamed = dialect.names == tuple(map(str, range(count)))
     if unnamed and not words and ACROSS * len(numbers) <= count:
         return {str(place): row for place, row in enumerate(numbers)}, ()
-    found: dict[str, Any] = {
-        dialect.names[place]: column for place, column in zip(dialect.numeric, numbers.T)
-    }
+    names = list(dialect.names)
+    found: dict[str, Any] = {names[place]: column for place, column in zip(dialect.numeric, numbers.T)}
     if words:
         cells = [cells_of(text, dialect.separator) for text in rows.texts]
-        found |= {dialect.names[place]: _words([row[place] for row in cells], rows, place) for place in words}
+        for place in words:
+            own = [row[place] for row in cells]
+            values, unit = measured(own, dialect.decimal) or (_words(own, rows, place), "")
+            if unit and not heading_of(names[place]).unit:
+                names[place] = f"{names[place]} [{unit}]"
+            found[names[place]] = values
     if lvm is not None and lvm.step > 0.0:
-        found[dialect.names[0]] = lvm.times(len(rows))
-    return {name: found[name] for name in dialect.names}, dialect.notes
+        found[names[0]] = lvm.times(len(rows))
+    return {name: found[name] for name in names}, dialect.notes
 
 
 def dialect_of(lines: list[str], name: str) -> Dialect:
@@ -183,7 +189,7 @@ def _readings(lines: list[str]) -> Iterator[tuple[str | None, str, list[int], tu
 
 def _count(cell: str, decimal: str) -> int:
     """How many numbers a cell holds, of which a list has several; [1] may be a unit."""
-    if is_number(cell, decimal):
+    if is_number(cell, decimal) or is_measured(cell, decimal):
         return 1
     found = list_of(cell) or ()
     return len(found) if len(found) > 1 else 0

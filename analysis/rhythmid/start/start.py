@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
 from rhythmid.model import Model
-from rhythmid.record.angle_wrap import wraps_of
+from rhythmid.record.angle_wrap import unwrapped, wraps_of
 from rhythmid.record.cleaning import cleaned
 from rhythmid.record.inventory import Inventory, inventory
 from rhythmid.record.read import load_records, read_record
@@ -172,6 +172,7 @@ def start(
     moving = [one for one in sources if one not in resting]
     records = load_records(moving, Signals.from_text(guessed.signals, GUESSED))
     records = [one for one in records if standstill(cleaned(one).record) is None] or records
+    records = [unwrapped(one) for one in records]
     catalogue = load_catalogue() if catalogue is None else catalogue
     units = _units(guessed.roles)
     nominal = nominal_of(records, guessed.roles, units, catalogue)
