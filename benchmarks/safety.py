@@ -184,7 +184,7 @@ class Bench:
         """Everything is healthy, and effort flows."""
         self.robot.measure_well()
         while True:
-            wait(self._flows, "effort")
+            wait(self._flows, "effort", 300.0)
             time.sleep(0.05)
             if self.robot.effort() == EFFORT and time.time() - self.robot.heard[-1][0] < FRESH:
                 return

@@ -7,6 +7,7 @@ import pytest
 from live_machine import CHANGED, LIFT, at_work
 from machines_at_work import RATE, Stretch
 
+from rhythmid.errors import InputError
 from rhythmid.model import Model
 from rhythmid.twin.lateness import LOOK, Doubt, lateness, possible_lateness
 from rhythmid.twin.released import Released
@@ -100,6 +101,23 @@ def test_a_change_of_physics_between_late_messages_is_told(learnt):
     assert (
         said[-1].since is not None and said[-1].isolation is not None and said[-1].isolation.slot == "force"
     )
+
+
+def test_a_machine_whose_messages_are_always_late_is_told_to_be_late_and_none_is_learnt_from_it(learnt):
+    begin = float(learnt[2].time[-1])
+    always = tuple((0.1 * k, 0.08) for k in range(200))
+    said = watched(learnt, stalled(always, begin), punctual, False)
+    assert {status.level for status in said[5:]} == {"late"}
+    model, signals = healthy()
+    twin = Twin(model, SETTINGS)
+    late = np.maximum.accumulate(
+        signals.stamp + stalled(tuple((0.1 * k, 0.08) for k in range(270)), 0.0)(signals.stamp)
+    )
+    for role, time, value in signals.channels:
+        told = late + 1e-9 * np.arange(len(late)) if role == "output" else time
+        twin.push(role, told, value)
+    with pytest.raises(InputError, match="came too late"):
+        twin.advance()
 
 
 def test_lateness_is_that_behind_the_grid_of_what_follows_and_a_gap_is_doubt():

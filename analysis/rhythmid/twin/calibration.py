@@ -87,15 +87,23 @@ class Stretch:
         return segments(self.output.time, self.size)
 
     def innovations(self, observer: Observer, pieces: Sequence[slice]) -> list[Innovations]:
-        """What an observer finds of these segments, without those that it cannot follow."""
+        """What an observer finds of these segments, without those that it cannot follow and those that came too late."""
         time, value = self.output.time, self.output.value
+        doubts = self.doubts(pieces)
         found = [
-            observer.take(
-                time[at], value[at], Doubt.of(time, self.late, at.start, at.stop), self.command, self.forcing
-            )
-            for at in pieces
+            observer.take(time[at], value[at], doubt, self.command, self.forcing)
+            for at, doubt in zip(pieces, doubts)
         ]
-        return [one for one in found if one is not None]
+        return [one for one, doubt in zip(found, doubts) if one is not None and doubt.punctual]
+
+    def doubts(self, pieces: Sequence[slice]) -> list[Doubt]:
+        """In the times of these segments. Raises InputError where most of them came too late to tell of the physics."""
+        doubts = [Doubt.of(self.output.time, self.late, at.start, at.stop) for at in pieces]
+        if sum(doubt.punctual for doubt in doubts) < max(len(doubts) // 2, SETTLED + 1):
+            raise InputError(
+                "most measurements of the healthy stretch came too late to tell of the physics; use a quieter machine"
+            )
+        return doubts
 
 
 def segments(time: Array, size: int) -> list[slice]:
@@ -212,13 +220,14 @@ def _tuned(simulation: Simulation, stretch: Stretch, scatter: Array) -> Filter:
     some, block, value = stretch.pieces[: SETTLED + TUNED], stretch.block, stretch.output.value
     averaged = value[: len(value) // block * block].reshape(-1, block).mean(axis=1)
     rough = float(np.var(np.diff(averaged, ROUGH)))
+    punctual = sum(doubt.punctual for doubt in stretch.doubts(some))
     noise = max(rough / comb(2 * ROUGH, ROUGH), (LEAST * scatter[0]) ** 2, 1e-300)
     best, best_density = None, -np.inf
     for kick in KICKS:
         for _ in range(PASSES):
             given = Filter(noise, (kick * scatter[1]) ** 2, scatter, block, stretch.size)
             found = stretch.innovations(Observer(simulation, given, None), some)[SETTLED:]
-            if len(found) < len(some) // 2:
+            if len(found) < punctual // 2:
                 break
             squares = float(np.mean([np.mean(one.white**2) for one in found]))
             density = sum(one.log_density for one in found)

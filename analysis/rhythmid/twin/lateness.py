@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 LOOK = 0.25  # s of later stamps that tell the lateness of one: longer than a stall that leaves a backlog (0.1 s) and its release
 STALL = 0.02  # s without a measurement in which the machine may have stood still: a delay of 0.05 s leaves that of a stall of 0.07 s
 PERIODS = 5  # that a gap lasts at least, at low rates
+UNTOLD = 5e-3  # s of rms lateness above which a segment tells nothing: a twin is to tell a delay that has grown by so much
 
 
 def lateness(stamps: Array, period: float) -> Array:
@@ -40,6 +41,11 @@ class Doubt:
 
     late: Array
     rms: float
+
+    @property
+    def punctual(self) -> bool:
+        """Whether the segment tells of the physics."""
+        return self.rms <= UNTOLD
 
     @classmethod
     def of(cls, stamps: Array, late: Array, first: int, end: int) -> "Doubt":

@@ -88,7 +88,10 @@ class Observer:
     def _of_times(self, run: Run, doubt: Doubt) -> Array:
         """Covariance (m, m) of the block averages by the doubt in their times: of each one's lateness, and of one that all have."""
         each, all_of_them = (
-            (run.slope * late).reshape(-1, self.given.block).mean(axis=1) for late in (doubt.late, doubt.rms)
+            (np.abs(run.slope) * late + 0.5 * np.abs(run.curvature) * late**2)
+            .reshape(-1, self.given.block)
+            .mean(axis=1)
+            for late in (doubt.late, doubt.rms)
         )
         return np.diag(each**2) + np.outer(all_of_them, all_of_them)
 

@@ -38,6 +38,6 @@ class Released:
             time = time + np.interp(time + self._delay, released - late, late, left=0.0, right=0.0)
             self.released.forget(float(time[0]) - LOOK)
         time = np.maximum.accumulate(np.concatenate([[self._newest], time]))[1:]
-        time = time + APART * np.arange(1, count + 1)
+        time = np.asarray(time + APART * np.arange(1, count + 1), dtype=np.float64)
         self._newest = float(time[-1]) if count else self._newest
         return time, value

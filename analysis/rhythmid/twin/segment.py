@@ -50,11 +50,12 @@ class Run:
 
     `output` (m,) are block averages, `states` (q,) those at its end, `by_start` (m, q) and `by_change` (m, p) what a unit of
     each state at the start and of each change does to the output, `end_by_start` (q, q) and `end_by_change` (q, p) to the end.
-    `slope` (n,) is the rate of change of the output at each sample.
+    `slope` and `curvature` (n,) are the first and the second derivative of the output at each sample.
     """
 
     output: Array
     slope: Array
+    curvature: Array
     states: Array
     by_start: Array
     by_change: Array
@@ -197,7 +198,18 @@ class Simulation:
                 parameters[place] += size
                 other = self.rows(given, start, parameters=parameters)
                 by_change[:, i], end_by_change[:, i] = moved(other, size)
-        return Run(output, slope, rows[-1, :q].copy(), by_start, by_change, end_by_start, end_by_change, past)
+        curvature = _slope(given.times, slope)
+        return Run(
+            output,
+            slope,
+            curvature,
+            rows[-1, :q].copy(),
+            by_start,
+            by_change,
+            end_by_start,
+            end_by_change,
+            past,
+        )
 
 
 def _slope(time: Array, value: Array) -> Array:

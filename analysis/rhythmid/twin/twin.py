@@ -25,7 +25,7 @@ from rhythmid.twin.segment import Simulation
 from rhythmid.twin.settings import Settings
 
 Array = NDArray[np.float64]
-Level = Literal["learning", "ok", "warn", "error"]
+Level = Literal["learning", "late", "ok", "warn", "error"]
 Role = Literal["input", "output", "forcing", "released"]
 CONFIRMED = 10.0  # s of mismatch after which a warning becomes an error
 PATIENCE = 1.0  # s that commands and forcing may be older than the measurement, before they are taken as held
@@ -38,7 +38,7 @@ class Status:
     Attributes
     ----------
     time : of the newest measurement judged [s].
-    level : learning in the healthy stretch; warn with the first mismatch, error when it has lasted ten seconds.
+    level : learning in the healthy stretch; late where messages come too late to tell of the physics; warn with the first mismatch, error when it has lasted ten seconds.
     mismatch : the largest statistic as a multiple of its threshold.
     innovation : rms of the normalised innovations of the last second, 1 in healthy operation.
     since : when the mismatch was seen first [s], None without one.
@@ -181,6 +181,9 @@ class Twin:
         if found is None:
             self._settling = self._scores.maxlen or 1
             return None
+        if not doubt.punctual:
+            level = "late" if self._since is None else self._lasting(float(time[-1]))
+            return Status(float(time[-1]), level, since=self._since)
         score = self._whitener(found)
         if self._settling:
             self._settling -= 1
@@ -229,8 +232,11 @@ class Twin:
             self._below = now if self._below is None else self._below
             if now - self._below >= CONFIRMED:
                 self._since = self._below = None
-        if self._since is None:
-            return "ok"
+        return "ok" if self._since is None else self._lasting(now)
+
+    def _lasting(self, now: float) -> Level:
+        """Level of a mismatch by how long it has lasted."""
+        assert self._since is not None
         return "error" if now - self._since >= CONFIRMED else "warn"
 
     def _forget(self) -> None:

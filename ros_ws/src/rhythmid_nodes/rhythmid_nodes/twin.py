@@ -54,6 +54,7 @@ PARAMETERS = (
 )  # fmt: skip
 _LEVELS = {
     "learning": DiagnosticStatus.OK,
+    "late": DiagnosticStatus.OK,
     "ok": DiagnosticStatus.OK,
     "warn": DiagnosticStatus.WARN,
     "error": DiagnosticStatus.ERROR,
@@ -227,6 +228,8 @@ class TwinNode(GraphNode):
     def _message(self, status: Status) -> str:
         if status.level == "learning":
             return "learning the healthy machine"
+        if status.level == "late":
+            return "messages come too late to tell of the physics"
         event = self._watch.events.current
         if event is None:
             return "the machine does what its model does"
