@@ -1,5 +1,6 @@
 """The commands for machines of several joints, from simulation to diagnosis."""
 
+import importlib.util
 import json
 import subprocess
 import sys
@@ -11,6 +12,8 @@ from legged import fixed_leg
 from typer.testing import CliRunner
 
 import rhythmid as rh
+from rhythmid.body.joint_experiment import JointExperiment
+from rhythmid.body.machine import Machine
 from rhythmid.cli import app
 from rhythmid.errors import InputError
 
@@ -164,3 +167,20 @@ def test_what_cannot_be_done_is_told_in_one_line(bags: Path, arguments: list[str
         CliRunner().invoke(app, [one.format(**places) for one in arguments], catch_exceptions=False)
     assert "\n" not in str(caught.value)
     assert not (bags / "new").exists()
+
+
+def test_the_demonstration_conceals_one_effect_at_one_joint_and_seals_what_it_was(tmp_path: Path):
+    path = Path(__file__).parents[2] / "docs" / "demo_leg.py"
+    spec = importlib.util.spec_from_file_location("demo_leg", path)
+    assert spec is not None and spec.loader is not None
+    demo = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(demo)
+    plant, sealed = demo.conceal(tmp_path, 3)
+    truth = json.loads(sealed.read_text())
+    given, made = (Machine.load(one) for one in (LEGS / "leg.yaml", plant))
+    more = {
+        joint: [term.label for term in made.paths[joint].terms if given.paths[joint].term(term.label) is None]
+        for joint in given.joints
+    }
+    assert more == {joint: [truth["element"]] * (joint == truth["joint"]) for joint in given.joints}
+    assert [JointExperiment.load(tmp_path / f"{one}.yaml").duration for one in demo.RECORDS] == [8.0, 8.0]

@@ -171,7 +171,7 @@ def _effort(joint: str, one: IdentifiedEffort) -> list[Block]:
         drawing(
             f"Effort at {joint}",
             over_time,
-            "Both are filtered as for the fit. As given: the path and the body before the fit.",
+            "All are filtered as for the fit. As given: the path and the body before the fit.",
         )
     ]
     figures: list[Block] = [_against(joint, one, unit)]
