@@ -7,8 +7,10 @@ from rhythmid.diagnose.admission import admitted
 from rhythmid.model import Model
 from rhythmid.record.angle_wrap import unwrapped, wrap_notes
 from rhythmid.record.bag_report import quality_report
+from rhythmid.record.cleaning import cleaned
+from rhythmid.record.read import read_record
 from rhythmid.record.record import Channel, Record
-from rhythmid.start.start import start
+from rhythmid.start.start import guess, start
 
 TIME = 0.01 * np.arange(2000)
 TURNING = 3.0 * np.sin(0.4 * TIME) + 1.3 * TIME  # rad
@@ -103,3 +105,26 @@ def test_init_says_it_and_makes_the_same_of_an_angle_within_a_turn(tmp_path):
         assert ("CHECK output: it jumps by 2π rad" in checks) is (name == "read")
         gains.append(begun.nominal.model.value("velocity_control.gain"))
     assert gains[0] == pytest.approx(gains[1], rel=0.01)
+
+
+def test_init_takes_counts_that_begin_again_after_a_turn_in_rad(tmp_path):
+    counts = np.floor(TURNING * 4096 / (2.0 * np.pi)) % 4096
+    torque = np.gradient(np.gradient(TURNING, TIME), TIME)
+    rows = [f"{t:.2f},{y:.0f},{u:.6f},{k % 256}" for k, (t, y, u) in enumerate(zip(TIME, counts, torque))]
+    (tmp_path / "run.csv").write_text("\n".join(["time,encoder,torque,sequence", *rows]) + "\n")
+    found = guess(tmp_path / "run.csv")
+    output = found.roles.choices["output"].recorded
+    assert (output.column, output.unit) == ("encoder", "rad") and output.scale == pytest.approx(
+        2.0 * np.pi / 4096
+    )
+    told = [line for line in found.lines() if "begins again" in line]
+    assert len(told) == 1 and "encoder: begins again after 4096" in told[0]  # a number of rows is no turn
+    (tmp_path / "signals.yaml").write_text(found.signals)
+    report = quality_report(tmp_path / "run.csv", tmp_path / "signals.yaml")
+    assert any("it is unwrapped" in note for note in report.notes) and not any(
+        "jumps" in one for one in report.matters
+    )
+    turns = (
+        cleaned(read_record(tmp_path / "run.csv", tmp_path / "signals.yaml")).record.output.value - TURNING
+    )
+    assert float(np.ptp(turns)) < 2.0 * 2.0 * np.pi / 4096
