@@ -128,3 +128,28 @@ def test_init_takes_counts_that_begin_again_after_a_turn_in_rad(tmp_path):
         cleaned(read_record(tmp_path / "run.csv", tmp_path / "signals.yaml")).record.output.value - TURNING
     )
     assert float(np.ptp(turns)) < 2.0 * 2.0 * np.pi / 4096
+
+
+@pytest.mark.parametrize("turn", [np.inf, 2.0 * np.pi], ids=["on and on", "within a turn"])
+def test_init_finds_inertia_and_damping_of_a_motor_that_never_comes_back(turn, tmp_path):
+    """Up to 100 rad/s, 2 ms apart, an encoder of 16384 counts a turn."""
+    time = 0.002 * np.arange(3000)
+    speed = 70.0 + 20.0 * np.sin(4.0 * time) + 8.0 * np.sin(11.0 * time)
+    torque = 2e-3 * (80.0 * np.cos(4.0 * time) + 88.0 * np.cos(11.0 * time)) + 1e-3 * speed
+    angle = 70.0 * time - 5.0 * np.cos(4.0 * time) - 8.0 / 11.0 * np.cos(11.0 * time)
+    count = 2.0 * np.pi / 16384
+    angle = np.floor(angle / count) * count
+    angle = angle if np.isinf(turn) else (angle + np.pi) % turn - np.pi
+    table = np.column_stack([time, angle, torque])
+    np.savetxt(
+        tmp_path / "run.csv",
+        table,
+        delimiter=",",
+        header="time,position [rad],torque [Nm]",
+        comments="",
+        fmt="%.8f",
+    )
+    model = start([tmp_path / "run.csv"]).nominal.model
+    assert model.value("inertia.mass") == pytest.approx(2e-3, rel=0.01)
+    assert model.value("viscous_damper.damping") == pytest.approx(1e-3, rel=0.01)
+    assert [term.label for term in model.terms] == ["viscous_damper"]
