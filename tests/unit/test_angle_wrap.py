@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from rhythmid.diagnose.diagnosis import diagnose
-from rhythmid.identify.identify import identify
+from rhythmid.diagnose.admission import admitted
 from rhythmid.model import Model
 from rhythmid.record.angle_wrap import unwrapped, wrap_notes
 from rhythmid.record.bag_report import quality_report
+from rhythmid.record.cleaning import cleaned
+from rhythmid.record.read import read_record
 from rhythmid.record.record import Channel, Record
-from rhythmid.start.start import start
+from rhythmid.start.start import guess, start
 
 TIME = 0.01 * np.arange(2000)
 TURNING = 3.0 * np.sin(0.4 * TIME) + 1.3 * TIME  # rad
@@ -65,18 +66,20 @@ command: [{velocity_control: {gain: {value: GAIN, unit: "1/s"}}}]
 """
 
 
-@pytest.mark.parametrize("fit", [identify, diagnose])
-def test_a_fit_takes_the_jumps_out_and_says_so(fit):
+def test_the_analyses_take_the_jumps_out_and_say_so():
     asked = Channel(TIME, np.gradient(TURNING, TIME), "rad/s")
     model = Model.from_text(SERVO.replace("GAIN", "30.0"))
-    gains = []
+    told = []
     for angle in (TURNING, TURNING % (2.0 * np.pi)):
-        record = Record("wheel", Channel(TIME, angle, "rad"), input=asked, input_kind="reference")
-        found = fit(record, model)
-        notes = found.notes if fit is identify else found.diagnosis.notes
-        assert ("wheel: output: it jumps by 2π rad" in " ".join(notes)) is (angle is not TURNING)
-        gains.append(found.model.value("velocity_control.gain"))
-    assert gains[0] == pytest.approx(gains[1], rel=1e-6)
+        given = admitted(
+            [Record("wheel", Channel(TIME, angle, "rad"), input=asked, input_kind="reference")], (), model
+        )
+        (record,) = given.records
+        np.testing.assert_allclose(
+            record.output.value - TURNING, record.output.value[0] - TURNING[0], atol=1e-9
+        )
+        told.append("wheel: output: it jumps by 2π rad" in " ".join(given.notes))
+    assert told == [False, True]
 
 
 @pytest.mark.parametrize("role", ["input", "reference"])
@@ -102,3 +105,51 @@ def test_init_says_it_and_makes_the_same_of_an_angle_within_a_turn(tmp_path):
         assert ("CHECK output: it jumps by 2π rad" in checks) is (name == "read")
         gains.append(begun.nominal.model.value("velocity_control.gain"))
     assert gains[0] == pytest.approx(gains[1], rel=0.01)
+
+
+def test_init_takes_counts_that_begin_again_after_a_turn_in_rad(tmp_path):
+    counts = np.floor(TURNING * 4096 / (2.0 * np.pi)) % 4096
+    torque = np.gradient(np.gradient(TURNING, TIME), TIME)
+    rows = [f"{t:.2f},{y:.0f},{u:.6f},{k % 256}" for k, (t, y, u) in enumerate(zip(TIME, counts, torque))]
+    (tmp_path / "run.csv").write_text("\n".join(["time,encoder,torque,sequence", *rows]) + "\n")
+    found = guess(tmp_path / "run.csv")
+    output = found.roles.choices["output"].recorded
+    assert (output.column, output.unit) == ("encoder", "rad") and output.scale == pytest.approx(
+        2.0 * np.pi / 4096
+    )
+    told = [line for line in found.lines() if "begins again" in line]
+    assert len(told) == 1 and "encoder: begins again after 4096" in told[0]  # a number of rows is no turn
+    (tmp_path / "signals.yaml").write_text(found.signals)
+    report = quality_report(tmp_path / "run.csv", tmp_path / "signals.yaml")
+    assert any("it is unwrapped" in note for note in report.notes) and not any(
+        "jumps" in one for one in report.matters
+    )
+    turns = (
+        cleaned(read_record(tmp_path / "run.csv", tmp_path / "signals.yaml")).record.output.value - TURNING
+    )
+    assert float(np.ptp(turns)) < 2.0 * 2.0 * np.pi / 4096
+
+
+@pytest.mark.parametrize("turn", [np.inf, 2.0 * np.pi], ids=["on and on", "within a turn"])
+def test_init_finds_inertia_and_damping_of_a_motor_that_never_comes_back(turn, tmp_path):
+    """Up to 100 rad/s, 2 ms apart, an encoder of 16384 counts a turn."""
+    time = 0.002 * np.arange(3000)
+    speed = 70.0 + 20.0 * np.sin(4.0 * time) + 8.0 * np.sin(11.0 * time)
+    torque = 2e-3 * (80.0 * np.cos(4.0 * time) + 88.0 * np.cos(11.0 * time)) + 1e-3 * speed
+    angle = 70.0 * time - 5.0 * np.cos(4.0 * time) - 8.0 / 11.0 * np.cos(11.0 * time)
+    count = 2.0 * np.pi / 16384
+    angle = np.floor(angle / count) * count
+    angle = angle if np.isinf(turn) else (angle + np.pi) % turn - np.pi
+    table = np.column_stack([time, angle, torque])
+    np.savetxt(
+        tmp_path / "run.csv",
+        table,
+        delimiter=",",
+        header="time,position [rad],torque [Nm]",
+        comments="",
+        fmt="%.8f",
+    )
+    model = start([tmp_path / "run.csv"]).nominal.model
+    assert model.value("inertia.mass") == pytest.approx(2e-3, rel=0.01)
+    assert model.value("viscous_damper.damping") == pytest.approx(1e-3, rel=0.01)
+    assert [term.label for term in model.terms] == ["viscous_damper"]

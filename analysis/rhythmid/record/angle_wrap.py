@@ -20,7 +20,7 @@ def unwrapped(record: Record) -> Record:
     output = _unwrapped(record.output, turn)
     found = replace(record, output=output)
     reference = record.input if record.input_kind == "reference" else record.reference
-    if reference is None or reference.unit != record.output.unit or not len(_wraps(reference.value, turn)):
+    if reference is None or reference.unit != record.output.unit or not len(wraps_by(reference.value, turn)):
         return found
     asked = _unwrapped(reference, turn)
     # a reference is of the turn in which the machine is
@@ -45,7 +45,7 @@ def wraps_of(record: Record) -> str | None:
     if turn == 0.0:
         return None
     name = next(name for name, one in TURNS.items() if one == turn)
-    at = _wraps(record.output.value, turn)
+    at = wraps_by(record.output.value, turn)
     return (
         f"it jumps by {name} rad {len(at)} times, the first at t = {record.output.time[at[0] + 1]:.6g} s, as an angle does that is "
         "read within a turn: it is unwrapped"
@@ -56,10 +56,10 @@ def turn_of(record: Record) -> float:
     """The turn [rad] by which an output jumps that is read within one; 0 where it does not."""
     if record.output_kind != "position" or record.output.unit != "rad":
         return 0.0
-    return next((turn for turn in TURNS.values() if len(_wraps(record.output.value, turn))), 0.0)
+    return next((turn for turn in TURNS.values() if len(wraps_by(record.output.value, turn))), 0.0)
 
 
-def _wraps(value: Array, turn: float) -> NDArray[np.intp]:
+def wraps_by(value: Array, turn: float) -> NDArray[np.intp]:
     """Steps (m,) of the values (n,) that are jumps by a turn; none where any jump is something else.
 
     A jump is a turn less what the angle moves meanwhile, which is no more than in any other step, and the angle moves on against it.

@@ -208,9 +208,10 @@ def quality_report(
         for begin, one in parts.items():
             channels |= {f"{begin}{role}": channel for role, channel in one.quality.channels.items()}
             notes += [note for note in one.quality.notes if note not in notes]
-            assumed += one.quality.assumed
+            wrapped = wrap_notes(one)  # are taken out, and change no answer
+            assumed += [*one.quality.assumed, *(f"{begin or f'{one.name}: '}{note}" for note in wrapped)]
             notes += [f"{begin}{note}" for note in (*copy_notes(one), *unsigned_notes(one))]
-            notes += [f"{begin}{note}" for note in (*wrap_notes(one), *rest_notes(one)) if begin]
+            notes += [f"{begin}{note}" for note in (*wrapped, *rest_notes(one)) if begin]
             if begin and (still := standstill(one)) is not None:
                 notes.append(f"{begin}output: {still}")
         duration = max(one.duration for one in parts.values())

@@ -1,5 +1,6 @@
 """What is in a source: every number that was recorded over and over, a field of a topic or a column of a table, with its times."""
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -14,6 +15,7 @@ from rhythmid.errors import InputError
 from rhythmid.record.bag import Bag, is_bag
 from rhythmid.record.block import Topic
 from rhythmid.record.columns import Columns, read_columns
+from rhythmid.record.encoder_turn import counts_of_turn
 from rhythmid.record.field import NAMES, OWN_NAMES, Field
 from rhythmid.record.foreign_file import refuse_foreign
 from rhythmid.record.grouped_runs import grouped_runs
@@ -174,6 +176,13 @@ def _of_table(table: Table, rate: float | None) -> Inventory:
             continue
         if merged or is_sampled_rarely(value):
             time, value = time[~np.isnan(value)], value[~np.isnan(value)]
+        if not heading.unit and (turn := counts_of_turn(value)):
+            heading = replace(
+                heading, unit="rad", scale=2.0 * math.pi / turn, written=f"of {turn:.0f} a turn"
+            )
+            notes += (
+                f"{name}: begins again after {turn:.0f}, as an encoder does after a turn: it is taken in rad, scale: 2π/{turn:.0f}",
+            )
         one = Recorded(
             heading.name, time, value * heading.scale, column=name, unit=heading.unit, scale=heading.scale,
             written_unit=heading.written,
