@@ -10,7 +10,7 @@ from rhythmid.errors import InputError
 from rhythmid.identify.inverse_dynamics.estimate import fit_effort
 from rhythmid.identify.joints.joint_motion import JointBalances
 
-LONGEST = 0.1  # [s] in which a reference acts at the latest
+LONGEST_REFERENCE_DELAY = 0.1  # [s] in which a reference acts at the latest
 COARSE = 2.0  # samples between the delays that are tried first
 STEPS = 2  # of a fit at each of them: the parameters are nearly linear
 
@@ -27,7 +27,7 @@ def reference_delay(balances: JointBalances, joints: Sequence[str]) -> float:
         fits = [fit_effort(balances.balance(one, late), balances.models[one], steps=STEPS) for one in joints]
         return sum(math.log(max(fit.error, 1e-300)) for fit in fits)
 
-    tried = np.arange(0.0, LONGEST, COARSE * balances.period)
+    tried = np.arange(0.0, LONGEST_REFERENCE_DELAY, COARSE * balances.period)
     costs: list[float] = []
     for late in tried:
         costs.append(cost(float(late)))
