@@ -34,7 +34,7 @@ forcing: {{amplitude: 1.0, frequency: 1.0}}
 delays: {{input: {input}, measurement: {measurement}}}
 """
 DRAWN = 5  # experiment whose HTFs are drawn, as in the paper's Figures 2 and 3
-HIGHEST = 7.0  # [Hz] drawn
+HIGHEST_FREQUENCY_DRAWN = 7.0  # [Hz] drawn
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def curves(found: Identification) -> tuple[dict[int, list[Curve]], dict[int, lis
     magnitude, phase = {}, {}
     for m in (0, -1, 1):
         row = htf.row(m)
-        seen = paper.estimate.reached[row] & (htf.frequency <= HIGHEST)
+        seen = paper.estimate.reached[row] & (htf.frequency <= HIGHEST_FREQUENCY_DRAWN)
         at = htf.frequency[seen]
         estimate = Curve("estimate", at, htf.value[row, seen])
         fitted = Curve("parametric fit", at, fit[row, seen])

@@ -21,7 +21,7 @@ from refusals import refusal
 from scipy.io import savemat
 
 from rhythmid import document
-from rhythmid.errors import LONGEST, InputError
+from rhythmid.errors import LONGEST_MESSAGE, InputError
 from rhythmid.experiment import Experiment
 from rhythmid.record import compression
 from rhythmid.record.block import Block, Topic
@@ -110,7 +110,7 @@ def test_a_value_that_its_tag_does_not_fit_is_refused_with_its_line(tag):
 
 def test_what_a_refusal_quotes_can_neither_break_the_line_nor_command_the_terminal():
     line = str(InputError("a\nb\x1b[2Jc" + "x" * 10_000))
-    assert line.startswith("a b [2Jc") and line.isprintable() and len(line) == LONGEST
+    assert line.startswith("a b [2Jc") and line.isprintable() and len(line) == LONGEST_MESSAGE
 
 
 # Messages

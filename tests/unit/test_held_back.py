@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rhythmid.record.held_back import LEAST, evened
+from rhythmid.record.held_back import LEAST_SAMPLES_IN_BURSTS, evened
 from rhythmid.record.read import read_record
 from rhythmid.record.record import Channel
 
@@ -79,7 +79,7 @@ def test_all_others_keep_their_times(case):
         "stamped in bursts": one(time, motion(time)),
         "noise alone": one(time, rng.standard_normal(len(time))),
         "samples lost": one(time[kept], motion(TAKEN)[kept]),
-        "few": one(time[: LEAST - 1], motion(TAKEN)[: LEAST - 1]),
+        "few": one(time[: LEAST_SAMPLES_IN_BURSTS - 1], motion(TAKEN)[: LEAST_SAMPLES_IN_BURSTS - 1]),
     }[case]
     assert evened(channels) == (channels, ())
 

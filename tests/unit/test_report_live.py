@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rhythmid.report.chart import Chart, Curve
-from rhythmid.report.live import FEWEST, MISSING, VALUE, chart_data, most_points
+from rhythmid.report.live import FEWEST_POINTS, MISSING, VALUE, chart_data, most_points
 
 TIME = np.arange(50_000) * 1e-3
 
@@ -79,7 +79,7 @@ def test_very_many_records_stay_within_the_budget_and_few_are_kept_whole() -> No
     one = chart(Curve(TIME, TIME, "a", "before"))
     assert most_points([one]) == len(TIME)
     most = most_points([one] * 40)
-    assert FEWEST < most < len(TIME)
+    assert FEWEST_POINTS < most < len(TIME)
     assert 40 * most * VALUE == pytest.approx(700_000, rel=0.01)
 
 

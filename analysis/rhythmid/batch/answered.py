@@ -34,7 +34,7 @@ from rhythmid.report.page import Page, render
 KIBIBYTE = (
     1 if sys.platform == "darwin" else 1024
 )  # bytes in which the system counts the largest memory of a process
-LONGEST = 300  # characters of a reason
+LONGEST_REASON = 300  # characters of a reason
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,9 @@ def answer(task: Task) -> Answered:
 def failed(reason: str) -> Answered:
     """No answer, and why, in one line."""
     line = " ".join(reason.split())
-    return Answered(line if len(line) <= LONGEST else line[: LONGEST - 1] + "…", verdict="failed")
+    return Answered(
+        line if len(line) <= LONGEST_REASON else line[: LONGEST_REASON - 1] + "…", verdict="failed"
+    )
 
 
 def command_line(task: Task) -> str:

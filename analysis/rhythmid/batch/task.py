@@ -21,7 +21,7 @@ from rhythmid.record.joint_record import JointSignals
 from rhythmid.record.signals import Signals
 
 DIGITS = 12  # of a key in a file's name: 48 bits, enough for thousands of answers
-LONGEST = 60  # characters of a task's name in a file's name
+LONGEST_TASK_NAME = 60  # characters of a task's name in a file's name
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Task:
     @property
     def file(self) -> str:
         """Name of its answer's files, without suffix."""
-        plain = re.sub(r"[^A-Za-z0-9]+", "-", self.name).strip("-")[:LONGEST].strip("-")
+        plain = re.sub(r"[^A-Za-z0-9]+", "-", self.name).strip("-")[:LONGEST_TASK_NAME].strip("-")
         return f"{plain or 'answer'}-{self.key[:DIGITS]}"
 
 

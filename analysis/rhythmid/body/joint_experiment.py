@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from rhythmid.body.joint_plant import JointPlant
 
 Array = NDArray[np.float64]
-LONGEST = 10_000_000  # samples of a run
+MOST_RUN_SAMPLES = 10_000_000  # samples of a run
 AT_ONCE = 10_000  # samples of a run that are simulated together
 TOPICS = ("command", "joint_states")
 
@@ -140,8 +140,8 @@ class JointExperiment:
     def count(self) -> int:
         """Number of samples of every topic. Raises InputError where these are too few or too many."""
         count = round(self.duration * self.rate)
-        if not 1 < count <= LONGEST:
-            raise InputError(f"a run has 2 to {LONGEST} samples, not {count}")
+        if not 1 < count <= MOST_RUN_SAMPLES:
+            raise InputError(f"a run has 2 to {MOST_RUN_SAMPLES} samples, not {count}")
         return count
 
     @property

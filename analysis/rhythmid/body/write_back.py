@@ -31,7 +31,7 @@ from rhythmid.output import write_text
 Array = NDArray[np.float64]
 MJCF, URDF = ".xml", ".urdf"
 ROUNDING = 1e-12  # of a link's inertia, that comes of its numbers
-SMALL = 1e-3  # [m] radius of gyration of a payload in a URDF, which has no inertia of zero
+LEAST_GYRATION_RADIUS = 1e-3  # [m] radius of gyration of a payload in a URDF, which has no inertia of zero
 LOSSES = ("viscous_damper", "coulomb_friction", "soft_constraint_friction")
 KEPT = (
     "name",
@@ -237,7 +237,7 @@ def _attach(root: tree.Element, link: str, mass: float, place: Sequence[float]) 
     own = f"{link}_{PAYLOAD}"
     ball = tree.SubElement(tree.SubElement(root, "link", name=own), "inertial")
     tree.SubElement(ball, "mass", value=repr(mass))
-    inertia = repr(mass * SMALL**2)
+    inertia = repr(mass * LEAST_GYRATION_RADIUS**2)
     sides = {"ixx": inertia, "iyy": inertia, "izz": inertia, "ixy": "0", "ixz": "0", "iyz": "0"}
     tree.SubElement(ball, "inertia", sides)
     joint = tree.SubElement(root, "joint", name=f"{own}_joint", type="fixed")

@@ -23,7 +23,9 @@ Array = NDArray[np.float64]
 Clock = Literal["command", "forcing", "output"]
 MOST_SAMPLES = 200_000  # samples of a common grid
 OVERLAP = 0.3  # share of the shorter record that has to be common to both
-CLOSE = 0.03  # of the correlation, within which other offsets of a periodic command are tried as well
+CLOSE_CORRELATION = (
+    0.03  # of the correlation, within which other offsets of a periodic command are tried as well
+)
 TRIED = 12  # offsets of a periodic command
 SAME = 0.05  # relative rms difference up to which two commands are one
 TURN = 0.01  # of a cycle, up to which the forcings stand at the same phase
@@ -124,7 +126,9 @@ def _offsets(
         a, b = a - a.mean(), b - b.mean()
     value, lags = _correlation(a, b)
     peak = np.concatenate([[-np.inf], value, [-np.inf]])
-    tops = np.flatnonzero((value >= peak[:-2]) & (value >= peak[2:]) & (value >= value.max() - CLOSE))
+    tops = np.flatnonzero(
+        (value >= peak[:-2]) & (value >= peak[2:]) & (value >= value.max() - CLOSE_CORRELATION)
+    )
     best = tops[np.argsort(-value[tops], kind="stable")][:TRIED]
     begin = float(recording.time[0] - simulation.time[0])
     return [(begin + step * float(lags[i]), float(value[i])) for i in best], step

@@ -31,7 +31,7 @@ from rhythmid.progress import Tell
 from rhythmid.record.joint_record import JointRecord
 
 Array = NDArray[np.float64]
-PERIODS = 2  # of the multisines in a run: what repeats shows the noise
+PERIODS_IN_A_RUN = 2  # of the multisines in a run: what repeats shows the noise
 MARGIN = 0.1  # of a joint's travel that references keep away from its ends: overshoot of the controllers
 DRAWS = 20  # of the phases, of which the best is taken
 POSES = 200  # of a period at which draws are compared
@@ -129,12 +129,12 @@ def _excitation(
     machine: Machine, wanted: JointRequirements, ranges: Mapping[str, tuple[float, float]], seed: int, share: float
 ) -> dict[str, dict[str, Any]]:  # fmt: skip
     """The excitation of each joint as an experiment's file has it."""
-    period = wanted.duration / PERIODS
+    period = wanted.duration / PERIODS_IN_A_RUN
     found: dict[str, dict[str, Any]] = {}
     for place, joint in enumerate(machine.joints):
         low, high = ranges[joint]
         spec: dict[str, Any] = {
-            "type": "multisine", "period": period, "periods": PERIODS, "band": list(wanted.band), "select": "all",
+            "type": "multisine", "period": period, "periods": PERIODS_IN_A_RUN, "band": list(wanted.band), "select": "all",
             "part": [place, len(machine.joints)], "seed": seed * len(machine.joints) + place,
         }  # fmt: skip
         try:
@@ -166,7 +166,7 @@ def _seen(
     """Rank of the inertial columns along the references, and the logarithm of their determinant."""
     body = machine.body
     experiment = _experiment(wanted, _excitation(machine, wanted, ranges, seed, 0.5))
-    time = np.linspace(0.0, wanted.duration / PERIODS, POSES, endpoint=False)
+    time = np.linspace(0.0, wanted.duration / PERIODS_IN_A_RUN, POSES, endpoint=False)
     pose = np.tile(body.reference, (POSES, 1))
     rate, acceleration = np.zeros((POSES, body.model.nv)), np.zeros((POSES, body.model.nv))
     step = 1e-3  # [s] of the differences: references are smooth

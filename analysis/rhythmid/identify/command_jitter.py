@@ -32,16 +32,16 @@ WHITE = (
     0.4,
     0.8,
 )  # noise of the measurement beside the jitter's, as a share of one innovation of all that is left
-BETTER = (
+LEAST_LIKELIHOOD_GAIN = (
     12.5  # in log likelihood over the colour that the residuals have by themselves: five standard deviations
 )
-MOST = 0.5  # share of the innovations' power that has to grow with the command's steps
+LEAST_GROWING_SHARE = 0.5  # share of the innovations' power that has to grow with the command's steps
 SHOWN = 5.0  # standard deviations from which innovations grow with the command's steps
 FOLLOWED = (
     0.5  # share of the innovations that may follow from the command: beyond it the model lacks something
 )
 LAGS = 8  # blocks of the command from which they may
-LEAST = 500  # commands and blocks of a series, below which its own half tells no colour
+LEAST_COMMANDS = 500  # commands and blocks of a series, below which its own half tells no colour
 SEED = 20  # of the simulated jitter, so that an answer is the same each time
 
 
@@ -70,7 +70,7 @@ def command_jitter(fit: Fit) -> CommandJitter | None:
     left = [r[part] for r, one in zip(fit.residuals, fit.run.series) for part in runs(one.used)]
     whole = sum(len(r) for r in left)
     usual = burg(left)
-    if whole == 0 or _growing_share(fit, usual) < MOST:  # before any run is simulated
+    if whole == 0 or _growing_share(fit, usual) < LEAST_GROWING_SHARE:  # before any run is simulated
         return None
     std = TRIED * fit.run.series[0].period
     simulated = _simulated(fit, std)
@@ -90,7 +90,7 @@ def command_jitter(fit: Fit) -> CommandJitter | None:
     noise, size = best
     known = replace(noise, std=noise.std * size)
     share = _growing_share(fit, known)
-    if likelihood < own + BETTER or share < MOST:
+    if likelihood < own + LEAST_LIKELIHOOD_GAIN or share < LEAST_GROWING_SHARE:
         return None
     most = std * scale * size
     least = most * math.sqrt(share)
@@ -110,7 +110,7 @@ def _held(one: Series) -> bool:
     if not one.commanded or one.kind != "force" or one.ignored is not None or one.spread is not None:
         return False
     assert one.command is not None
-    return is_held(one.command) and len(one.command.x) > LEAST and one.blocks > LEAST
+    return is_held(one.command) and len(one.command.x) > LEAST_COMMANDS and one.blocks > LEAST_COMMANDS
 
 
 def _simulated(fit: Fit, std: float) -> list[Array]:

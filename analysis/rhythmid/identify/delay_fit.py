@@ -16,7 +16,7 @@ from rhythmid.ltp.regularised_least_squares import HAT, HtfEstimate
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-HIGHEST = 40.0  # [rad/s] upper limit of the integral in (16)
+UPPER_LIMIT_OF_INTEGRAL = 40.0  # [rad/s] upper limit of the integral in (16)
 LEAST_BINS = 4  # bins from which a phase can be read
 LARGEST = 1.0  # [s] largest sum of the delays that is considered
 
@@ -89,7 +89,7 @@ MEASUREMENT_ALONE = np.array([[0.0], [1.0]])
 def _legible(estimate: HtfEstimate, m: int) -> NDArray[np.bool_]:
     """Bins of harmonic m that the excitation reaches: those up to the limit of (16), or all where a machine works above it."""
     reached = estimate.reached[estimate.htf.row(m)]
-    below = reached & (2.0 * np.pi * estimate.htf.frequency <= HIGHEST)
+    below = reached & (2.0 * np.pi * estimate.htf.frequency <= UPPER_LIMIT_OF_INTEGRAL)
     return below if below.sum() >= LEAST_BINS else reached
 
 

@@ -34,7 +34,9 @@ LINES = 1500  # that a search looks at
 LONGEST_DELAY = 0.5  # [s] largest delay on either side that is looked for
 SIDEBANDS = 3  # on either side that are compared
 TIME = 0.02  # [s] size of a delay that begins at none
-NEAR = 0.05  # unexplained share of the power from which a descent finds the rest of the way
+UNEXPLAINED_NEAR_OPTIMUM = (
+    0.05  # unexplained share of the power from which a descent finds the rest of the way
+)
 FACTORS = np.geomspace(0.4, 2.5, 25)  # on each parameter when a search starts far off
 
 
@@ -185,7 +187,7 @@ def _scan(comparison: _Comparison, start: Array) -> tuple[Array, Array, float]:
         before = best
         for i in range(len(values)):
             centre = values[i]
-            if best < NEAR:
+            if best < UNEXPLAINED_NEAR_OPTIMUM:
                 return values, delays, best
             for factor in FACTORS if centre != 0.0 else ():
                 trial = values.copy()

@@ -18,7 +18,9 @@ from rhythmid.identify.series import Series, record_of
 from rhythmid.identify.zero_estimates import zeros_of
 from rhythmid.model import Model
 
-LARGE = 0.1  # of the motion, that a model leaves of a held-out record, from which its zero is asked for
+MISFIT_OF_WRONG_ZERO = (
+    0.1  # of the motion, that a model leaves of a held-out record, from which its zero is asked for
+)
 AS_GOOD = 1.1  # times the least error, within which the smallest zero is told: those that are a turn apart do equally well
 TURNS = (0.5, -0.5, 1.0, -1.0)  # of a machine that turns: an encoder's zero may be a half or a whole one off
 
@@ -44,7 +46,7 @@ def _zero_of(fit: Fit, parts: Sequence[Series], middle: float) -> float | None:
     model, step = fit.model, fit.run.max_step
     error = _error(model, parts, fit.noise, step)
     size = math.sqrt(float(np.mean([np.var(one.value) for one in parts])))
-    if error is None or error[0] < LARGE * size:
+    if error is None or error[0] < MISFIT_OF_WRONG_ZERO * size:
         return None
     starts = [0.0, float(np.mean([np.mean(one.value) for one in parts])) - middle]
     if model.units.position == "rad":

@@ -33,7 +33,7 @@ GROWTH = 1.5
 HELD = 3.0 * PUSH
 # of the motion at the end of a record, up to which a swing that the push shifts in phase is still the same: twenty times the effect at
 # rest, so that an error of the model of 1.5 % of the forces, which models of real machines have, stays below 30 %
-SMALL = 0.02
+SAME_SWING_SHARE = 0.02
 # of the whole motion, from which the run with the push has nothing in common with the one without: runs of a chaotic machine end
 # 1.4 times the motion apart, and no further
 PARTED = 0.5
@@ -121,7 +121,9 @@ def forgets(model: Model, series: Sequence[Series]) -> bool:
         if displaced > GROWTH * abs(float(middle.mean())) and displaced > HELD * motion:
             return False
         differs, left = _rms(end), float(np.std(one.averaged[n - length :]))
-        if differs > PARTED * motion or (differs > GROWTH * _rms(middle) and differs > SMALL * left):
+        if differs > PARTED * motion or (
+            differs > GROWTH * _rms(middle) and differs > SAME_SWING_SHARE * left
+        ):
             return False
     return True
 

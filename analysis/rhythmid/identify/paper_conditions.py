@@ -7,7 +7,7 @@ from rhythmid.ltp.pumping import Pumping
 
 LEAKAGE = 0.05  # of the command that may differ before and at the end of the window
 # of the limit cycle's motion (rms) that the response to the command may have: a quadratic law bends the response by as much
-SMALL = 0.1
+SMALL_RESPONSE_SHARE = 0.1
 FREEDOM = (
     0.8  # of the equations' degrees of freedom that the estimate may take; a fifth is left to tell its error
 )
@@ -21,10 +21,10 @@ def lacks_transfer_functions(pumping: Pumping, result: PaperResult | str) -> str
     if isinstance(result, str):
         return result
     share = response_share(result)
-    if share > SMALL:
+    if share > SMALL_RESPONSE_SHARE:
         return (
             f"the excitation is not small: the response to it is {share:.0%} of the limit cycle's motion, and linearisation allows "
-            f"{SMALL:.0%}; reduce the amplitude"
+            f"{SMALL_RESPONSE_SHARE:.0%}; reduce the amplitude"
         )
     return None
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
 Array = NDArray[np.float64]
-FEWEST = 2.0  # waves in the travel: what has fewer is a smooth law of the position
+FEWEST_WAVES = 2.0  # waves in the travel: what has fewer is a smooth law of the position
 FINER = 4  # bins in the shortest wave
 MOST_BINS = 1 << 20
 # times the travel over which the spectrum is taken, so that a line stands in more than one of its bins
@@ -29,7 +29,7 @@ def strongest_wavelengths(position: Array, signal: Array, shortest: float, count
     of the travel (D. J. Thomson, Proc. IEEE 70 (1982) 1055). What is shorter than `shortest` is not looked for.
     """
     low, travel = float(position.min()), float(np.ptp(position))
-    if len(position) < 8 or not travel > FEWEST * shortest > 0.0:
+    if len(position) < 8 or not travel > FEWEST_WAVES * shortest > 0.0:
         return ()
     bins = min(MOST_BINS, 1 << math.ceil(math.log2(FINER * travel / shortest)))
     place = np.minimum(((position - low) * (bins / travel)).astype(np.int64), bins - 1)
@@ -37,7 +37,7 @@ def strongest_wavelengths(position: Array, signal: Array, shortest: float, count
     sums = np.bincount(place, signal - signal.mean(), bins) * taper
     power = np.abs(np.fft.rfft(sums, PADDED * bins)) ** 2
     waves = np.arange(len(power)) / PADDED  # in the travel
-    power[(waves < FEWEST) | (waves > travel / shortest)] = 0.0
+    power[(waves < FEWEST_WAVES) | (waves > travel / shortest)] = 0.0
     peaks = find_peaks(power, distance=2 * PADDED)[0]
     best = peaks[np.argsort(-power[peaks], kind="stable")][:count]
     return tuple(float(travel / _top(power, waves, one)) for one in best)

@@ -11,7 +11,7 @@ from rhythmid.identify.series import Series
 from rhythmid.simulation.signal import FOR_EVER
 
 Array = NDArray[np.float64]
-ENOUGH = 400  # differences below which a noise level is not worth quoting
+ENOUGH_DIFFERENCES = 400  # differences below which a noise level is not worth quoting
 
 
 def _sampled(series: Series, which: str) -> Array | None:
@@ -63,6 +63,6 @@ def noise_from_repeats(series: list[Series], settle: float = 0.4) -> NoiseModel 
         if one.blocks - lag - begin < 64:
             continue
         stretches.append((value[begin + lag :] - value[begin:-lag]) / np.sqrt(2.0))
-    if sum(len(s) for s in stretches) < ENOUGH:
+    if sum(len(s) for s in stretches) < ENOUGH_DIFFERENCES:
         return None
     return estimate_noise(stretches)

@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 from rhythmid.identify.series import Series, moving_part
 
 Array = NDArray[np.float64]
-LARGE = 0.1  # of the largest swing, below which swings are not looked at: noise crosses zero as it likes
+LEAST_SWING_SHARE = (
+    0.1  # of the largest swing, below which swings are not looked at: noise crosses zero as it likes
+)
 OUTER = (0.05, 0.95)  # quantiles of the frequencies of all swings, beyond which they are taken for errors
 
 
@@ -29,4 +31,4 @@ def _of_one(value: Array, step: float) -> Array:
         return np.empty(0)
     times = step * (before - value[before] / (value[before + 1] - value[before]))
     sizes = np.array([np.abs(value[a : b + 1]).max() for a, b in zip(before[:-1], before[1:])])
-    return (1.0 / np.diff(times))[sizes > LARGE * np.abs(value).max()]
+    return (1.0 / np.diff(times))[sizes > LEAST_SWING_SHARE * np.abs(value).max()]

@@ -26,7 +26,7 @@ Complex = NDArray[np.complex128]
 ORDER = 2  # of the polynomials
 FREEDOM = 20  # degrees of freedom that are left for the error
 ROUNDS = 3  # of solving with instruments
-HIGHEST = 3  # M that is considered
+MOST_LOCAL_HARMONICS = 3  # M that is considered
 # half-width of a window, as a multiple of the resonance's own half-width, that a local model bears
 WIDEST = 2.5
 RANK = 1e-6  # singular value, relative to the largest, below which a combination is not determined
@@ -43,7 +43,7 @@ def half_window(harmonics: int) -> int:
     return -(-(unknowns + FREEDOM) // 2)
 
 
-def highest_local(lines: ExcitedLines, ring_down: float, highest: int = HIGHEST) -> int | None:
+def highest_local(lines: ExcitedLines, ring_down: float, highest: int = MOST_LOCAL_HARMONICS) -> int | None:
     """Largest M for which a window is narrow against a resonance with this `ring_down` [s]; None if there is none."""
     least = 1 if lines.periods else 0
     step = bin_step(lines) * lines.spectra.resolution

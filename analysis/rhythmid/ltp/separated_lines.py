@@ -13,10 +13,10 @@ from rhythmid.ltp.harmonic_estimate import HarmonicEstimate
 
 Array = NDArray[np.float64]
 SEPARATED = 0.8  # share of a harmonic's bins that it must have for itself
-HIGHEST = 8  # M that is considered
+MOST_SEPARATED_HARMONICS = 8  # M that is considered
 
 
-def highest_separated(lines: ExcitedLines, highest: int = HIGHEST) -> int | None:
+def highest_separated(lines: ExcitedLines, highest: int = MOST_SEPARATED_HARMONICS) -> int | None:
     """Largest M whose harmonics this excitation separates, with empty bins left to show the error; None if there is none."""
     least = 1 if lines.periods else 0
     for harmonics in range(min(highest, lines.farthest), least - 1, -1):

@@ -32,10 +32,10 @@ from rhythmid.proof.equations import (
     STIFFNESS,
 )
 
-MOST = 5  # effects at once: two, and three small ones beside them
+MOST_EFFECTS = 5  # effects at once: two, and three small ones beside them
 RELATIVE, ABSOLUTE = 1e-8, 1e-11  # error allowed in a step
-SHORTEST = 1e-8  # [s] step below which no accuracy is asked for: inside a jump
-FAR = 1e3  # [m] beyond which the machine has diverged
+SHORTEST_STEP = 1e-8  # [s] step below which no accuracy is asked for: inside a jump
+DIVERGED_POSITION = 1e3  # [m] beyond which the machine has diverged
 COLUMNS = 5  # of what is told of each sample: position, velocity, measured, concealed force, acceleration
 
 COMMAND, ACTUATOR, LEG, CONTACT, BODY, SENSOR = range(len(PLACES))
@@ -47,7 +47,7 @@ numbers = float64[::1]
 SIGNATURE = float64(
     float64, float64, float64, float64, float64, numbers, numbers, numbers, numbers, numbers, boolean
 )
-EFFECTS = types.UniTuple(types.FunctionType(SIGNATURE), MOST)
+EFFECTS = types.UniTuple(types.FunctionType(SIGNATURE), MOST_EFFECTS)
 whole = int64[::1]
 table = int64[:, ::1]
 
@@ -71,7 +71,7 @@ def compiled(name: str) -> Any:
 )  # fmt: skip
 def through(place, value, t, x, v, f, effects, places, layout, m, p, s, ds, held, accepted):
     """The signal `value` after all effects at its place."""
-    for i in range(MOST):
+    for i in range(MOST_EFFECTS):
         if places[i] == place:
             value = effects[i](
                 value, t, x, v, f, m, p[layout[i, 0] : layout[i + 1, 0]],
@@ -230,15 +230,15 @@ def integrate(
                 if not np.isfinite(worst):
                     return i
                 growth = 5.0 if worst == 0.0 else min(5.0, max(0.2, 0.9 * worst**-0.2))
-                if worst > 1.0 and step > SHORTEST:
-                    h = max(step * growth, SHORTEST)
+                if worst > 1.0 and step > SHORTEST_STEP:
+                    h = max(step * growth, SHORTEST_STEP)
                     continue
                 t = stop if last else t + step
                 z[:] = trial
                 u, du = command_at(t, j, knots, values, slopes, level, smooth)
                 rates(t, z, u, du, drive, effects, places, layout, m, p, held, True, k1, told)
-                h = max(h, step * growth) if last else max(step * growth, SHORTEST)
-            if abs(z[0]) > FAR:
+                h = max(h, step * growth) if last else max(step * growth, SHORTEST_STEP)
+            if abs(z[0]) > DIVERGED_POSITION:
                 return i
         u, du = command_at(t, j, knots, values, slopes, level, smooth)
         out[i, 0], out[i, 1] = z[0], z[1]

@@ -16,7 +16,7 @@ from rhythmid.proof.integrator import (
     COLUMNS,
     CONTINUOUS,
     FORCE,
-    MOST,
+    MOST_EFFECTS,
     NOWHERE,
     SAMPLED_POSITION,
     SAMPLED_VELOCITY,
@@ -160,7 +160,7 @@ def observe(
             arrival, value = held_command(arrival, value, effect.parameters["period"])
     inside = [effect for effect in effects if effect.name not in TIMING]
     known = [EQUATIONS[effect.name] for effect in inside]
-    spare = MOST - len(known)
+    spare = MOST_EFFECTS - len(known)
     functions = tuple(compiled(effect.name) for effect in inside) + (compiled(""),) * spare
     places = np.array([PLACES.index(one.place) for one in known] + [NOWHERE] * spare)
     widths = [(len(one.parameters), len(one.states), one.held) for one in known] + [(0, 0, 0)] * spare

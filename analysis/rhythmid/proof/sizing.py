@@ -30,7 +30,7 @@ from rhythmid.simulation.transport import INPUT_DELAY
 Array = NDArray[np.float64]
 AVERAGED = 200  # [Hz] to which samples are averaged
 STEP = 6.25e-4  # [s] of the fit's integrator: its error must not pass for a mismatch
-CLOSE = 1.25  # factor within which a mismatch is the one asked for
+SIZE_TOLERANCE = 1.25  # factor within which a mismatch is the one asked for
 TRIES = 7
 SHIFT = 2.0  # samples by which input and motion may be logged apart: nobody knows their clocks better before
 HELD = 0.5  # samples that a held input, which the machine sees as a smooth one, comes later
@@ -123,7 +123,7 @@ def force_share(rig: Rig, seen: Sequence[Observation] | None, free: Sequence[str
 
 
 def strength_for(
-    target: float, ratio_at: Callable[[float], float], close: float = CLOSE, tries: int = TRIES
+    target: float, ratio_at: Callable[[float], float], close: float = SIZE_TOLERANCE, tries: int = TRIES
 ) -> tuple[float, float]:
     """Strength in (0, 1] at which `ratio_at` comes close to `target`, and the ratio there.
 

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Iterator
 
 OPENS = re.compile(r"""(?:^|[\s,;])"(?:\w+\()?[\[(][^"]*$""")  # a list that does not end in its line
-LONGEST = 64  # lines of one cell: more than a list of joints takes
+MOST_LINES_OF_CELL = 64  # lines of one cell: more than a list of joints takes
 
 
 def unbroken(lines: Iterable[str]) -> Iterator[str]:
@@ -13,7 +13,7 @@ def unbroken(lines: Iterable[str]) -> Iterator[str]:
     for line in lines:
         opens = bool(OPENS.search(line.rstrip())) if '"' in line else bool(parts)
         parts.append(line)
-        if opens and len(parts) < LONGEST:
+        if opens and len(parts) < MOST_LINES_OF_CELL:
             continue
         if (
             opens or len(parts) == 1

@@ -6,7 +6,7 @@ import numpy as np
 
 # of the counts, and of counts of µs that are written in ms or s
 SPANS = (2.0**16, 2.0**32, 2.0**32 * 1e-3, 2.0**32 * 1e-6)
-LONGEST = 3.0  # usual steps that the one over the end may be, a lost sample among them
+LONGEST_STEP_OVER_END = 3.0  # usual steps that the one over the end may be, a lost sample among them
 
 
 def unwrapped(values: Any) -> Any:
@@ -25,6 +25,11 @@ def unwrapped(values: Any) -> Any:
     usual = float(np.median(step[step > 0.0]))
     for span in SPANS:
         over = step[back] + span
-        if time.min() >= 0.0 and time.max() < span and over.min() > 0.0 and over.max() <= LONGEST * usual:
+        if (
+            time.min() >= 0.0
+            and time.max() < span
+            and over.min() > 0.0
+            and over.max() <= LONGEST_STEP_OVER_END * usual
+        ):
             return time + span * np.concatenate([[0.0], np.cumsum(back)])
     return values

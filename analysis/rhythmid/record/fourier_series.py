@@ -10,8 +10,8 @@ from rhythmid.errors import InputError
 Array = NDArray[np.float64]
 HARMONICS = 9  # that are looked for
 HARMONIC = 1e-3  # share of a signal that its best period may leave before multiples of that period are tried
-ENOUGH = 60_000  # samples of a signal that is far oversampled
-PERIODS = 2.0  # that a signal has to cover, for its period and phase to be told
+ENOUGH_SAMPLES = 60_000  # samples of a signal that is far oversampled
+LEAST_PERIODS_COVERED = 2.0  # that a signal has to cover, for its period and phase to be told
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +38,10 @@ def fourier_series(time: Array, value: Array) -> FourierSeries:
     """
     if np.ptp(value) == 0.0:
         raise InputError("is constant")
-    thin = max(1, len(time) // ENOUGH)
+    thin = max(1, len(time) // ENOUGH_SAMPLES)
     frequency = fundamental_frequency(time[::thin], value[::thin])
     periods = frequency * (time[-1] - time[0])
-    if periods < PERIODS:
+    if periods < LEAST_PERIODS_COVERED:
         raise InputError(f"covers {periods:.2g} periods")
     rate = (len(time) - 1) / (time[-1] - time[0])
     count = int(np.clip(0.25 * rate / frequency, 1, HARMONICS))

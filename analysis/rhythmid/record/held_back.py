@@ -22,7 +22,7 @@ SMOOTHER = 0.5
 MINIMA = 64  # parts of a recording of whose samples only the soonest can touch the line
 PARTS = 8  # of a recording, whose soonest samples are compared: a lost sample shifts all that follow, a busy network only delays some
 STEADY = 0.5  # of a period, by which these may be late: one lost sample makes it 0.8, bursts of 4 to 6 samples alone up to 0.4
-LEAST = 200  # samples, so that each part has several bursts
+LEAST_SAMPLES_IN_BURSTS = 200  # samples, so that each part has several bursts
 
 
 def evened(channels: Mapping[str, Channel]) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -50,7 +50,7 @@ def evened(channels: Mapping[str, Channel]) -> tuple[dict[str, Any], tuple[str, 
 
 def _taken(time: Array, values: list[Array]) -> Array | None:
     """Times (n,) at which samples were taken that came at `time`; None where that is when they came, or samples are missing."""
-    if len(time) < LEAST:
+    if len(time) < LEAST_SAMPLES_IN_BURSTS:
         return None
     step = np.diff(time)
     if float(np.median(step)) >= BURSTS * nominal_period(step):

@@ -17,7 +17,7 @@ SPARSE = 10.0
 # sin(π f T) for a sine f sampled every T [s], so this is six samples a period, of which a line misses 13 %; steps that have nothing
 # to do with each other leave 0.71, independent samples 0.87
 RESOLVED = 0.5
-LEAST = 3  # samples, of which one has two neighbours
+LEAST_SAMPLES_TO_RESOLVE = 3  # samples, of which one has two neighbours
 
 
 def held_note(given: Channel, answer: Channel) -> str | None:
@@ -37,7 +37,7 @@ def held_note(given: Channel, answer: Channel) -> str | None:
 
 def _is_resolved(time: Array, value: Array) -> bool:
     """Whether samples (n,) go on smoothly from one to the next; too few show nothing of the kind."""
-    if len(value) < LEAST:
+    if len(value) < LEAST_SAMPLES_TO_RESOLVE:
         return False
     share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
     off_line = value[1:-1] - value[:-2] - share * (value[2:] - value[:-2])

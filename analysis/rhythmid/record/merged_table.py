@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 OFTEN = 0.05  # share of rows in which each column of a merged table is empty, at least
 TOGETHER = 0.5  # share of rows with a number in every column, or in a slow one, at most
-LONGEST = (
+LONGEST_EMPTY_SHARE = (
     0.05  # of the rows that a column may be empty in one after the other, and still be sampled all along
 )
 
@@ -33,4 +33,4 @@ def is_sampled_rarely(value: Array) -> bool:
     if not 0 < len(there) <= TOGETHER * len(value):
         return False
     empty = np.diff(np.concatenate([[-1], there, [len(value)]])) - 1
-    return bool(empty.max() <= LONGEST * len(value))
+    return bool(empty.max() <= LONGEST_EMPTY_SHARE * len(value))

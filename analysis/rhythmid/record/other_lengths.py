@@ -15,7 +15,7 @@ from rhythmid.record.signals import Signals
 from rhythmid.record.table import HDF5, WIDEST, Table, table_suffix
 
 OF_ARRAYS = (".mat", ".npz", *HDF5, *JSON)  # kinds of tables whose columns may differ in length
-LEAST = 40  # values of an array that may be a recording, not a set of parameters
+LEAST_VALUES_OF_RECORDING = 40  # values of an array that may be a recording, not a set of parameters
 NAMED = 8  # arrays that a note names
 
 
@@ -57,7 +57,7 @@ def _why(array: NDArray[Any], rows: int) -> str:
 
 def length_notes(table: Table, rows: int) -> tuple[str, ...]:
     """One line on all such arrays that may be recordings; none where there are none."""
-    found = [str(one) for one in unequal_arrays(table, rows) if max(one.shape) >= LEAST]
+    found = [str(one) for one in unequal_arrays(table, rows) if max(one.shape) >= LEAST_VALUES_OF_RECORDING]
     if not found:
         return ()
     more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""

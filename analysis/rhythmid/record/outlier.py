@@ -14,7 +14,7 @@ WIDEST = 3  # samples in a row that may be outliers
 FAR_OFF = 12.0  # times the usual unevenness, from which a sample is suspected
 # of its distance, that the slopes before and after may differ from the line past an outlier
 PASSING = 0.25
-NEAR = 101  # samples over which the usual unevenness is taken
+SAMPLES_OF_UNEVENNESS = 101  # samples over which the usual unevenness is taken
 LARGEST_SHARE = 0.02  # share of a signal beyond which such samples are no exception and belong to it
 USUAL = 1.4826  # standard deviations in a median absolute deviation
 LEAP = 1.5  # times the steps before and after, that the step out of repeats is at least: the motion went on meanwhile
@@ -34,10 +34,10 @@ def outlying_samples(value: Array) -> Mask:
     A kink in the signal, such as an impact makes, changes the slope and is none; nor is what happens too often.
     """
     found = np.zeros(len(value), dtype=bool)
-    if len(value) < NEAR:
+    if len(value) < SAMPLES_OF_UNEVENNESS:
         return found
     uneven = np.abs(value[1:-1] - 0.5 * (value[:-2] + value[2:]))
-    usual = USUAL * np.maximum(median_filter(uneven, NEAR), np.median(uneven))
+    usual = USUAL * np.maximum(median_filter(uneven, SAMPLES_OF_UNEVENNESS), np.median(uneven))
     limit = FAR_OFF * np.maximum(np.concatenate([usual[:1], usual, usual[-1:]]), resolutions(value))
     for width in range(1, WIDEST + 1):
         first = np.arange(1, len(value) - width)
@@ -65,7 +65,7 @@ def repeated_samples(value: Array) -> Mask:
     """
     found = np.zeros(len(value), dtype=bool)
     step = np.diff(value)
-    if len(value) < NEAR or not np.any(step == 0.0) or not np.any(step != 0.0):
+    if len(value) < SAMPLES_OF_UNEVENNESS or not np.any(step == 0.0) or not np.any(step != 0.0):
         return found
     edges = np.diff(np.concatenate([[False], step == 0.0, [False]]).astype(int))
     # of steps of zero

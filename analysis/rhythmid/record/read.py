@@ -22,7 +22,7 @@ from rhythmid.record.judged import judged
 from rhythmid.record.merged_table import is_merged, is_sampled_rarely
 from rhythmid.record.punctuality import punctuality_notes
 from rhythmid.record.quality import ChannelQuality, Quality
-from rhythmid.record.record import SHORTEST, Channel, Record
+from rhythmid.record.record import FEWEST_COMMON_SAMPLES, Channel, Record
 from rhythmid.record.signals import Signals, Sinusoid, Source
 from rhythmid.record.standstill import is_driven
 from rhythmid.record.table import SUFFIXES, Table, table_name, table_suffix
@@ -332,7 +332,7 @@ def _finish(record: Record, signals: Signals) -> Record:
                 f"{signals.channels[role].place}{channel.source}: {np.count_nonzero(~finite)} of {len(channel)} samples "
                 f"are infinite, the first at {channel.time[np.argmin(finite)]:.6f} s (so is what is beyond {LARGEST:g})"
             )
-    if len(record.output) < SHORTEST:
+    if len(record.output) < FEWEST_COMMON_SAMPLES:
         raise InputError(
             f"{record.name}: {record.output.source} has only {len(record.output)} samples: too short"
         )
@@ -363,7 +363,7 @@ def _finish(record: Record, signals: Signals) -> Record:
 def _require_overlap(record: Record) -> None:
     """Refuse channels that were not recorded at the time of the output: most likely their clocks differ."""
     first, last = record.output.time[0], record.output.time[-1]
-    least = (SHORTEST - 1) * record.output.period
+    least = (FEWEST_COMMON_SAMPLES - 1) * record.output.period
     for role, channel in record.channels.items():
         start, end = max(first, channel.time[0]), min(last, channel.time[-1])
         if role == "input" and record.hold == "zero" and (end >= first or len(channel) == 1):

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 Array = NDArray[np.float64]
-SHORTEST = 8  # samples that a record must have in common
+FEWEST_COMMON_SAMPLES = 8  # samples that a record must have in common
 AS_GOOD = 3.0  # times the error of a cubic over one missing sample, up to which one over more is as good
-NEAR = 0.1  # periods; samples that follow another sooner are left out of an interpolation
+LEAST_STEP_IN_PERIODS = 0.1  # periods; samples that follow another sooner are left out of an interpolation
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,7 +254,7 @@ class Record(Result):
             ):  # fmt: skip
                 first -= 1
             parts[role] = replace(channel, time=channel.time[first:last], value=channel.value[first:last])
-            if len(parts[role]) < (SHORTEST if role == "output" else 1):
+            if len(parts[role]) < (FEWEST_COMMON_SAMPLES if role == "output" else 1):
                 raise InputError(
                     f"{self.name}: {role} has {len(parts[role])} samples within use: [{start:g}, {end:g}] s; "
                     f"it lasts from {channel.time[0]:g} to {channel.time[-1]:g} s"
@@ -281,10 +281,10 @@ class Record(Result):
                        and _on_grid(c.time, c.time[0], period).all()), self.output.time[0])  # fmt: skip
         low = int(np.ceil((start - anchor - SAME) / period))
         high = int(np.floor((end - anchor + SAME) / period))
-        if high - low + 1 < SHORTEST:
+        if high - low + 1 < FEWEST_COMMON_SAMPLES:
             spans = ", ".join(f"{role} {c.time[0]:.6g} to {c.time[-1]:.6g} s" for role, c in channels.items())
             raise InputError(
-                f"{self.name}: the channels have less than {SHORTEST} samples in common ({spans})"
+                f"{self.name}: the channels have less than {FEWEST_COMMON_SAMPLES} samples in common ({spans})"
             )
         grid = anchor + np.arange(low, high + 1) * period
         values = {role: self._resample(role, channel, grid) for role, channel in channels.items()}
@@ -316,7 +316,7 @@ class Record(Result):
                 )
             between = continuous(time, value, self.hold)
         else:
-            apart = np.concatenate([[True], np.diff(time) >= NEAR * channel.period])
+            apart = np.concatenate([[True], np.diff(time) >= LEAST_STEP_IN_PERIODS * channel.period])
             if apart.sum() < 4:
                 raise InputError(f"{self.name}: {role} has only {apart.sum()} samples to interpolate between")
             between = CubicSpline(time[apart], value[apart])

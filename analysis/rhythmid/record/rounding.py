@@ -18,7 +18,7 @@ ON_GRID = (
 )
 OFF = 0.05  # of a step, that a level on the grid may be off it
 # times the range of most samples, from which the others are no part of the signal: beyond it, steps of that range come near a hair
-FAR = 1e3
+OUTLYING_RANGES = 1e3
 BAND = 64  # levels next to each other in size whose own grid is sought: too many to be multiples of one step by chance
 BASES = (10.0, 2.0)  # of the digits that numbers are written with, or held in
 RUNG = 0.02  # of a step, that it may be off a power of the base times another one
@@ -77,7 +77,7 @@ def _span(value: Array) -> float:
     span = float(np.ptp(value))
     low, high = np.quantile(value, [0.5 * (1.0 - ROUNDED), 0.5 * (1.0 + ROUNDED)])
     usual = float(high - low)
-    return usual if 0.0 < usual and FAR * usual < span else span
+    return usual if 0.0 < usual and OUTLYING_RANGES * usual < span else span
 
 
 def _bands(value: Array) -> tuple[Array, Array] | None:

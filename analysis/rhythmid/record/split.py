@@ -23,7 +23,7 @@ from rhythmid.record.table import Table, table_name
 NUMBERED = re.compile(
     r"(?:.*[._ ])?(?:episode|trial|run|trajectory|segment)(?:[._ ]?(?:index|id|number|nr|no))?", re.IGNORECASE
 )
-MOST = 10_000  # recordings that a table may be split into
+MOST_RECORDINGS = 10_000  # recordings that a table may be split into
 Rows = NDArray[np.int64]
 
 
@@ -41,7 +41,10 @@ def recordings(table: Table, column: str | None = None) -> tuple[str, dict[str, 
         if not np.isfinite(value).all():
             raise InputError(f"{table.path}: column {column!r} does not number every row")
         numbers = np.unique(value)
-        found = {_name(number): np.flatnonzero(value == number) for number in numbers[: MOST + 1].tolist()}
+        found = {
+            _name(number): np.flatnonzero(value == number)
+            for number in numbers[: MOST_RECORDINGS + 1].tolist()
+        }
         why = f"column {column!r}"
     else:
         time = next((name for name, _ in table.vectors() if TIME.fullmatch(name)), None)
@@ -50,11 +53,13 @@ def recordings(table: Table, column: str | None = None) -> tuple[str, dict[str, 
                 f"{table.path}: neither a column that numbers recordings nor a time is there; name a column with --by"
             )
         back = 1 + np.flatnonzero(np.diff(table.column(time)) < 0.0)
-        parts = np.split(np.arange(len(table.column(time))), back[:MOST])
+        parts = np.split(np.arange(len(table.column(time))), back[:MOST_RECORDINGS])
         found = {str(number): rows for number, rows in enumerate(parts)}
         why = f"{time!r}, which begins anew"
-    if not 1 < len(found) <= MOST:
-        raise InputError(f"{table.path}: {why} tells {len(found)} recordings apart; 2 to {MOST} are expected")
+    if not 1 < len(found) <= MOST_RECORDINGS:
+        raise InputError(
+            f"{table.path}: {why} tells {len(found)} recordings apart; 2 to {MOST_RECORDINGS} are expected"
+        )
     return why, found
 
 

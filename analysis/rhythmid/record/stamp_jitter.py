@@ -22,7 +22,9 @@ SIDES = (3, 4)  # neighbours on either side of the polynomial, and of the finer 
 AGREE = (
     1.5  # factor by which the variances that both find may differ: what a finer polynomial tells is motion
 )
-CLOSE = 0.3  # periods; where samples follow one another sooner, a polynomial through them swings
+SHORTEST_STEP_IN_PERIODS = (
+    0.3  # periods; where samples follow one another sooner, a polynomial through them swings
+)
 BINS = 16  # of equally many samples, by slope
 SAMPLES_OF_A_BIN = 100  # samples of a bin
 SLOWER = (
@@ -115,7 +117,7 @@ def _deviations(time: Array, value: Array, sides: int, period: float) -> tuple[A
             told += weight * value[sides + k : sides + k + n]
             square += weight**2
     step = np.diff(time)
-    even = (step > CLOSE * period) & (step < GAP * period)
+    even = (step > SHORTEST_STEP_IN_PERIODS * period) & (step < GAP * period)
     kept = np.ones(n, bool)
     for k in range(2 * sides):
         kept &= even[k : k + n]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rhythmid.errors import InputError
 from rhythmid.record.clock_time import DAY
 from rhythmid.record.heading import heading_of
-from rhythmid.record.record import SHORTEST
+from rhythmid.record.record import FEWEST_COMMON_SAMPLES
 from rhythmid.record.signals import Clock
 
 Array = NDArray[np.float64]
@@ -25,7 +25,9 @@ KIND_OF_TIME = re.compile(r".*_(?:time|timestamp|stamp|clock)", re.IGNORECASE)  
 COUNTER = re.compile(
     r"|index|idx|i|n|k|id|no|nr|frame|sample|step|row|count|counter|seq|unnamed: 0", re.IGNORECASE
 )
-NEAR = 0.5  # of the median step of an unnamed column: a step that differs by no more is a usual one
+USUAL_STEP_DEVIATION = (
+    0.5  # of the median step of an unnamed column: a step that differs by no more is a usual one
+)
 USUAL = 0.95  # share of usual steps from which such a column is taken for the time; the others are gaps, and may be as long as they like
 MOST_NAMED = 12  # columns that a complaint lists
 FORWARD = 0.99  # share of steps of a time that go forward
@@ -90,7 +92,7 @@ def is_even(value: Array) -> bool:
     step = np.diff(value)
     usual = float(np.median(step))
     in_any_unit = 0.0 < usual <= LONGEST_STEP / NANOSECOND
-    return in_any_unit and float(np.mean(np.abs(step - usual) <= NEAR * usual)) >= USUAL
+    return in_any_unit and float(np.mean(np.abs(step - usual) <= USUAL_STEP_DEVIATION * usual)) >= USUAL
 
 
 def has_time(columns: Sequence[tuple[str, Array]]) -> bool:
@@ -129,7 +131,7 @@ def table_clock(
         raise InputError(
             f"{path}: {anew[0]!r} begins anew or goes back; take the recordings apart with  rhythmid split {path} --out runs"
         )
-    if len(columns[0][1]) < SHORTEST:
+    if len(columns[0][1]) < FEWEST_COMMON_SAMPLES:
         raise InputError(
             f"{path}: holds no recording: its columns have {len(columns[0][1])} values ({names})"
         )

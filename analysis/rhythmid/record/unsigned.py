@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 EACH_WAY = 0.1  # of the time, that the motion goes each way at least
 SLOW = 0.1  # of its largest speed (the 95 % quantile), below which it goes no way
 LEAST_SAMPLES = 100  # for the laws, of five terms each, to be told apart
-WORTH = 0.2  # of the effort's variance, that the sizes tell at least
-BETTER = 0.8  # of what the signed law leaves of it, up to which the law of sizes is the better one
+LEAST_SHARE_TOLD = 0.2  # of the effort's variance, that the sizes tell at least
+BETTER_LAW_SHARE = 0.8  # of what the signed law leaves of it, up to which the law of sizes is the better one
 ROUNDS = 10  # of signs and laws in turn [Fienup, Applied Optics 21 (1982) 2758, of the phases of a signal]; few change after
 AVERAGED = 2  # samples on either side, of which a motion that is read coarsely has its speed
 WHY = (
@@ -56,7 +56,7 @@ def is_unsigned(time: Array, position: Array, effort: Array) -> bool:
     sizes = _left(effort, _law(np.column_stack([terms[:, :2], np.abs(terms[:, 2:])]), effort))
     for column in (way, acceleration, position - position.mean()):
         sizes = min(sizes, _left(np.abs(effort), _size_of_law(terms, np.abs(effort), np.sign(column))))
-    return sizes <= min(1.0 - WORTH, BETTER * signed)
+    return sizes <= min(1.0 - LEAST_SHARE_TOLD, BETTER_LAW_SHARE * signed)
 
 
 def _mean(value: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import Union
 from urllib.parse import quote
 
 from rhythmid.report.chart import Chart, draw
-from rhythmid.report.live import FEWEST, chart_data
+from rhythmid.report.live import FEWEST_POINTS, chart_data
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def charts_of(blocks: Sequence[Block]) -> list[Chart]:
     return found
 
 
-def markup(block: Block, most: int = FEWEST) -> str:
+def markup(block: Block, most: int = FEWEST_POINTS) -> str:
     """HTML of one block; curves of its charts have `most` points at most."""
     match block:
         case Paragraph(text, kind):
@@ -169,7 +169,7 @@ def formula(text: str) -> str:
     return re.sub(r"\^\{([^{}]*)\}", r"<sup>\1</sup>", safe)
 
 
-def joined(blocks: Sequence[Block], most: int = FEWEST) -> str:
+def joined(blocks: Sequence[Block], most: int = FEWEST_POINTS) -> str:
     """HTML of blocks, one after another."""
     return "\n".join(markup(block, most) for block in blocks)
 

@@ -13,7 +13,7 @@ from rhythmid.report.chart import Chart, Curve, x_extent, y_extent
 Array = NDArray[np.float64]
 BUDGET = 700_000  # bytes that the curves of all charts of a page take at most, or so
 VALUE = 2.7  # bytes of one value: two, in base 64
-FEWEST = 400  # points of a curve that are always kept: about one for each pixel of a phone
+FEWEST_POINTS = 400  # points of a curve that are always kept: about one for each pixel of a phone
 MISSING = 65535  # stands for a value that is not known
 LEVELS = 65534.0  # steps in which a curve's range is stored, far finer than a screen shows
 UNEVEN = 1e-6  # of a step, by which samples may be off an even grid
@@ -23,8 +23,8 @@ def most_points(charts: Sequence[Chart], budget: float = BUDGET) -> int:
     """Points that a curve may have for all charts to keep within the budget [bytes]; longer curves are thinned."""
     sizes = [size for chart in charts for size in _sizes(chart)]
     if VALUE * sum(sizes) <= budget:
-        return max(sizes, default=FEWEST)
-    low, high = FEWEST, max(sizes)
+        return max(sizes, default=FEWEST_POINTS)
+    low, high = FEWEST_POINTS, max(sizes)
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if VALUE * sum(min(n, middle) for n in sizes) <= budget else (low, middle)

@@ -12,7 +12,7 @@ from rhythmid.report.quantity import number
 COLOURS = ("after", "before", "third", "measured")
 SHAPES = ("circle", "square")
 LARGE, SMALL, MANY = 4.0, 2.5, 60  # radius of a mark, of one among more than so many
-CLOSE = 1e-3  # spread as a share of the mean below which differences from it are drawn
+NARROW_SPREAD = 1e-3  # spread as a share of the mean below which differences from it are drawn
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ def draw_runs(alt: str, x_label: str, y_label: str, points: Sequence[Point], mea
     groups = list(dict.fromkeys(point.group for point in points))
     ends = [np.array([point.y - point.half, point.y + point.half]) for point in points]
     low, high = extent([*ends, np.array([mean])])
-    shift = mean if high - low < CLOSE * abs(mean) else 0.0
+    shift = mean if high - low < NARROW_SPREAD * abs(mean) else 0.0
     x = Axis(*_with_air([point.x for point in points]), LEFT, WIDTH - RIGHT)
     y = Axis(low - shift, high - shift, HEIGHT - BOTTOM, TOP)
     said = f"{y_label}, less {number(shift, 7)}" if shift else y_label

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rhythmid.simulation.history import SIGNALS
 
 PADE = 4  # order of the rational approximation of a dead time
-SHORTEST = 4.0  # integration steps that the states of this approximation need
+FEWEST_STEPS_OF_DELAY = 4.0  # integration steps that the states of this approximation need
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ def rational_past(signal: str, delay: str, step: str, first: int) -> tuple[str, 
     some steps is a share of one that long, which agrees to first order in frequency. `first` is the place of the first state.
     """
     w = [f"s{first + k}" for k in range(PADE)]
-    lasting = f"max({delay}, {SHORTEST} * {step})"
+    lasting = f"max({delay}, {FEWEST_STEPS_OF_DELAY} * {step})"
     lines = [f"d{first + k} = {w[k + 1]} / {lasting}" for k in range(PADE - 1)]
     lines.append(
         f"d{first + 3} = (1680.0 * ({signal} - {w[0]}) - 840.0 * {w[1]} - 180.0 * {w[2]} - 20.0 * {w[3]}) / {lasting}"

@@ -10,7 +10,7 @@ from rhythmid.record.inventory import Recorded
 from rhythmid.record.standstill import FLICKER
 from rhythmid.start.meaning import Meaning, Quantity, joint_of_column, same_joint, words_of
 
-CLOSE = 0.7  # of the motion of the joint that moves most, from which another one is worth a question
+CLOSE_MOTION = 0.7  # of the motion of the joint that moves most, from which another one is worth a question
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def joint_of(
     if len(ranked) < 2:
         name = ranked[0] if ranked else ""
         return Joint(name, motion, _further(name, known))
-    close = [name for name in ranked if motion[name] >= CLOSE * motion[ranked[0]]]
+    close = [name for name in ranked if motion[name] >= CLOSE_MOTION * motion[ranked[0]]]
     number = ask("Which joint is looked at?", close) if len(close) > 1 else 0
     return Joint(close[number], motion, _further(close[number], known))
 

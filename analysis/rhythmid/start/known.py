@@ -12,7 +12,7 @@ from rhythmid.start.meaning import Meaning, Quantity
 Ask = Callable[
     [str, Sequence[str]], int
 ]  # a question and its possible answers, the best first -> number of the answer
-CLOSE = 0.7  # of the best candidate's worth, from which another one is worth a question
+CLOSE_WORTH = 0.7  # of the best candidate's worth, from which another one is worth a question
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class Known:
 
 def pick(question: str, ranked: Sequence[tuple[float, Recorded]], ask: Ask) -> int:
     """The best of candidates in falling order of worth; asked for where others are close."""
-    close = [one for worth, one in ranked if worth >= CLOSE * ranked[0][0]]
+    close = [one for worth, one in ranked if worth >= CLOSE_WORTH * ranked[0][0]]
     return ask(question, [str(one) for one in close]) if len(close) > 1 else 0
 
 

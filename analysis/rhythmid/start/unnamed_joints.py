@@ -9,7 +9,7 @@ from rhythmid.start.known import Known
 from rhythmid.start.meaning import Quantity
 from rhythmid.start.relation import integrals
 
-FEWEST = 2  # joints whose velocities stand in the same distance behind their positions, from which columns are groups
+FEWEST_JOINTS = 2  # joints whose velocities stand in the same distance behind their positions, from which columns are groups
 
 
 @dataclass(frozen=True)
@@ -44,10 +44,10 @@ def column_groups(found: Inventory) -> ColumnGroups | None:
     pairs: dict[int, list[int]] = defaultdict(list)
     for motion, slope, _ in integrals(found.recorded):
         count = int(slope.column) - int(motion.column)
-        if count >= FEWEST:
+        if count >= FEWEST_JOINTS:
             pairs[count].append(int(motion.column) - first)
     for count, places in sorted(pairs.items(), key=lambda pair: -len(pair[1])):
         group = places[0] // count
-        if len(places) >= FEWEST and all(place // count == group for place in places):
+        if len(places) >= FEWEST_JOINTS and all(place // count == group for place in places):
             return ColumnGroups(first, count, group, group + 1)
     return None

@@ -33,10 +33,10 @@ KICKS = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # candidates, of the usual speed in a se
 TUNED = 60  # segments that random forces are tuned on
 PASSES = 3  # for each candidate, at most
 FORCE_PASSES = 3  # in which the constant force is learnt, each with a filter tuned to what is left of it
-CLOSE = 0.1  # change of the noise's variance from pass to pass that is none
+CONVERGED_VARIANCE_CHANGE = 0.1  # change of the noise's variance from pass to pass that is none
 SETTLED = 15  # segments until the beginning is forgotten, three of the seconds of which a minute has sixty
 ROUGH = 3  # differences of the measurement that leave noise and take motion away
-LEAST = 1e-9  # of the motion: noise that no sensor is below
+LEAST_NOISE_SHARE = 1e-9  # of the motion: noise that no sensor is below
 CONSTANT = "constant_force.force"
 UNNOTICED = 0.01  # of the innovations' squares, below which a constant force disturbs no filter
 LOST = 0.5  # of the motion that innovations may be, above which the model is not one of this machine
@@ -221,7 +221,7 @@ def _tuned(simulation: Simulation, stretch: Stretch, scatter: Array) -> Filter:
     averaged = value[: len(value) // block * block].reshape(-1, block).mean(axis=1)
     rough = float(np.var(np.diff(averaged, ROUGH)))
     punctual = sum(doubt.punctual for doubt in stretch.doubts(some))
-    noise = max(rough / comb(2 * ROUGH, ROUGH), (LEAST * scatter[0]) ** 2, 1e-300)
+    noise = max(rough / comb(2 * ROUGH, ROUGH), (LEAST_NOISE_SHARE * scatter[0]) ** 2, 1e-300)
     best, best_density = None, -np.inf
     for kick in KICKS:
         for _ in range(PASSES):
@@ -234,7 +234,7 @@ def _tuned(simulation: Simulation, stretch: Stretch, scatter: Array) -> Filter:
             if density > best_density:
                 best, best_density = given, density
             noise = max(noise * min(max(squares, 0.1), 10.0), 1e-300)
-            if abs(squares - 1.0) < CLOSE:
+            if abs(squares - 1.0) < CONVERGED_VARIANCE_CHANGE:
                 break
     if best is None:
         raise InputError("the model diverges from the healthy machine's motion; identify the machine first")

@@ -16,7 +16,7 @@ from rhythmid.twin.settings import Settings
 
 Array = NDArray[np.float64]
 Pieces = tuple[Array, Array]
-SMALL = 1e-3  # of its scale, by which a state or parameter is moved to see what it does
+DIFFERENCE_STEP_SHARE = 1e-3  # of its scale, by which a state or parameter is moved to see what it does
 DELAY_STEP = (
     2e-4  # s, likewise of a delay: below the sample period of most machines, above the rounding of times
 )
@@ -180,7 +180,7 @@ class Simulation:
             return averaged(other[0][:, q] - rows[:, q]) / size, (other[0][-1, :q] - rows[-1, :q]) / size
 
         for i in range(q):
-            size = SMALL * scatter[i]
+            size = DIFFERENCE_STEP_SHARE * scatter[i]
             state = start.state.copy()
             state[i] += size
             there = Start(start.time, state, start.past)
@@ -193,7 +193,7 @@ class Simulation:
                 other = self.rows(given, start, command=given.later)
                 by_change[:, i], end_by_change[:, i] = moved(other, DELAY_STEP)
             elif (place := self.places[i]) is not None:
-                size = SMALL * sizes[i]
+                size = DIFFERENCE_STEP_SHARE * sizes[i]
                 parameters = self.parameters.copy()
                 parameters[place] += size
                 other = self.rows(given, start, parameters=parameters)

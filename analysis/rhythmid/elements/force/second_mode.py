@@ -33,13 +33,17 @@ RATIOS = (
 )  # of the mode's frequency to the mass's on its spring
 DAMPING_RATIOS = (0.1, 0.01)  # of a joint or a payload, and of a metal structure
 SHARE = 0.03  # of the first mass
-NEAR = (1.0, 0.97, 1.03)  # of the strongest line left: a mode answers beside the line that it splits off
+FACTORS_OF_LINE = (
+    1.0,
+    0.97,
+    1.03,
+)  # of the strongest line left: a mode answers beside the line that it splits off
 
 
 def starts(scales):
     """At the strongest line that is left, and on a grid; lightly damped ones close to the line, where alone they show."""
     line = scales.residual_frequency
-    found = [(ratio * line, damping) for damping in DAMPING_RATIOS for ratio in NEAR if line > 0.0]
+    found = [(ratio * line, damping) for damping in DAMPING_RATIOS for ratio in FACTORS_OF_LINE if line > 0.0]
     found += [(ratio * scales.natural_frequency, DAMPING_RATIOS[0]) for ratio in RATIOS]
     return [
         {"mass": SHARE * scales.mass, "frequency": frequency, "damping_ratio": damping}

@@ -15,7 +15,7 @@ from rhythmid.model import Model
 
 Array = NDArray[np.float64]
 ABOVE = 4.0  # times its floor that the spectrum of the motion is at least within the bandwidth (as the records' own `bandwidth`)
-HIGHEST = 0.2  # of the sample rate: derivatives of a spline err by 3 % there
+HIGHEST_DERIVED_SHARE = 0.2  # of the sample rate: derivatives of a spline err by 3 % there
 HALF = 0.5  # share of the effort's power that a free map has to explain in the highest half-octave
 SEGMENTS = 8  # of a record in Welch's spectra, at least
 RIDGE = 1e-6  # of the columns' power, against columns that the data do not tell apart
@@ -47,7 +47,7 @@ def bandwidth_of_motion(raw: Sequence[Stretch]) -> tuple[float, float]:
         weights.append(len(one.time) * one.period)
     motion = float(np.median(limits))
     dominant = float(np.average(lines, weights=weights))
-    motion = max(motion, min(2.0 * LOWEST * dominant, HIGHEST / max(one.period for one in raw)))
+    motion = max(motion, min(2.0 * LOWEST * dominant, HIGHEST_DERIVED_SHARE / max(one.period for one in raw)))
     return motion, dominant
 
 
@@ -78,7 +78,7 @@ def _of_motion(raw: Stretch) -> tuple[float, float]:
         last = len(power) - 1
     whole = np.abs(np.fft.rfft(detrend(raw.output) * np.hanning(len(raw.output))))
     strongest = (1 + int(np.argmax(whole[1:]))) * rate / len(raw.output)
-    return min(float(frequency[last]), HIGHEST * rate), float(strongest)
+    return min(float(frequency[last]), HIGHEST_DERIVED_SHARE * rate), float(strongest)
 
 
 def _lines(motions: Sequence[Motion], frequency: float, low: float) -> tuple[float, ...]:

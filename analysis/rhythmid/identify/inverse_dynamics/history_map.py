@@ -22,7 +22,7 @@ WIDTHS = (0.02, 0.1, 0.4)
 CENTRES = 80  # a record has some hundred rows: about as many as its columns tell apart
 LENGTH = 2.0  # of the function, in standard deviations of each quantity: between 1.5 and 3, which were best for large and small remainders
 JITTER = 1e-6  # added to the kernel of the centres, so that near ones do no harm
-FAR = 4.0  # standard deviations beyond which a quantity of other records is taken to be there
+DISTINCT_STDS = 4.0  # standard deviations beyond which a quantity of other records is taken to be there
 
 
 @njit("float64[::1](float64[::1], float64)", cache=True)
@@ -61,7 +61,7 @@ class HistoryMap:
         return np.column_stack([place, motion.leg_velocity, motion.acceleration, load, *stops])
 
     def _scaled(self, quantities: Array) -> Array:
-        return np.clip((quantities - self._middle) / self._spread, -FAR, FAR)
+        return np.clip((quantities - self._middle) / self._spread, -DISTINCT_STDS, DISTINCT_STDS)
 
     def _kernel(self, scaled: Array) -> Array:
         return np.exp(-0.5 * cdist(scaled, self._centres, "sqeuclidean") / LENGTH**2)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-MOST = 12  # steps at most: an error that halves each time is then below a thousandth
+MOST_INVERSION_STEPS = 12  # steps at most: an error that halves each time is then below a thousandth
 SETTLING = 0.5  # of its error that a correction has to leave at most: a limit of rate, which cannot be inverted, leaves nearly all
 FAST = 0.1  # of its error that a step leaves, up to which the slopes of the one before do for the next: they cost two runs
 EXACT = 1e-6  # of a signal: as near as an inversion goes
@@ -40,7 +40,7 @@ def inverted(
     slope: Array | None = None
     share = np.ones(len(wanted))  # of a step, halved where it led too far: where the slope grows on the way
     reached = np.ones(len(wanted), dtype=bool)  # by what goes in
-    for _ in range(MOST):
+    for _ in range(MOST_INVERSION_STEPS):
         step = error
         if not remembers:
             slope = _slope(comes_out, into) if slope is None else slope

@@ -30,7 +30,7 @@ Mask = NDArray[np.bool_]
 ORDER = 4  # of the Butterworth filter, run forwards and backwards (the order that Gautier et al. use)
 SLOW_ORDER = 2  # of the high-pass filter, run twice
 FINER = 10.0  # samples in a period of the motion's bandwidth that are kept: the switch of a friction is placed to a tenth of it
-SHORTEST = 32  # samples of a stretch without a gap, below which it says nothing
+FEWEST_STRETCH_SAMPLES = 32  # samples of a stretch without a gap, below which it says nothing
 BRIDGE = 3  # degree of the polynomial across a gap: it turns once on either side, as what the band holds may within three gaps
 LEAST_BESIDE = (
     4  # samples on either side of a gap that it is fitted to, at least, and as many more as are missing
@@ -149,7 +149,7 @@ def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> 
                 int(measured[0]),
                 int(measured[-1]) + 1,
             )  # beyond the last sample there is nothing to bridge to
-            if end - first < SHORTEST:
+            if end - first < FEWEST_STRETCH_SAMPLES:
                 continue
             part = slice(first, end)
             spans = ((first + gap.start - 1, first + gap.stop) for gap in runs(bridged[part]))
@@ -161,7 +161,7 @@ def stretches(records: Sequence[Record], model: Model, longest: float = 0.0) -> 
                 )
             )  # fmt: skip
     if not found:
-        raise InputError(f"no stretch without a gap has {SHORTEST} samples")
+        raise InputError(f"no stretch without a gap has {FEWEST_STRETCH_SAMPLES} samples")
     return found
 
 

@@ -12,7 +12,9 @@ from rhythmid.identify.inverse_dynamics.estimate import EffortFit
 from rhythmid.model import INERTIA
 
 Array = NDArray[np.float64]
-CLOSE = 0.9  # correlation of two estimates, from which the records tell only a combination of them
+INSEPARABLE_CORRELATION = (
+    0.9  # correlation of two estimates, from which the records tell only a combination of them
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +60,7 @@ class Correlations:
         """The pairs of names of which the records tell only a combination, and their correlation."""
         for i, first in enumerate(self.names):
             for j in range(i):
-                if abs(self.matrix[i, j]) > CLOSE:
+                if abs(self.matrix[i, j]) > INSEPARABLE_CORRELATION:
                     yield first, self.names[j], float(self.matrix[i, j])
 
     def to_dict(self) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from rhythmid.body.machine import FREE, Machine
 from rhythmid.errors import InputError
 from rhythmid.identify.drive import controlled
-from rhythmid.identify.inverse_dynamics.motion import SHORTEST
+from rhythmid.identify.inverse_dynamics.motion import FEWEST_STRETCH_SAMPLES
 from rhythmid.identify.inverse_dynamics.reference_path import Commanded
 from rhythmid.identify.joints.reference_lead import HeldReference, held_reference
 from rhythmid.model import Model
@@ -18,9 +18,9 @@ from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.record import Record, Uniform
 
 Array = NDArray[np.float64]
-NEAR = 0.002  # [m] between two surfaces, below which they may touch: what an encoder and a link's shape are wrong by
+TOUCHING_DISTANCE = 0.002  # [m] between two surfaces, below which they may touch: what an encoder and a link's shape are wrong by
 WHOLE = 0.99  # of a sample that has to be no bridge over a gap
-MOST = (
+MOST_POSES = (
     4000  # poses at which contact is looked for, in a record: contacts last longer than the samples between
 )
 
@@ -54,8 +54,8 @@ def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[Jo
         pose = np.tile(machine.body.reference, (len(grid), 1))
         for joint, one in columns.items():
             pose[:, machine.body.joints[joint].position] = one.output
-        every = max(1, len(grid) // MOST)
-        touching = machine.body.touches(pose[::every], NEAR)
+        every = max(1, len(grid) // MOST_POSES)
+        touching = machine.body.touches(pose[::every], TOUCHING_DISTANCE)
         beside = touching.copy()  # a contact may begin between the poses that were looked at
         beside[1:] |= touching[:-1]
         beside[:-1] |= touching[1:]
@@ -75,7 +75,7 @@ def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[Jo
         }
         ends = np.flatnonzero(np.diff(np.concatenate([[0], (valid & flying).astype(int), [0]])))
         for first, end in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
-            if end - first < SHORTEST:
+            if end - first < FEWEST_STRETCH_SAMPLES:
                 continue
             part = slice(first, end)
             found.append(
@@ -91,7 +91,7 @@ def joint_stretches(machine: Machine, records: Sequence[JointRecord]) -> list[Jo
                 )
             )  # fmt: skip
     if not found:
-        raise InputError(f"no stretch without a gap and without contact has {SHORTEST} samples")
+        raise InputError(f"no stretch without a gap and without contact has {FEWEST_STRETCH_SAMPLES} samples")
     return found
 
 
@@ -136,8 +136,10 @@ def _common(
     start = max(float(one.time[0]) for one in grids.values())
     end = min(float(one.time[-1]) for one in grids.values())
     time = first.time[(first.time >= start - 1e-9) & (first.time <= end + 1e-9)]
-    if len(time) < SHORTEST:
-        raise InputError(f"{record.name}: the joints have less than {SHORTEST} samples in common")
+    if len(time) < FEWEST_STRETCH_SAMPLES:
+        raise InputError(
+            f"{record.name}: the joints have less than {FEWEST_STRETCH_SAMPLES} samples in common"
+        )
     moved = {joint: _at(one, time) for joint, one in grids.items()}
     valid = np.all([one.valid for one in moved.values()], axis=0)
     return time, first.period, moved, valid

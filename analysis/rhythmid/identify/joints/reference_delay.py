@@ -22,7 +22,7 @@ from rhythmid.identify.student import weights_of
 from rhythmid.statistics import NORMAL_95
 
 Array = NDArray[np.float64]
-LONGEST = 0.1  # [s] in which a reference acts at the latest
+LONGEST_REFERENCE_DELAY = 0.1  # [s] in which a reference acts at the latest
 FIRST = 3  # Gauss-Newton steps of the fit about which delays are scanned: the parameters are nearly linear
 # of a sample: what jitter of stamps and interpolation add to the standard deviation of a joint's delay (measured: delays of joints with one bus
 # scatter by 0.01 to 0.02 of a sample, their standard deviations by the noise alone are smaller)
@@ -102,7 +102,7 @@ def reference_delay(balances: JointBalances, joints: Sequence[str]) -> Reference
 def delay_fit(balance: Balance, balances: JointBalances, joint: str) -> EffortFit:
     """The fit of a joint's path with the delay of its reference free, from the best of a scan."""
     model = balances.models[joint]
-    wide = Alignment(LONGEST, -FARTHEST * balance.period, LONGEST)
+    wide = Alignment(LONGEST_REFERENCE_DELAY, -FARTHEST * balance.period, LONGEST_REFERENCE_DELAY)
     first = fit_effort(balance, model, steps=FIRST)
     weight = weights_of(first.residual, first.scale) / first.scale**2
     root = np.sqrt(weight)

@@ -16,7 +16,9 @@ from rhythmid.record.record import Channel
 
 Array = NDArray[np.float64]
 IN_STEP = 0.9  # length of the mean unit vector of the phases: stamps that scatter by up to 7 % of the period
-NEAR = 0.1  # of the period before a stamp of the reference, within which an effort counts as taken with it
+TAKEN_TOGETHER_SHARE = (
+    0.1  # of the period before a stamp of the reference, within which an effort counts as taken with it
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +35,10 @@ class HeldReference:
 
 def held_reference(effort: Channel, reference: Channel, grid: Array) -> HeldReference | None:
     """The reference at the times of a grid (n,), none where efforts are not taken in step with it."""
-    last = np.searchsorted(reference.time, effort.time + NEAR * reference.period, side="right") - 1
+    last = (
+        np.searchsorted(reference.time, effort.time + TAKEN_TOGETHER_SHARE * reference.period, side="right")
+        - 1
+    )
     phases = (effort.time[last >= 0] - reference.time[last[last >= 0]]) / reference.period
     if len(phases) == 0 or abs(complex(np.mean(np.exp(2j * np.pi * phases)))) < IN_STEP:
         return None
