@@ -44,6 +44,7 @@ EFFECTS = ("coulomb_friction", "actuator_lag", "actuator_gain", "actuator_delay"
 # effects of the command path, which a recorded torque does not show
 COMMANDS = ("input_delay", "command_lag", "command_hold", "reference_rate_limit")
 DELAYS = ("actuator_delay", "input_delay")
+RATES = (30.0, 40.0, 50.0, 60.0)  # Hz, of drives that hold their commands: round ones, as drives have
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ def concealed(
         "linear_spring": {"stiffness": 4.0 * share * effort, "rest_length": float(rng.uniform(-0.5, 0.5))},
         "actuator_deadband": {"threshold": share * effort},
         "command_lag": {"time_constant": float(rng.uniform(0.008, 0.015))},
-        "command_hold": {"period": float(rng.uniform(0.02, 0.03))},
+        "command_hold": {"period": 1.0 / float(rng.choice(RATES))},
         "reference_rate_limit": {"rate": float(rng.uniform(0.4, 0.6)) * speed},
     }[effect]  # fmt: skip
     element = catalogue[effect]

@@ -30,6 +30,8 @@ GAINS = (0.9, 1.1)  # at which it is tried whether an actuator gives less or mor
 # standard deviations of a joint's speed at which a limit of its reference's rate is tried: a reference that the limit keeps back most of the time
 # moves at that rate, so that the joint does
 RATES = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
+# [Hz] at which a drive may take a new reference: round ones, below those of records, which show no faster one
+CLOCKS = (125.0, 100.0, 80.0, 60.0, 50.0, 40.0, 30.0, 25.0, 20.0, 10.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,10 @@ def joint_catalogue(catalogue: Catalogue) -> Catalogue:
         )
     if (limit := found.get("reference_rate_limit")) is not None:
         found[limit.name] = replace(limit, starts=lambda s: [{"rate": one * s.velocity} for one in RATES])
+    if (hold := found.get("command_hold")) is not None:
+        found[hold.name] = replace(
+            hold, starts=lambda s: [{"period": 1.0 / rate} for rate in CLOCKS if 4.0 * s.frequency < rate]
+        )
     # what the joints of a simulated robot have
     if (friction := found.get("soft_constraint_friction")) is not None:
         found[friction.name] = replace(friction, candidate=True)
