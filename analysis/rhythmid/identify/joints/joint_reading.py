@@ -20,7 +20,7 @@ from rhythmid.body.machine import Machine
 from rhythmid.identify.inverse_dynamics.bandwidth import bandwidth_of_motion
 from rhythmid.identify.inverse_dynamics.motion import FINER, Stretch, low_pass
 from rhythmid.identify.joints.joint_motion import CLEAR
-from rhythmid.identify.joints.joint_stretch import NEAR, JointStretch, joint_stretches
+from rhythmid.identify.joints.joint_stretch import TOUCHING_DISTANCE, JointStretch, joint_stretches
 from rhythmid.model import Model
 from rhythmid.record.joint_record import JointRecord
 
@@ -98,7 +98,7 @@ class RecordedMotion:
         clear = np.ones(len(self._pose), dtype=bool)
         if self._touching:
             beside = self._read(np.concatenate(self._beside), self._positions, sources, factors)
-            touched = self.body.touches(beside, NEAR).reshape(len(self._beside), -1)
+            touched = self.body.touches(beside, TOUCHING_DISTANCE).reshape(len(self._beside), -1)
             clear = ~np.any(touched, axis=0)
         if clear.sum() < min(FEW, len(clear)):
             return tuple(Balanced(1.0) for _ in readings)
