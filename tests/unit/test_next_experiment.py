@@ -16,6 +16,7 @@ from rhythmid.identify.record_scales import scales
 from rhythmid.identify.series import Series, prepare
 from rhythmid.model import Model
 from rhythmid.record.record import Channel, Record
+from rhythmid.simulation.signal import zero_order_hold
 
 PENDULUM = """
 units: {force: rad/s^2, position: rad}
@@ -57,6 +58,18 @@ def test_only_a_machine_without_input_is_idle():
         CATALOGUE["periodic_forcing"], {"amplitude": 1.0, "frequency": 1.0, "phase": 0.0}
     )
     assert not scales(decay(0.5), forced).idle
+
+
+def test_a_machine_that_is_driven_at_another_level_in_each_record_is_not_idle():
+    levels = (0.5, 0.5, 2.0)
+    held = [
+        replace(one, command=zero_order_hold(one.time[:1], np.array([level])))
+        for one, level in zip(decay(0.5)[:1] * 3, levels)
+    ]
+    nominal = Model.from_text(PENDULUM)
+    assert scales(held[:2], nominal).idle
+    sizes = scales(held, nominal)
+    assert not sizes.idle and sizes.effort == pytest.approx(np.std(levels))
 
 
 @pytest.mark.parametrize("highest", [4.0, 40.0, 400.0])

@@ -38,6 +38,10 @@ STEP, FINE_STEP = (
     0.2,
     0.05,
 )  # of a block, integrated in one step; the latter where the limit cycle is not to be used
+# share to which a delay of a period of the motion more has to lower the error: a motion that repeats itself looks the same a period later, but for
+# where it begins
+LATER_PERIOD = 0.7
+EARLIEST = 1.5  # samples by which a delay may come out negative
 NO_PUMPING = Pumping(1.0, np.zeros(2, dtype=complex), 0.0, "none")
 
 
@@ -106,7 +110,7 @@ def prepared_model(model: Model, records: Sequence[Record]) -> tuple[Model, Pump
     if not excited and INPUT_DELAY in model.parameters:
         value = model.parameters[INPUT_DELAY]
         model = model.with_parameters({INPUT_DELAY: replace(value, fixed=True)})
-    slack = 1.5 * max(record.output.period for record in records)
+    slack = EARLIEST * max(record.output.period for record in records)
     longest = max(record.duration for record in records)
     bounds = {}
     for name in DELAYS:
@@ -255,8 +259,45 @@ def best_fit(records: Record | Sequence[Record], model: Model) -> JointFit:
     records : recordings of the same machine.
     model : what is known of it; its values may be far off.
 
-    The best that was found, whose `search` tells whether it arrived. Raises InputError when the records have nothing to fit.
+    The best that was found, whose `search` tells whether it arrived. Of delays that are whole periods of the motion apart it has the shortest
+    that fits about as well. Raises InputError when the records have nothing to fit.
     """
+    return of_shortest_delays(_best_fit(records, model))
+
+
+def of_shortest_delays(found: JointFit) -> JointFit:
+    """Of fits whose delays are whole periods of the motion apart that with the shortest ones that fits about as well."""
+    while (shorter := _a_period_earlier(found)) is not None:
+        found = shorter
+    return found
+
+
+def _a_period_earlier(found: JointFit) -> JointFit | None:
+    """The fit from delays that together are a period of the motion shorter, where it is about as good; None else."""
+    free = [name for name in DELAYS if name in found.fit.names]
+    period = 1.0 / dominant_frequency(max(found.fit.run.series, key=lambda one: one.blocks), finer=8)
+    model, rest = found.fit.model, period
+    if sum(model.value(name) for name in free) < period - EARLIEST * found.records[0].output.period:
+        return None
+    for name in free:
+        taken = min(max(model.value(name), 0.0), rest)
+        model, rest = model.with_values({name: model.value(name) - taken}), rest - taken
+    series = begun_series(found.records, late_by(model))
+    try:
+        fit = estimate(model, series, max_step=step_of(series))
+    except InputError:
+        return None
+    # a descent that comes back to where it began tells nothing
+    shorter = sum(fit.model.value(name) for name in free) < sum(found.fit.model.value(n) for n in free)
+    return (
+        _judged(fit, found.pumping, found.records)
+        if shorter and found.fit.nrmse() >= LATER_PERIOD * fit.nrmse()
+        else None
+    )
+
+
+def _best_fit(records: Record | Sequence[Record], model: Model) -> JointFit:
+    """The best fit, whatever its delays."""
     given = (records,) if isinstance(records, Record) else tuple(records)
     if not given:
         raise InputError("nothing to identify from: give at least one record")

@@ -32,13 +32,16 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     # by a forcing or a controller of the model's own
     driven = any(term.element.acts in ("drive", "feedback") for term in model.terms)
     fed = any(term.element.takes for term in model.terms)  # by a voltage, say: what is recorded is no force
-    for one in series:
-        total = one.drive
+    drives = [one.drive for one in series]
+    # windows and records may each be driven at a level of their own
+    levels = [float(total[0]) for one, total in zip(series, drives) if one.kind != "base_displacement"]
+    driven = driven or len(set(levels)) > 1
+    for one, total in zip(series, drives):
         driven = driven or one.driven
         if one.kind == "reference":
             reference = max(reference, float(np.std(total)))
         elif not fed:
-            effort = max(effort, float(np.std(total)))
+            effort = max(effort, float(np.std(total)), float(np.std(levels)))
             peak = max(peak, float(np.abs(total).max(initial=0.0)))
     forced = [one for one in series if one.forcing is not None]
     if forced:

@@ -43,7 +43,7 @@ def ticks_sought(fit: Fit, floor: float, pool: ThreadPoolExecutor | None = None)
         return fit
     series, places = fit.run.series, places_of(fit)
     for _ in range(SCANS):
-        if time_is_up():
+        if time_is_up() or fit.model.value(period) == 0.0:  # a period of nothing has no ticks
             break
         noise = noise_of(fit.residuals, series, floor)
         try:
