@@ -95,7 +95,7 @@ def test_joints_are_told_by_their_names_or_else_by_their_numbers(tmp_path, robot
     efforts = [head.replace("q", "tau", 1) for head in heads]
     found = begun(table(tmp_path / "run.csv", run, [*heads, *efforts], "position", "effort"), robot)
     assert joints in found.signals
-    assert any("they are numbered" in line for line in found.told) == ("1" in joints)
+    assert any("they are numbered" in line for line in found.lines()) == ("1" in joints)
 
 
 def test_units_of_headings_are_heeded(tmp_path, robot, run):
@@ -122,12 +122,12 @@ def test_of_several_efforts_the_one_that_was_measured_is_taken_and_the_others_ar
     path = table(tmp_path / "run.csv", run, heads, "position", "effort", "friction", "measured")
     found = begun(path, robot)
     assert 'effort: {column: "tau_meas*"' in found.signals
-    checks = [line for line in found.told if line.startswith("CHECK effort")]
+    checks = [line for line in found.lines() if line.startswith("CHECK effort")]
     assert any("tau_con*" in line for line in checks) and any("tau_fric*" in line for line in checks)
     assert "# CHECK effort: tau_con* is what" in found.signals
     found = begun(table(tmp_path / "run.csv", run, heads[:4], "position", "effort"), robot)
     assert 'effort: {column: "tau_con*"' in found.signals
-    assert any("what the actuators were asked for" in line for line in found.told)
+    assert any("what the actuators were asked for" in line for line in found.lines())
 
 
 def test_references_alone_get_controllers_whose_gains_are_to_be_checked(tmp_path, robot, run):

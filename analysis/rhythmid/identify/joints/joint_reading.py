@@ -192,7 +192,8 @@ def _effort(model: Model, joint: str, stretch: JointStretch, place: int) -> Arra
         return stretch.effort[joint]
     x = stretch.pose[:, place]
     v = np.gradient(x, stretch.time)
-    asked, total = stretch.reference[joint], np.zeros(len(x))
+    commanded, total = stretch.reference[joint], np.zeros(len(x))
+    asked = np.interp(stretch.time - commanded.late(model), commanded.time, commanded.passed(model))
     for term in model.terms:
         if term.element.acts == "feedback" and term.element.kernel is not None:
             total = term.element.kernel(asked, x, v, stretch.time, **term.numbers)
