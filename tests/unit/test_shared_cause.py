@@ -1,6 +1,5 @@
 """A payload of an arm that hardly moves: at each joint it looks like a constant force, at both together only like itself."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,12 +7,8 @@ import pytest
 from legged import recorded, references
 
 from rhythmid.body.machine import Machine
-from rhythmid.diagnose.case import Budget
-from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint
-from rhythmid.diagnose.joints.joint_diagnosis import stated_at
-from rhythmid.diagnose.joints.shared_cause import contradicted, shared_cause
+from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
 from rhythmid.elements.catalogue import load_catalogue
-from rhythmid.identify.joints.joint_motion import JointBalances
 
 ARM = """<robot name="two">
   <link name="base"/>
@@ -31,71 +26,33 @@ PATH = (
     "{command: [{input_delay: {delay: 0.0}}, {position_control: {proportional: {value: 80, fixed: true}, "
     "derivative: {value: 2.0, fixed: true}}}], force: [{viscous_damper: {damping: 0.1}}]}"
 )
-CARRIED, PAYLOAD = 0.1, "lower.payload"  # kg
+CARRIED = 0.1  # kg
 
 
-@pytest.fixture(scope="module")
-def arm(tmp_path_factory: pytest.TempPathFactory) -> Machine:
-    folder: Path = tmp_path_factory.mktemp("two")
-    (folder / "two.urdf").write_text(ARM)
-    (folder / "two.yaml").write_text(
+@pytest.fixture
+def arm(tmp_path: Path) -> Machine:
+    (tmp_path / "two.urdf").write_text(ARM)
+    (tmp_path / "two.yaml").write_text(
         f"body: {{urdf: two.urdf, contacts: false}}\njoints:\n  one: {PATH}\n  two: {PATH}\n"
     )
-    return Machine.load(folder / "two.yaml")
+    return Machine.load(tmp_path / "two.yaml")
 
 
-def searched(plant: Machine, nominal: Machine) -> tuple[JointBalances, dict[str, JointResult]]:
-    """What is found at each joint alone."""
+def diagnosed(plant: Machine, nominal: Machine):
     time, rng = np.arange(0.0, 5.0, 0.002), np.random.default_rng(4)
     asked = references({"one": (0.5, 0.01), "two": (0.7, 0.01)}, time, rng, (0.3, 2.0))
-    balances = JointBalances.of(nominal, [recorded(plant, asked, time, rng)])
-    known, budget = load_catalogue(), Budget(None)
-    return balances, {
-        joint: diagnose_joint(balances, None, joint, known, lambda _: None, budget)
-        for joint in nominal.joints
-    }
+    return diagnose_machine([recorded(plant, asked, time, rng)], nominal).diagnosis
 
 
-@pytest.fixture(scope="module")
-def carrying(arm: Machine) -> tuple[JointBalances, dict[str, JointResult]]:
-    return searched(arm.with_inertial({"lower.payload": CARRIED}), arm)
+def test_one_payload_is_named_in_the_place_of_a_constant_force_at_every_joint(arm: Machine):
+    (one,) = diagnosed(arm.with_inertial({"lower.payload": CARRIED}), arm).missing
+    assert (one.element, one.link, one.joint) == ("payload", "lower", "two")
+    assert one.parameters["mass"].value == pytest.approx(CARRIED, rel=0.15)
+    assert one.probability > 0.8
 
 
-@pytest.fixture(scope="module")
-def leaning(arm: Machine) -> tuple[JointBalances, dict[str, JointResult]]:
-    """A constant force at either joint, as no payload makes them."""
+def test_constant_forces_that_no_payload_makes_stay_what_they_are(arm: Machine):
     constant = load_catalogue()["constant_force"]
     plant = arm.with_element("one", constant, {"force": 0.4}).with_element("two", constant, {"force": -0.3})
-    return searched(plant, arm)
-
-
-def choosing(found: dict[str, JointResult], *elements: str) -> dict[str, JointResult]:
-    """The results as if these elements alone had been chosen at every joint."""
-    made = {}
-    for joint, one in found.items():
-        fitted = next(f for f in one.result.search.hypotheses if f.elements == elements)
-        made[joint] = replace(one, result=replace(one.result, chosen=fitted))
-    return made
-
-
-def test_one_payload_explains_what_constant_forces_of_all_joints_do(carrying):
-    balances, found = carrying
-    stated = dict.fromkeys(found, ("constant_force",))
-    cause = shared_cause(balances, choosing(found, "constant_force"), stated, ())
-    assert cause is not None and cause.parameter == PAYLOAD and cause.evidence > 0.0
-    (label,) = cause.shown.result.decision.named
-    assert label == f"body.{PAYLOAD}" and cause.shown.result.decision.probability[label] > 0.8
-    assert cause.shown.result.chosen.model.value(label) == pytest.approx(CARRIED, rel=0.15)
-
-
-def test_constant_forces_that_no_payload_makes_stay_what_they_are(leaning):
-    balances, found = leaning
-    stated = {joint: stated_at(one) for joint, one in found.items()}
-    assert stated == {"one": ("constant_force",), "two": ("constant_force",)}
-    assert shared_cause(balances, found, stated, ()) is None
-
-
-def test_a_payload_that_one_joint_sees_and_the_others_contradict_is_none(leaning, carrying):
-    for (balances, found), wrong in ((leaning, True), (carrying, False)):
-        shown = choosing({"two": found["two"]}, f"body.{PAYLOAD}")["two"]
-        assert contradicted(balances, found, PAYLOAD, shown) is wrong
+    found = diagnosed(plant, arm).missing
+    assert {(one.joint, one.element) for one in found} == {("one", "constant_force"), ("two", "constant_force")}

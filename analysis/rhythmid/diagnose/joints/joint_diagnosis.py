@@ -23,7 +23,7 @@ from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.misfit import misfits
-from rhythmid.diagnose.joints.shared_cause import contradicted, shared_cause
+from rhythmid.diagnose.joints.shared_cause import shared_cause
 from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
@@ -176,15 +176,10 @@ def _explained(
         if best is None:
             break
         link, result = best
-        if contradicted(balances, found, link, result):
-            balances = balances.without(result.joint, link)
-            once, refused = _searched(balances, unseen, [result.joint], catalogue, tell, budget, delay)
-            found = {**found, **once}
-            continue
         found = {**found, result.joint: result}
         links[link] = wrong_link(balances, records, found, link, result)
         machine = links[link].put_right(machine)
-        balances = JointBalances.of(machine, records, balances).without_all(balances.excluded)
+        balances = JointBalances.of(machine, records, balances)
         unseen = JointBalances.of(machine, holdout, balances) if holdout else None
         again = [joint for joint in machine.joints if link in balances.links(joint)]
         delay = reference_delay(balances, balances.computed) if balances.computed else None

@@ -61,21 +61,6 @@ def shared_cause(
     return max(filter(None, made), key=lambda one: one.evidence, default=None)
 
 
-def contradicted(
-    balances: JointBalances, found: Mapping[str, JointResult], name: str, shown: JointResult
-) -> bool:
-    """Whether the other joints that feel a parameter of the body predict worse with the value that the search at one joint has found, so that
-    something else acts there: a constant force of that joint is no payload, which all joints that carry it would feel."""
-    label = f"{BODY}.{name}"
-    change = shown.result.chosen.model.value(label) - shown.case.nominal.value(label)
-    gained = 0.0
-    for joint, one in found.items():
-        if joint != shown.joint and name in balances.links(joint):
-            alone, _, nominal = _predicted(_felt(one, label), change)
-            gained += alone.score - nominal.score
-    return gained < -decisive(1)
-
-
 def _judged(
     balances: JointBalances, found: Mapping[str, JointResult], stated: Mapping[str, Collection[str]], name: str
 ) -> SharedCause | None:  # fmt: skip

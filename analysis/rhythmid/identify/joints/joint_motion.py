@@ -79,8 +79,7 @@ class JointBalances:
 
     `computed` are the joints whose effort is what their controller's known gains make of the reference; `leads` [s] of others are what the
     references in their recorded efforts were ahead by, and are not in the motions. `rotor_like` are by joint the parameters of links that
-    do there what the rotor's inertia does, with how much of that [kg m²] a unit of each is, `excluded` those,
-    as (joint, link's parameter), that keep their values.
+    do there what the rotor's inertia does, with how much of that [kg m²] a unit of each is.
     """
 
     machine: Machine
@@ -92,7 +91,6 @@ class JointBalances:
     computed: tuple[str, ...]
     leads: Mapping[str, float] = field(default_factory=dict)
     rotor_like: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    excluded: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def of(
@@ -150,20 +148,6 @@ class JointBalances:
                 for motion, body in zip(self.motions[joint], self.bodies, strict=True)
             ]
         return replace(self, motions=motions, leads={**self.leads, **leads})
-
-    def without(self, joint: str, link: str) -> "JointBalances":
-        """The balances where a parameter of a link keeps its value at one joint: its other joints contradict what this one makes of it."""
-        model, name = self.models[joint], f"{BODY}.{link}"
-        value = model.parameters[name]
-        kept = model.with_parameters({name: replace(value, bounds=(value.value, value.value))})
-        return replace(self, models={**self.models, joint: kept}, excluded=(*self.excluded, (joint, link)))
-
-    def without_all(self, excluded: Sequence[tuple[str, str]]) -> "JointBalances":
-        """The same for several joints and links."""
-        made = self
-        for joint, link in excluded:
-            made = made.without(joint, link)
-        return made
 
     def links(self, joint: str) -> tuple[str, ...]:
         """The links whose masses and inertias a joint feels, as "link.mass" and "link.inertia", and those whose payloads it would feel, as
