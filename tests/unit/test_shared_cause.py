@@ -55,4 +55,7 @@ def test_constant_forces_that_no_payload_makes_stay_what_they_are(arm: Machine):
     constant = load_catalogue()["constant_force"]
     plant = arm.with_element("one", constant, {"force": 0.4}).with_element("two", constant, {"force": -0.3})
     found = diagnosed(plant, arm).missing
-    assert {(one.joint, one.element) for one in found} == {("one", "constant_force"), ("two", "constant_force")}
+    assert {(one.joint, one.element) for one in found} == {
+        ("one", "constant_force"),
+        ("two", "constant_force"),
+    }
