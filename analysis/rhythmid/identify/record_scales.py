@@ -36,12 +36,13 @@ def scales(series: Sequence[Series], model: Model) -> Scales:
     # windows and records may each be driven at a level of their own
     levels = [float(total[0]) for one, total in zip(series, drives) if one.kind != "base_displacement"]
     driven = driven or len(set(levels)) > 1
+    spread = float(np.std(levels)) if levels else 0.0
     for one, total in zip(series, drives):
         driven = driven or one.driven
         if one.kind == "reference":
             reference = max(reference, float(np.std(total)))
         elif not fed:
-            effort = max(effort, float(np.std(total)), float(np.std(levels)))
+            effort = max(effort, float(np.std(total)), spread)
             peak = max(peak, float(np.abs(total).max(initial=0.0)))
     forced = [one for one in series if one.forcing is not None]
     if forced:
