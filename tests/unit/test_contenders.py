@@ -131,6 +131,15 @@ def test_a_hypothesis_that_fails_is_left_out_and_the_others_keep_their_order(giv
     assert [one.trial for one in found] == [good]
 
 
+@pytest.mark.parametrize(("name", "determined"), [("gravity.acceleration", False), ("inertia.mass", True)])
+def test_a_value_that_is_set_free_competes_where_the_records_determine_it(given, plain, name, determined):
+    # gravity moves the rest of the motion as the free rest length does
+    freed = plain.model.with_parameters({name: replace(plain.model.parameters[name], fixed=False)})
+    trial = replace(search_of(fitted(freed, given)).best, added=(name,))
+    found = contend([(trial, "freed_value")], given, rows_of(given, [], NOISE), 1e-3)
+    assert bool(found) is determined
+
+
 def test_every_felt_start_of_an_effects_own_states_costs_one_of_log_density_at_most(given, plain):
     rows = rows_of(given, [], NOISE)
     lagging = fitted(

@@ -160,14 +160,17 @@ def test_what_the_first_scoring_leaves_without_a_name_is_tried_in_the_second(mon
     assert len(left) == (1 if kept == 0 and verdicts[0] == "missing_physics" else 0)
 
 
-def tried(monkeypatch: pytest.MonkeyPatch, *errors: float) -> tuple[list[Scoring], list[float]]:
-    """The ways to score that come out of a free run and ever shorter windows of these errors, as shares of the motion; and the errors of
-    those that were tried."""
+def tried(
+    monkeypatch: pytest.MonkeyPatch, *errors: float, shares: dict[float, float] | None = None
+) -> tuple[list[Scoring], list[float]]:
+    """The ways to score that come out of a free run and ever shorter windows of these errors; and the errors of those that were tried. `shares`
+    of the motion in the windows are as large as the errors by default."""
     asked: list[float] = []
+    share = shares or {}
 
     def calibrated(_model, error, *_):
         asked.append(error)
-        fit = SimpleNamespace(error=error, nrmse=lambda: error)
+        fit = SimpleNamespace(error=error, nrmse=lambda: share.get(error, error))
         return SimpleNamespace(fit=fit, reconstructed=False)
 
     def ladder(*_):
@@ -214,6 +217,12 @@ def test_windows_are_the_way_to_score_where_they_lower_the_error_to_less_than_60
     monkeypatch, errors, kept
 ):
     assert [one.error for one in tried(monkeypatch, *errors)[0]] == kept
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.65, [0.4, 0.7]), (0.85, [0.7])])
+def test_windows_in_which_the_machine_hardly_moves_are_no_way_to_score(monkeypatch, share, kept):
+    # the error falls with the windows' length, as the motion does of which it is a share
+    assert [one.error for one in tried(monkeypatch, 0.7, 0.4, shares={0.4: share})[0]] == kept
 
 
 @pytest.mark.parametrize(

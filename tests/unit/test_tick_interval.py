@@ -73,6 +73,12 @@ def test_a_model_without_a_free_period_is_left_alone():
     assert ticks_sought(fit, 1e-9) is fit
 
 
+def test_a_hold_of_no_length_has_no_ticks_to_be_sought():
+    fit = estimate(held(), [recorded(0)], names=[PERIOD], noise=NOISE, max_step=STEP, iterations=0)
+    fit = replace(fit, model=fit.model.with_values({PERIOD: 0.0}), values=np.zeros(1))
+    assert ticks_sought(fit, 1e-9) is fit
+
+
 def test_a_period_that_alone_is_free_is_followed_too():
     model = held(**{PERIOD: TRUE[PERIOD] + 2e-6})
     fixed = {name: replace(model.parameters[name], fixed=True) for name in model.free if name != PERIOD}

@@ -42,7 +42,8 @@ class Contest:
     cut_short : whether the budget ended the search before all effects that scored well were tried.
     structured : share of the error of the nominal model that follows from its own past, so that it is no noise; 0 of an effort, whose noise
         the filter of the balance colours.
-    structured_after : the same of the model with which the search ended; of an effort what lasts longer than the filter mixes neighbours.
+    structured_after : the same of the model with which the search ended; of an effort that of the chosen one, what lasts longer than the
+        filter mixes neighbours.
     """
 
     hypotheses: tuple[Hypothesis, ...]

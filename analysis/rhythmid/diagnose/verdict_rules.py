@@ -26,7 +26,7 @@ class Outcome:
     remainder : rms of what it leaves and something else predicts by more than chance, at least, over the smallest of practical importance.
     missed : rms error of the chosen hypothesis, as a share of what was measured.
     structured : the part of it that follows from its own past, so that it is no noise.
-    lost : the same of the model with which the search ended.
+    lost : the same by the share of the model with which the search ended.
     astray : its error on held-out data, over that up to which a model follows the machine.
     detectable : smallest effect that the records would show, the same.
     vague : standard deviation of the size of its effect with the largest share, relative to the size.

@@ -160,8 +160,6 @@ def effort_run(
         return one.claimed(made(errors_of), errors[tuple(sorted(one.elements))] / size)
 
     maps = {quantity: made(one) for quantity, one in mapped.items()}
-    # of several joints an error of one may be another one's
-    lasting = lasting_share(predicted[found.chosen.elements].error, rows.record, GAP) if places == 1 else 0.0
     contest = Contest(
         tuple(claimed(one, predicted[one.elements]) for one in found.hypotheses),
         maps,
@@ -170,10 +168,12 @@ def effort_run(
         PRACTICAL_EFFORT,
         tuple(claimed(one, ruled_out[one.elements]) for one in found.ruled_out),
         cut_short=found.cut_short,
-        structured_after=lasting,
     )
     selection = select(contest)
     chosen = next(one for one in found.hypotheses if tuple(sorted(one.elements)) == selection.chosen.key)
+    if places == 1:  # of several joints an error of one may be another one's
+        lasting = lasting_share(predicted[chosen.elements].error, rows.record, GAP)
+        contest = replace(contest, structured_after=lasting)
     least = detectable(predicted[chosen.elements].error, time) / size
     robust = replace(chosen, fit=with_robust_std(chosen.fit, found.balance.record))
     errors_of_sizes = size_errors(chosen.fit.model, chosen.elements, robust.std())
