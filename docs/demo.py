@@ -6,11 +6,11 @@ The truth is read from the experiment file and compared afterwards; the identifi
 """
 
 import json
-import subprocess
 import sys
 from datetime import datetime
 from pathlib import Path
 
+from demo_command import rhythmid
 from rich.console import Console
 from rich.table import Table
 
@@ -19,15 +19,6 @@ from rhythmid.experiment import Experiment
 ROOT = Path(__file__).parents[1]
 EXPERIMENT = ROOT / "ros_ws/src/rhythmid_bringup/config/demo.yaml"
 MODEL = ROOT / "analysis/rhythmid/models/paper_hopper.yaml"
-
-
-def rhythmid(*arguments: str | Path) -> None:
-    """Run the command and end with its exit code if it fails."""
-    line = ["rhythmid", *map(str, arguments)]
-    print("$", *line, flush=True)
-    code = subprocess.call([sys.executable, "-m", "rhythmid.cli", *line[1:]])
-    if code:
-        sys.exit(code)
 
 
 def compare(experiment: Experiment, result: dict) -> Table:

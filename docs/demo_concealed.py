@@ -6,9 +6,7 @@ The plant node runs a model file with one element more than the nominal model. W
 random and written to a sealed file that nobody reads until the diagnosis is there.
 """
 
-import hashlib
 import json
-import subprocess
 import sys
 import time
 from datetime import datetime
@@ -16,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from demo_command import rhythmid, seal_of
 from rich.console import Console
 
 from rhythmid.elements.catalogue import load_catalogue
@@ -43,15 +42,6 @@ RECORDS = {
     "multisine": ({"type": "multisine", "rms": 0.4, "period": 5.0, "periods": 4, "band": [0.2, 8.0], "seed": 4}, 1.0),
     "unseen": ({"type": "chirp", "amplitude": 0.5, "band": [7.0, 0.2], "sweep": 15.0}, 2.0),
 }  # fmt: skip
-
-
-def rhythmid(*arguments: str | Path) -> None:
-    """Run the command and end with its exit code if it fails."""
-    line = ["rhythmid", *map(str, arguments)]
-    print("$", *line, flush=True)
-    code = subprocess.call([sys.executable, "-m", "rhythmid.cli", *line[1:]])
-    if code:
-        sys.exit(code)
 
 
 def conceal(folder: Path, seed: int) -> tuple[Path, Path]:
@@ -102,7 +92,7 @@ def main() -> None:
     folder.mkdir(parents=True)
     console = Console()
     _, sealed = conceal(folder, seed)
-    digest = hashlib.sha256(sealed.read_bytes()).hexdigest()
+    digest = seal_of(sealed)
     console.print(f"An effect is concealed in the plant (seed {seed}). Sealed: SHA-256 {digest[:16]}…")
     for record in RECORDS:
         rhythmid("run", folder / f"{record}.yaml", "--out", folder / record)
@@ -114,7 +104,7 @@ def main() -> None:
     )
     rhythmid("diagnose", *seen, "--model", NOMINAL, "--holdout", folder / "unseen", "--json", answer,
              "--report", report, "--save-model", augmented)  # fmt: skip
-    assert hashlib.sha256(sealed.read_bytes()).hexdigest() == digest
+    assert seal_of(sealed) == digest
     truth, found = (
         json.loads(sealed.read_text(encoding="utf-8")),
         json.loads(answer.read_text(encoding="utf-8")),

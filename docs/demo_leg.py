@@ -6,9 +6,7 @@ The leg of `rhythmid/models/legs` slides on a rail and stands on a floor. The pl
 its knee. Which one, where, and how much of it, is drawn at random and written to a sealed file that nobody reads until the diagnosis is there.
 """
 
-import hashlib
 import json
-import subprocess
 import sys
 import time
 from datetime import datetime
@@ -17,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from demo_command import rhythmid, seal_of
 from rich.console import Console
 
 from rhythmid.body.machine import Machine
@@ -32,15 +31,6 @@ EFFECTS = {  # what can be concealed, in sizes of some percent of the joint's to
     "constant_force": {"force": (0.4, 1.0)},
     "quadratic_drag": {"coefficient": (0.02, 0.06)},
 }
-
-
-def rhythmid(*arguments: str | Path) -> None:
-    """Run the command and end with its exit code if it fails."""
-    line = ["rhythmid", *map(str, arguments)]
-    print("$", *line, flush=True)
-    code = subprocess.call([sys.executable, "-m", "rhythmid.cli", *line[1:]])
-    if code:
-        sys.exit(code)
 
 
 def conceal(folder: Path, seed: int) -> tuple[Path, Path]:
@@ -69,7 +59,7 @@ def main() -> None:
     folder.mkdir(parents=True)
     console = Console()
     plant, sealed = conceal(folder, seed)
-    digest = hashlib.sha256(sealed.read_bytes()).hexdigest()
+    digest = seal_of(sealed)
     console.print(
         f"An effect is concealed at a joint of the leg (seed {seed}). Sealed: SHA-256 {digest[:16]}…"
     )
@@ -78,7 +68,7 @@ def main() -> None:
     answer, report, augmented = folder / "answer.json", folder / "answer.html", folder / "augmented.yaml"
     rhythmid("diagnose", folder / "seen", "--model", NOMINAL, "--signals", SIGNALS, "--holdout", folder / "unseen",
              "--json", answer, "--report", report, "--save-model", augmented)  # fmt: skip
-    assert hashlib.sha256(sealed.read_bytes()).hexdigest() == digest
+    assert seal_of(sealed) == digest
     truth = json.loads(sealed.read_text(encoding="utf-8"))
     found = json.loads(answer.read_text(encoding="utf-8"))
     named = [f"{effect['element']} at {effect['joint']}" for effect in found["missing"]]

@@ -1,12 +1,12 @@
 """The commands for machines of several joints, from simulation to diagnosis."""
 
-import importlib.util
 import json
 import subprocess
 import sys
 from importlib.resources import files
 from pathlib import Path
 
+import demo_leg
 import pytest
 from legged import fixed_leg
 from typer.testing import CliRunner
@@ -170,12 +170,7 @@ def test_what_cannot_be_done_is_told_in_one_line(bags: Path, arguments: list[str
 
 
 def test_the_demonstration_conceals_one_effect_at_one_joint_and_seals_what_it_was(tmp_path: Path):
-    path = Path(__file__).parents[2] / "docs" / "demo_leg.py"
-    spec = importlib.util.spec_from_file_location("demo_leg", path)
-    assert spec is not None and spec.loader is not None
-    demo = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(demo)
-    plant, sealed = demo.conceal(tmp_path, 3)
+    plant, sealed = demo_leg.conceal(tmp_path, 3)
     truth = json.loads(sealed.read_text())
     given, made = (Machine.load(one) for one in (LEGS / "leg.yaml", plant))
     more = {

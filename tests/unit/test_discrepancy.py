@@ -49,11 +49,11 @@ def test_many_rows_give_the_same_in_parts(monkeypatch):
     assert whole.any()
 
 
-@pytest.mark.parametrize("size", [0.5, 1.0, 3.0])
+@pytest.mark.parametrize("size", [0.5, 1.0, 3.0, 6.0])
 def test_intervals_hold_the_truth_beside_small_effects_that_the_model_lacks(size):
     plain, whole, _ = share_held(size)
-    assert plain < whole
-    assert 0.9 < whole < 0.98
+    assert plain < (0.91 if size < 1.0 else 0.8)
+    assert 0.9 < whole < 0.99
 
 
 def test_little_is_added_where_the_residual_is_noise():
