@@ -178,4 +178,4 @@ def test_the_demonstration_conceals_one_effect_at_one_joint_and_seals_what_it_wa
         for joint in given.joints
     }
     assert more == {joint: [truth["element"]] * (joint == truth["joint"]) for joint in given.joints}
-    assert [JointExperiment.load(tmp_path / f"{one}.yaml").duration for one in demo.RECORDS] == [8.0, 8.0]
+    assert [JointExperiment.load(tmp_path / f"{one}.yaml").duration for one in demo_leg.RECORDS] == [8.0, 8.0]
