@@ -23,7 +23,6 @@ from rhythmid.diagnose.joints.joint_answer import MachineDiagnosis
 from rhythmid.diagnose.joints.joint_case import JointResult, diagnose_joint, name_of
 from rhythmid.diagnose.joints.joint_compose import compose_machine
 from rhythmid.diagnose.joints.misfit import misfits
-from rhythmid.diagnose.joints.shared_cause import shared_cause
 from rhythmid.diagnose.joints.wrong_link import WrongLink, wrong_link
 from rhythmid.elements.catalogue import Catalogue, load_catalogue
 from rhythmid.errors import InputError
@@ -170,13 +169,8 @@ def _explained(
             break
         best = _heaviest(found, set(links))
         if best is None:
-            stated = {joint: stated_at(one) for joint, one in found.items()}
-            cause = shared_cause(balances, found, stated, links)
-            best = None if cause is None else (cause.parameter, cause.shown)
-        if best is None:
             break
         link, result = best
-        found = {**found, result.joint: result}
         links[link] = wrong_link(balances, records, found, link, result)
         machine = links[link].put_right(machine)
         balances = JointBalances.of(machine, records, balances)
