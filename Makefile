@@ -48,7 +48,7 @@ test: lint ## Run the linters and all tests
 lint: $(VENV)/.packages ## Run ruff and pyright
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet .
-	$(BIN)/pyright --pythonpath $(BIN)/python
+	$(BIN)/pyright --threads 2 --pythonpath $(BIN)/python
 
 format: install ## Format the code
 	$(BIN)/ruff check --fix .

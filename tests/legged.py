@@ -13,6 +13,19 @@ from rhythmid.record.joint_record import JointRecord
 from rhythmid.record.record import Channel, Record
 from rhythmid.simulation.signal import continuous, spline
 
+# two links that hang from a base, with hinges about one horizontal axis
+TWO_LINKS = """<robot name="two">
+  <link name="base"/>
+  <link name="upper"><inertial><origin xyz="0 0 -0.2"/><mass value="2"/>
+    <inertia ixx="0.03" iyy="0.03" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="lower"><inertial><origin xyz="0 0.02 -0.15" rpy="0.1 0.2 0"/><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.012" izz="0.004" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="one" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="3" effort="50" velocity="10"/></joint>
+  <joint name="two" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0 0 -0.4"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="3" effort="50" velocity="10"/></joint>
+</robot>
+"""
 MODELS = Path(str(files("rhythmid"))) / "models" / "legs"
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from legged import MODELS, hop, recorded, references
+from legged import MODELS, TWO_LINKS, hop, recorded, references
 
 from rhythmid.body.machine import Machine
 from rhythmid.body.mujoco_body import MujocoBody
@@ -13,18 +13,6 @@ from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
 from rhythmid.errors import InputError
 
 GRIPPER = 0.35  # kg
-TWO_LINKS = """<robot name="two">
-  <link name="base"/>
-  <link name="upper"><inertial><origin xyz="0 0 -0.2"/><mass value="2"/>
-    <inertia ixx="0.03" iyy="0.03" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="lower"><inertial><origin xyz="0 0.02 -0.15" rpy="0.1 0.2 0"/><mass value="1"/>
-    <inertia ixx="0.01" iyy="0.012" izz="0.004" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="one" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
-    <limit lower="-3" upper="3" effort="50" velocity="10"/></joint>
-  <joint name="two" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0 0 -0.4"/><axis xyz="0 1 0"/>
-    <limit lower="-3" upper="3" effort="50" velocity="10"/></joint>
-</robot>
-"""
 
 
 def random_motion(body: MujocoBody) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

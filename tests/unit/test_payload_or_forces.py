@@ -4,24 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from legged import recorded, references
+from legged import TWO_LINKS, recorded, references
 
 from rhythmid.body.machine import Machine
 from rhythmid.diagnose.joints.joint_diagnosis import diagnose_machine
 from rhythmid.elements.catalogue import load_catalogue
 
-ARM = """<robot name="two">
-  <link name="base"/>
-  <link name="upper"><inertial><origin xyz="0 0 -0.2"/><mass value="2"/>
-    <inertia ixx="0.03" iyy="0.03" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="lower"><inertial><origin xyz="0 0 -0.15"/><mass value="1"/>
-    <inertia ixx="0.01" iyy="0.012" izz="0.004" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="one" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
-    <limit lower="-3" upper="3" effort="50" velocity="10"/></joint>
-  <joint name="two" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0 0 -0.4"/><axis xyz="0 1 0"/>
-    <limit lower="-3" upper="3" effort="50" velocity="10"/></joint>
-</robot>
-"""
 PATH = (
     "{command: [{input_delay: {delay: 0.0}}, {position_control: {proportional: {value: 80, fixed: true}, "
     "derivative: {value: 2.0, fixed: true}}}], force: [{viscous_damper: {damping: 0.1}}]}"
@@ -31,7 +19,7 @@ CARRIED = 0.1  # kg
 
 @pytest.fixture
 def arm(tmp_path: Path) -> Machine:
-    (tmp_path / "two.urdf").write_text(ARM)
+    (tmp_path / "two.urdf").write_text(TWO_LINKS)
     (tmp_path / "two.yaml").write_text(
         f"body: {{urdf: two.urdf, contacts: false}}\njoints:\n  one: {PATH}\n  two: {PATH}\n"
     )
