@@ -14,6 +14,7 @@ from rhythmid.diagnose.effort.fitted import Fitted
 from rhythmid.diagnose.effort.kin import contained
 from rhythmid.diagnose.effort.reference import residual_with_map
 from rhythmid.diagnose.effort.remainder import remainder_of
+from rhythmid.diagnose.effort.run import small_effects
 from rhythmid.diagnose.effort.search import EffortSearch, search_effort
 from rhythmid.diagnose.evidence import predict
 from rhythmid.diagnose.rejections import RULES, SHAPES, Claim, Rejection, rejections_of
@@ -64,6 +65,16 @@ def test_a_hysteresis_that_hardly_yields_within_the_travel_is_not_named_in_the_p
 def test_a_name_predicts_no_worse_than_unknown_physics(friction):
     chosen, nominal, unknown = errors_of(friction, friction.chosen, friction.nominal)
     assert chosen < 1.1 * unknown and nominal > 10.0 * unknown
+
+
+def test_a_law_that_the_catalogue_lacks_widens_the_standard_deviations_of_what_takes_it_up(friction):
+    nothing = CATALOGUE.without(*CATALOGUE)
+    place = 1 + friction.nominal.fit.names.index("viscous_damper.damping")  # the alignment is first
+    lacking, whole = (
+        small_effects(friction.balance, one, nothing)[place] / one.fit.std[place]
+        for one in (friction.nominal, friction.chosen)
+    )
+    assert lacking > 3.0 and whole < 0.5
 
 
 def test_what_is_left_by_the_nominal_model_goes_with_the_speed(friction):

@@ -201,10 +201,10 @@ def _among_models(
     fit = chosen.fit
     std = fit.std.copy()  # of the alignment first, which belongs to no model
     std[1:] = np.hypot(std[1:], np.sqrt(np.diag(between)))
-    return replace(chosen, fit=replace(fit, std=np.hypot(std, _unnamed(balance, chosen, catalogue))))
+    return replace(chosen, fit=replace(fit, std=np.hypot(std, small_effects(balance, chosen, catalogue))))
 
 
-def _unnamed(balance: Balance, chosen: Fitted, catalogue: Catalogue) -> Array:
+def small_effects(balance: Balance, chosen: Fitted, catalogue: Catalogue) -> Array:
     """Standard deviations (p,) of the fit's parameters that come from small effects which it lacks: those of the catalogue, and any function
     of the motion."""
     fit = chosen.fit
