@@ -18,7 +18,7 @@ from rhythmid.diagnose.case import SEARCHED, Budget
 from rhythmid.diagnose.constants import FOLLOWS, PRACTICAL
 from rhythmid.diagnose.search.backward import eliminate
 from rhythmid.diagnose.search.order import in_best_order
-from rhythmid.diagnose.search.proposals import REFITTED, better_of, from_given, proposals
+from rhythmid.diagnose.search.proposals import REFITTED, WORTH, better_of, from_given, proposals, refitted
 from rhythmid.diagnose.search.refit import (
     fine_enough,
     near_under_noise,
@@ -45,8 +45,6 @@ from rhythmid.progress import Tell
 
 Array = NDArray[np.float64]
 
-# difference of the information criterion below which two models are indistinguishable
-WORTH = 10.0
 SHARE = 5e-4  # of what is explained already, below which a further effect is an imperfection of the others
 LEVEL = 0.01  # false-alarm rate of a round's score tests, over the whole catalogue
 GROUPS = 3  # of so many elements that are refitted for the first effect, one after the other, while none does better
@@ -221,7 +219,7 @@ def _cut_off(state: _State) -> list[tuple[tuple[str, ...], str]]:
 def _refitted(task: _Task, state: _State) -> tuple[_State, list[Trial]]:
     """Refits of the models that the last round proposes, those that do better than the best so far, best first."""
     here, now = state.here, replace(state.rounds[-1], added=state.here.added)
-    count = REFITTED if not state.best.added else REFITTED - 1
+    count = refitted(now, REFITTED if not state.best.added else REFITTED - 1)
     begun = task.series, Origin.of(here), here.noise, task.step
     found, failed = [], []
     # where nothing is found yet and none of the best does better, they were kin that the scores, which are linear, promise too much of

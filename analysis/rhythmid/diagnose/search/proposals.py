@@ -22,6 +22,9 @@ from rhythmid.model import Model
 # elements of a round that are refitted because they score best along the whole records, and in windows. On 90 cases of all
 # machines of the proof the right one, or its kin, was among the first four or among the first three in windows
 REFITTED, LOCAL = 4, 3
+# difference of the information criterion below which two models are indistinguishable: of elements whose statistics are as close the
+# one that is missing may have any, for a score is linear in what a refit is not
+WORTH = 10.0
 MANY = 5  # guesses of one element beyond which its shape matters so much that more of them are tried
 
 
@@ -44,6 +47,12 @@ def proposals(
         made.append(propose(base, group[0].element, [one.start for one in group[:2]], now.added, chi2))
         enough.append(-math.inf)
     return made, enough
+
+
+def refitted(now: Round, least: int) -> int:
+    """Number of elements of a round to refit: at least so many, and all that score as well as the best."""
+    best = distinct(now.scores, len(now.scores))
+    return max(least, sum(one.statistic > best[0][0].statistic - WORTH for one, _ in best))
 
 
 def from_given(
