@@ -1,9 +1,7 @@
 """What a design predicts is what its file then gives: scatter of the joint fit over noise drawn anew.
 
-`benchmarks/design_prediction.py` does the same with more runs, on larger designs.
+`benchmarks/design_prediction.py` does the same with more runs, for combs of tones too, and on larger designs.
 """
-
-from dataclasses import replace
 
 import pytest
 
@@ -20,7 +18,6 @@ WANTED = Requirements(
     duration=40.0, band=(0.3, 5.0), max_effort=0.05, envelope=(0.12, 0.18), noise_std=2e-5, rate=250, harmonics=2,
     input_delay=0.0403, measurement_delay=0.0551,
 )  # fmt: skip
-COMB = replace(WANTED, kind="comb", duration=50.0, harmonics=1, rate=500)
 RUNS = 100  # the scatter of a scatter is 7 % then; the draws are fixed
 OFF = {
     "linear_spring.stiffness": 202.0,
@@ -30,15 +27,14 @@ OFF = {
 }
 
 
-@pytest.mark.parametrize("wanted", [WANTED, COMB], ids=["multisine", "comb"])
-def test_the_predicted_standard_deviations_are_within_a_fifth_of_monte_carlo(wanted, tmp_path):
-    made = design(hopper(), wanted)
+def test_the_predicted_standard_deviations_are_within_a_fifth_of_monte_carlo(tmp_path):
+    made = design(hopper(), WANTED)
     save_design(made, HOPPER, tmp_path / "design")
     record = planned_record(Experiment.load(tmp_path / "design" / EXPERIMENT))
     machine = made.prediction.fit.model
     start = machine.with_values(OFF)
     found = [
-        Drawn.of(fit_from(start, noisy(record, wanted.noise_std, seed)), machine.free) for seed in range(RUNS)
+        Drawn.of(fit_from(start, noisy(record, WANTED.noise_std, seed)), machine.free) for seed in range(RUNS)
     ]
     predicted = made.prediction.parameters | {
         f"{which}_delay.delay": estimate

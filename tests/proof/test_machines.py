@@ -18,8 +18,6 @@ from rhythmid.model import Model
 
 NAMED: dict[str, Callable[[], Twin]] = {
     "axis under a controller, sticking and slipping, driven by its motor's effort": twins.axis,
-    "joint driven by a current, velocity measured": twins.joint,
-    "pendulum driven through large swings": twins.pendulum,
     "servo of which only command and motion are known": twins.servo,
     "free decay without any input": twins.decay,
 }
@@ -29,6 +27,8 @@ NULLS: dict[str, Callable[[], Twin]] = {
     "film at 30 Hz": lambda: twins.camera(""),
 }
 SLOW: dict[str, Callable[[], Twin]] = {
+    "joint driven by a current, velocity measured": twins.joint,
+    "pendulum driven through large swings": twins.pendulum,
     # not named: the position, integrated from the speed, drifts along the gravity
     "joint, velocity, with a heavy link": lambda: twins.joint(0.0, weight=0.5),
     "axis in closed loop from its reference": lambda: twins.axis(known="reference"),
