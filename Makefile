@@ -9,7 +9,7 @@ UPLOT    := analysis/rhythmid/report/vendor/uplot
 UPLOT_VERSION := 1.6.32
 
 .DEFAULT_GOAL := help
-.PHONY: help install test lint format demo demo-leg docs picture benchmark naming docker dist vendor lock clean
+.PHONY: help install test test-long lint format demo demo-leg docs picture benchmark naming docker dist vendor lock clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -37,13 +37,16 @@ $(VENV)/.warm: $(VENV)/.packages
 	@$(BIN)/python -m rhythmid.warm_up || true
 	@touch $@
 
-test: lint ## Run the linters and all tests
+test: lint ## Run the linters and all tests but the long ones
 	@# folders with the longest files first, so that neither worker ends long after the other; a test that fails twice fails, one that
 	@# passes the second time is listed as RERUN
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder --reruns 1 -r fEsxXR \
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder --reruns 1 -r fEsxXR -m "not long" \
 		tests/proof tests/browser tests/faults tests/unit
 	@# what runs in real time has the machine to itself; much of it waits, so that two go side by side
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --reruns 1 -r fEsxXR tests/ros
+
+test-long: install ## Run the tests that `make test` leaves out because they take long
+	$(BIN)/python -m pytest --numprocesses 2 -m long tests
 
 lint: $(VENV)/.packages ## Run ruff and pyright
 	$(BIN)/ruff check .

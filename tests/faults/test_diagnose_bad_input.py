@@ -81,6 +81,7 @@ def test_what_one_amplitude_shows_clearly_is_named():
     assert [effect.element for effect in found.missing] == ["coulomb_friction"]
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_records_that_are_mostly_noise_decide_nothing_and_ask_for_more():
     quiet = ({"type": "chirp", "amplitude": 1e-3, "sweep": 8.0, "band": [0.0, 7.0]}, 1e-3)
@@ -97,6 +98,7 @@ def test_records_of_different_machines_get_no_name(plain):
     assert "the structure of the model are wrong" in found.summary
 
 
+@pytest.mark.long
 def test_a_strong_effect_is_not_mistaken_for_two_machines():
     machine = hopper().with_element(CATALOGUE["cubic_stiffness"], {"coefficient": 1e4})
     found = run(records(machine, (WEAK, STRONG), seed=7))

@@ -4,6 +4,7 @@ A rigid nominal model loses it altogether; tied to the record, what it lacks is 
 """
 
 import numpy as np
+import pytest
 from synthetic import integrate, noisy, tones
 
 from rhythmid.diagnose.diagnosis import diagnose
@@ -40,6 +41,7 @@ def records() -> list[Record]:
     return [record(1.0), record(2.5)]
 
 
+@pytest.mark.long
 def test_an_elastic_gear_is_named_and_measured_though_the_rigid_model_loses_the_joint():
     result = diagnose(records(), Model.from_text(NOMINAL)).diagnosis
     assert [effect.element for effect in result.missing] == ["second_mode"]

@@ -43,6 +43,7 @@ def records() -> list[Record]:
     return [one(1.0), one(1.4)]
 
 
+@pytest.mark.long
 def test_a_hopper_that_leaves_the_ground_is_told_so_and_its_leg_is_measured():
     result = diagnose(records(), Model.from_text(NOMINAL)).diagnosis
     assert result.verdict == "missing_physics"

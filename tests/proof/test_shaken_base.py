@@ -1,6 +1,7 @@
 """A rig whose damper rides on the base that shakes it, by equations of its own: it is not taken for the drag of the air."""
 
 import numpy as np
+import pytest
 from synthetic import integrate, noisy
 
 from rhythmid.diagnose.diagnosis import diagnose
@@ -41,6 +42,7 @@ def records() -> list[Record]:
     return [one(4e-4), one(8e-4)]
 
 
+@pytest.mark.long
 def test_quadratic_damping_that_rides_on_the_base_is_named_and_measured():
     result = diagnose(records(), Model.from_text(NOMINAL)).diagnosis
     assert result.verdict == "missing_physics"

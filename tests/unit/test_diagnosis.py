@@ -143,6 +143,7 @@ def test_all_parameters_fixed_is_refused_with_the_mend():
         diagnose(records(hopper())[:1], fixed, catalogue=CATALOGUE)
 
 
+@pytest.mark.long
 def test_a_drift_beside_a_strong_effect_does_not_pass_for_the_colour_of_the_noise():
     damped = hopper().with_element(CATALOGUE["flight_damping"], {"damping": 5.0})
     machine = damped.with_element(CATALOGUE["sensor_drift"], {"rate": 1e-4})

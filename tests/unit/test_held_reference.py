@@ -93,6 +93,7 @@ def test_a_lead_at_the_end_of_what_is_possible_is_none():
     assert lead_of_most(tried, np.array([-tried, -tried])) is None
 
 
+@pytest.mark.long
 def test_a_wrong_link_is_named_alone_where_the_efforts_of_both_joints_are_of_instants():
     heavy = leg().with_inertial({"thigh.mass": 0.6 * leg().body.parameters["thigh.mass"]})
     found = diagnose_machine([hopped(heavy, held=True)], leg()).diagnosis

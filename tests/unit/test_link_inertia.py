@@ -123,6 +123,7 @@ def test_a_links_wrong_inertia_is_named_with_its_value_and_the_files(leg: Machin
     assert answer.machine.body.parameters["shank.inertia"] == pytest.approx(share * known, abs=0.1 * known)
 
 
+@pytest.mark.long
 def test_inertias_about_the_joints_in_the_file_are_named_though_the_rotors_are_free(leg: Machine):
     """A file that takes both for those about the centres: what is too much at the first joint is more than its rotor."""
     bare = leg.with_inertial({"hip.armature": 0.0})

@@ -22,6 +22,7 @@ def test_a_links_wrong_mass_has_the_share_and_the_probability_that_the_evidence_
     assert one.heldout_gain > 0.05
 
 
+@pytest.mark.long
 def test_a_links_wrong_mass_has_only_its_part_of_the_mismatch_beside_a_friction():
     machine = Machine.load(MODELS / "leg.yaml")
     rough = machine.with_inertial({"shank.mass": 1.5 * machine.body.parameters["shank.mass"]}).with_element(

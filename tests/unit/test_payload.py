@@ -108,6 +108,7 @@ def test_a_payload_beside_the_end_of_its_link_is_named_with_its_mass_and_place()
     assert {one.verdict for one in found.joints.values()} == {"consistent"}
 
 
+@pytest.mark.long
 def test_an_arms_hand_with_a_gripper_is_named_as_a_payload():
     machine = Machine.load(MODELS / "arm.yaml")
     loaded = machine.with_inertial({"link6.payload": GRIPPER})
