@@ -94,12 +94,12 @@ def test_the_terminal_says(line):
     assert line in printed()
 
 
-def test_hypotheses_stand_in_a_table_with_differences_and_probabilities():
+def test_hypotheses_stand_in_a_table_with_differences_and_weights_of_evidence():
     rows = [line for line in printed().splitlines() if line.startswith("│")][1:]
     best, chosen, nominal = rows
     assert "coulomb_friction + position_ripple" in best and "best" in best
-    assert "coulomb_friction (chosen)" in chosen and "2 ± 0.6" in chosen and "97 %" in chosen
-    assert "nominal model" in nominal and "500 ± 150" in nominal and "< 0.1 %" in nominal
+    assert "coulomb_friction (chosen)" in chosen and "2 ± 0.6" in chosen and "0.97" in chosen
+    assert "nominal model" in nominal and "500 ± 150" in nominal and "0.00" in nominal
 
 
 def test_hypotheses_that_take_no_share_of_the_evidence_have_no_probability():

@@ -284,6 +284,14 @@ def test_what_effects_remove_that_are_hardly_true_counts_as_unexplained(floor, e
     assert verdict(made)[0] == expected
 
 
+@pytest.mark.parametrize(("second", "stated"), [("ripple", True), ("cubic", False)])
+def test_a_small_further_line_of_the_same_law_does_not_put_the_law_in_doubt(second, stated):
+    both = replace(supposed(f"ripple {second}_2", predicted(0.04, 900.0)), names=("ripple", second))
+    alone = supposed("ripple", predicted(0.16, 500.0))
+    _, decision = decided(contest(NOMINAL, alone, both), errors={f"{second}_2": 1.0})
+    assert (decision.probability["ripple"] >= 0.8) == stated
+
+
 def test_names_that_are_not_stood_by_have_no_high_joint_probability():
     score = predicted(0.1).score
     rivals = [supposed(name, predicted(0.1, score, seed=i)) for i, name in enumerate("abc")]

@@ -199,7 +199,7 @@ def decide(
     sure = {
         label: chance_of_law(
             shares[label],
-            lost + removed_by([one for one in open_ if one != label], chosen, contest),
+            lost + removed_by([one for one in open_ if names[one] != names[label]], chosen, contest),
             size_errors.get(label, 0.0),
             family[label],
         )

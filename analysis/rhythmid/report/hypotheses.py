@@ -7,7 +7,7 @@ from typing import Any
 from rhythmid.report.blocks import Block, Bullets, Drawing, Fold, Heading, Paragraph, Section, Table
 from rhythmid.report.evidence_chart import Evidence, draw_evidence
 from rhythmid.report.findings import Findings
-from rhythmid.report.quantity import NONE, number, percent, plain, plus_minus, pretty_name, probability
+from rhythmid.report.quantity import NONE, number, percent, plain, plus_minus, pretty_name
 from rhythmid.report.row_chart import Bar, draw_bars
 
 HYPOTHESES_SHOWN, REJECTIONS_SHOWN, SCORES_SHOWN = 12, 12, 12
@@ -38,17 +38,23 @@ def hypotheses_section(found: Findings) -> Section:
             "fit did not see; a simpler model is kept while the odds against it are below 40 to 1."
         )
     ]
-    stands = found.result["verdict"] in ("missing_physics", "consistent")
-    weight = "probability" if stands else "weight of evidence"
-    columns = ("hypothesis", "it says", "predicts worse by", weight, "held-out error", "verdict")
+    columns = (
+        "hypothesis",
+        "it says",
+        "predicts worse by",
+        "weight of evidence",
+        "held-out error",
+        "verdict",
+    )
     weighed = most_weighed([(row["elements"], row["probability"]) for row in rows])
     table = [_row(found, row, chosen, against, weighed) for row in rows]
     marked = [index for index, row in enumerate(rows) if sorted(row["elements"]) == chosen]
     caption = (
         "Predicts worse by: difference of the logarithm of the predictive density to the best hypothesis, ± one standard error over "
-        f"stretches of the records. The {'probabilities' if stands else 'weights'} divide the evidence among hypotheses with no more effects than the chosen one."
+        "stretches of the records. The weights divide the evidence among hypotheses with no more effects than the chosen one; the probability of a "
+        "name adds those of all hypotheses that hold it, or a richer law that contains it."
     )
-    blocks.append(_evidence(found, rows[:HYPOTHESES_SHOWN], chosen, weighed, stands))
+    blocks.append(_evidence(found, rows[:HYPOTHESES_SHOWN], chosen, weighed))
     first = tuple(index for index in marked if index < HYPOTHESES_SHOWN)
     blocks.append(Table(caption, columns, tuple(table[:HYPOTHESES_SHOWN]), first))
     if len(table) > HYPOTHESES_SHOWN:
@@ -65,7 +71,7 @@ def hypotheses_section(found: Findings) -> Section:
 
 
 def _evidence(
-    found: Findings, rows: Sequence[Mapping[str, Any]], chosen: Sequence[str], weighed: int, stands: bool
+    found: Findings, rows: Sequence[Mapping[str, Any]], chosen: Sequence[str], weighed: int
 ) -> Drawing:
     """The hypotheses as a chart; the reasons why some are rejected show under the pointer, and in the table below."""
     reasons = {tuple(sorted(row["hypothesis"])): str(row["reason"]) for row in found.result["rejections"]}
@@ -73,7 +79,7 @@ def _evidence(
     for row in rows:
         elements = tuple(row["elements"])
         reason, taken = reasons.get(tuple(sorted(elements))), sorted(elements) == chosen
-        weight = "rejected" if reason and not taken else _weight(row, weighed, stands)
+        weight = "rejected" if reason and not taken else _weight(row, weighed)
         behind = plus_minus(row["score_difference"], row["standard_error"] or 0.0)
         made.append(
             Evidence(
@@ -92,7 +98,7 @@ def _evidence(
         f"The {len(made)} best hypotheses" if len(made) > 1 else "The only hypothesis",
         draw_evidence(
             f"Hypotheses by how much worse than the best they predict: {words}.", made, LEAST_ODDS, "40 to 1",
-            "probability" if stands else "weight",
+            "weight",
         ),
         "By how much each predicts worse than the best one the stretches that its fit did not see, ± one standard error. Right of the "
         "dotted line the odds against a hypothesis are more than 40 to 1. A dash: it has more effects than the chosen one.",
@@ -100,11 +106,9 @@ def _evidence(
     )  # fmt: skip
 
 
-def _weight(row: Mapping[str, Any], weighed: int, stands: bool) -> str:
-    """Probability of a hypothesis, or its weight where no name stands; a dash where it does not share in the evidence."""
-    if len(row["elements"]) > weighed:
-        return NONE
-    return probability(row["probability"]) if stands else f"{row['probability']:.2f}"
+def _weight(row: Mapping[str, Any], weighed: int) -> str:
+    """Weight of a hypothesis; a dash where it does not share in the evidence."""
+    return NONE if len(row["elements"]) > weighed else f"{row['probability']:.2f}"
 
 
 def most_weighed(hypotheses: Sequence[tuple[Sequence[str], float]]) -> int:
@@ -154,7 +158,7 @@ def _row(
         said = "chosen"
     elif interchangeable(elements, chosen, found.result["indistinguishable"]):
         said = "as good as the chosen one"
-    chance = _weight(row, weighed, found.result["verdict"] in ("missing_physics", "consistent"))
+    chance = _weight(row, weighed)
     kind = KINDS.get(row["kind"], pretty_name(row["kind"]))
     return name, kind, behind, chance, percent(row["heldout_nrmse"]), said
 

@@ -82,13 +82,12 @@ def _print_hypotheses(found: Diagnosis, console: Console) -> None:
     ]
     best = min(len(found.hypotheses), HYPOTHESES_SHOWN)
     weighed = most_weighed([(one.elements, one.probability) for one in found.hypotheses])
-    stands = found.verdict in ("missing_physics", "consistent")
-    figures = ("worse by", "probability" if stands else "weight of evidence", "held-out error")
+    figures = ("worse by", "weight of evidence", "held-out error")
     rows = []
     for one in shown:
         behind = "best" if one.score_difference == 0.0 else _worse(one.score_difference, one.standard_error)
         held = NONE if one.heldout_nrmse is None else f"{number(100.0 * one.heldout_nrmse, 3)} %"
-        weight = _weight(one.probability, stands) if len(one.elements) <= weighed else NONE
+        weight = f"{one.probability:.2f}" if len(one.elements) <= weighed else NONE
         name = (" + ".join(one.elements) or NOMINAL) + (" (chosen)" if _is_chosen(found, one) else "")
         rows.append((name, one.kind.replace("_", " "), behind, weight, held))
     print_table(
@@ -163,12 +162,6 @@ def _probability(value: float) -> str:
     return (
         f"> {100.0 * (1.0 - LEAST_PROBABILITY):g} %" if value > 1.0 - LEAST_PROBABILITY else _percent(value)
     )
-
-
-def _weight(value: float, stands: bool) -> str:
-    """A hypothesis' weight: a probability in percent where the verdict stands, else a plain share between 0 and 1, for among
-    hypotheses of which none explains the records a weight only says which is the nearest."""
-    return _probability(value) if stands else f"{value:.2f}"
 
 
 def _percent(share: float) -> str:

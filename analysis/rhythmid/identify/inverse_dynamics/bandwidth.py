@@ -67,13 +67,18 @@ def bandwidth_below(motions: Sequence[Motion], motion: float, dominant: float, l
 
 
 def _of_motion(raw: Stretch) -> tuple[float, float]:
-    """Highest frequency [Hz] at which the motion stands above its floor, and its strongest one."""
+    """Highest frequency [Hz] at which the motion stands above its floor, and its strongest one.
+
+    The spectrum may fall to the floor between two lines. The band goes on behind such a gap where the velocity has more power there above
+    `ABOVE` times the floor than it lacks in the gap.
+    """
     length = max(min(len(raw.output), 64), len(raw.output) // SEGMENTS)
     rate = 1.0 / raw.period
     frequency, power = welch(raw.output - raw.output.mean(), rate, nperseg=length, detrend="linear")
     floor = float(np.median(power[len(power) // 2 :]))
-    below = np.flatnonzero(power[1 + int(np.argmax(power[1:])) :] < ABOVE * floor)
-    last = 1 + int(np.argmax(power[1:])) + int(below[0]) if len(below) else len(power) - 1
+    peak = 1 + int(np.argmax(power[1:]))
+    gained = np.cumsum(frequency[peak:] ** 2 * (power[peak:] - ABOVE * floor))
+    last = min(peak + int(np.argmax(gained)) + 1, len(power) - 1)
     if floor < FLOORLESS * float(power.max()):
         last = len(power) - 1
     whole = np.abs(np.fft.rfft(detrend(raw.output) * np.hanning(len(raw.output))))

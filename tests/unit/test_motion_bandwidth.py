@@ -1,0 +1,30 @@
+"""Up to which frequency a motion counts as measured: where its spectrum stands above its floor, gaps between lines included."""
+
+import numpy as np
+import pytest
+
+from rhythmid.identify.inverse_dynamics.bandwidth import bandwidth_of_motion
+from rhythmid.identify.inverse_dynamics.motion import Stretch
+
+RATE, NOISE = 1000.0, 1e-4
+
+
+def measured(line: float, seed: int) -> Stretch:
+    """Ten seconds of a motion at 1 and 3 Hz with a line at 60 Hz of this amplitude, and white noise."""
+    time = np.arange(0.0, 10.0, 1.0 / RATE)
+    motion = (
+        np.sin(2.0 * np.pi * time) + 0.1 * np.sin(6.0 * np.pi * time) + line * np.sin(120.0 * np.pi * time)
+    )
+    noise = NOISE * np.random.default_rng(seed).standard_normal(len(time))
+    return Stretch(0, "record", time, motion + noise, np.zeros(len(time)), 1.0 / RATE, "effort", "position")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_line_far_above_the_rest_of_the_motion_is_within_the_band(seed):
+    assert 60.0 < bandwidth_of_motion([measured(2e-3, seed)])[0] < 70.0
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("line", [0.0, 3e-5])
+def test_noise_and_a_line_that_hardly_stands_above_it_do_not_widen_the_band(seed, line):
+    assert bandwidth_of_motion([measured(line, seed)])[0] < 40.0
