@@ -128,8 +128,10 @@ def diagnose_machine(
 
 @dataclass(frozen=True, eq=False)
 class _Explained:
-    """The results of all joints: the machine with the corrected parameters of links, and the `leads` [s] and the `delay` of
-    references that were taken into account."""
+    """The results of all joints.
+
+    `machine` has the corrected parameters of links; the `leads` [s] and the `delay` of references were taken into account.
+    """
 
     machine: Machine
     found: Mapping[str, JointResult]
