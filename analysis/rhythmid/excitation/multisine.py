@@ -13,7 +13,7 @@ from scipy.fft import next_fast_len
 from rhythmid.errors import InputError
 from rhythmid.excitation.excitation import Array, Excitation
 
-FINENESS = 64  # samples in the shortest period of the grid on which the peak is sought; it is missed by a thousandth at most (1 - cos(pi/64))
+FINENESS = 64  # samples in the shortest period, for finding the peak; it is missed by a thousandth at most (1 - cos(pi/64))
 
 
 class Multisine(Excitation):
