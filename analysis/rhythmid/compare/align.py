@@ -59,7 +59,7 @@ def active(channel: Channel | None) -> bool:
 
 
 def white_level(value: Array) -> float:
-    """Standard deviation of the white noise in samples of a smooth signal, from their third differences."""
+    """Standard deviation of the white noise in samples (n,) of a smooth signal, in their unit, from third differences."""
     if len(value) < 16:
         return 0.0
     return float(USUAL * np.median(np.abs(np.diff(value, 3))) / math.sqrt(20.0))

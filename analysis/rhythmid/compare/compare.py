@@ -55,27 +55,27 @@ class Comparison(Result):
     simulation, recording
         Names of the two records.
     alignment
-        Offset between their clocks, and what it was found from.
+        Offset between their clocks, and the channel that it was found from.
     through_model
         Whether a model ran in the simulation's place.
     rates
-        Of simulation and recording [Hz].
+        Sample rates of simulation and recording [Hz].
     pair
-        Both on common times.
+        Both motions at common times.
     nrmse
         Root mean square of the difference over the standard deviation of the recording.
     explanations
         Changes that reduce the difference, the largest share first.
     left
-        What the explanations leave of the difference; float64[n], in `unit`.
+        Remainder of the difference after the explanations; float64[n], in `unit`.
     place
         Where in time, frequency, cycle and state the difference lies.
     harmonics
-        Of the forcing, recording over simulation.
+        Ratios of the forcing's harmonics, recording over simulation.
     unit
-        Of the measured motion.
+        Unit of the measured motion.
     notes
-        What the user should know, one line each.
+        Notes for the user, one line each.
     """
 
     simulation: str

@@ -44,7 +44,7 @@ def one_period(lines: Lines, weights: Array, phases: Array) -> Array:
 
 
 def clipped(lines: Lines, weights: Array, phases: Array, rounds: int = ROUNDS) -> tuple[float, Array]:
-    """Smallest crest factor that clipping reaches from these phases [rad], and its phases [rad]."""
+    """Smallest crest factor that clipping reaches from these phases [rad] (n,), and its phases [rad] (n,)."""
     found = phases
     best, chosen = np.inf, phases
     for level in np.linspace(HARSHEST, GENTLEST, rounds):

@@ -44,7 +44,7 @@ RICHER = 0.02
 PRACTICAL = 0.003
 # the same as a share of the effort, of which models of real machines leave a larger share
 PRACTICAL_EFFORT = 0.005
-# standard errors within which a simpler or related law predicts as well (A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413)
+# standard errors within which a simpler or related law counts as predicting equally well (A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413)
 EQUIVALENT = 2.0
 
 # share of a bound, or of an effect, within which a value counts as being there: rounding of a descent that stopped at it
@@ -115,7 +115,7 @@ BETTER_STEP, PATIENCE = 0.9, 2
 # ratio to which all steps together must lower it: this shows an error that accumulates, not one that noise or an effect makes at once
 BETTER_TOGETHER = 0.6
 
-# --- what calibration may take up -----------------------------------------------------------------------------------
+# --- what calibration may absorb ------------------------------------------------------------------------------------
 # [samples] how far the input delay may be negative, and the longest delay that counts as a nuisance. An input that is not held but
 # simulated as held comes out half a sample early. Every log may have a short delay; a longer one is a hypothesis of its own
 EARLIEST, LATEST = 1.5, 2.5

@@ -78,7 +78,7 @@ def _rates(kind: str, scores: Sequence[Score]) -> dict[str, Rate]:
 
 
 def _kind_rates(scores: Sequence[Score]) -> dict[str, Rate]:
-    """How often the family of a missing effect is stated, and how many of the stated families are wrong."""
+    """Rate of cases in which the dominant effect's family is stated, and rate of stated families that are wrong."""
     stated = [one for score in scores for one in score.kinds_stated]
     return {
         f"family of the dominant effect stated with p ≥ {SURE}": rate(scores, lambda s: s.kind_right),

@@ -27,7 +27,7 @@ from numba import njit
     RETURN, MOMENT, HANGING, PROPORTIONAL, DERIVATIVE, INTEGRAL, SLIDING, SENSED,
 ) = range(16)  # fmt: skip
 PLACES = ("command", "actuator", "leg", "contact", "body", "sensor")
-SWITCHING = 2e-4  # half the speed range over which a damper sets in smoothly [m/s]
+SWITCHING = 2e-4  # half the speed range over which a damper with a threshold sets in [m/s]
 
 
 @dataclass(frozen=True)

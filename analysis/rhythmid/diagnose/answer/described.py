@@ -48,7 +48,7 @@ def qualities(records: Sequence[Record], holdout: Sequence[Record]) -> tuple[Rec
 
 
 def words_of(elements: Iterable[Element]) -> dict[str, ElementWords]:
-    """What the catalogue says of these elements, by name."""
+    """Descriptions of these elements in the catalogue, by name."""
     return {
         e.name: ElementWords(
             e.title,

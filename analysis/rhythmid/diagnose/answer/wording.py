@@ -170,7 +170,7 @@ def freed_value(nominal: Model, fitted: Model, chosen: Hypothesis) -> str | None
 
 
 def recalibrated(nominal: Model, fitted: Model, stds: Mapping[str, float]) -> tuple[str, ...]:
-    """Nominal values that the records contradict, as sentences; `stds` are standard deviations of what was estimated."""
+    """Nominal values that the records contradict, as sentences; `stds` are standard deviations of the estimated parameters, by name."""
     said = []
     for name, value in nominal.parameters.items():
         if name not in stds or name not in fitted.parameters:

@@ -1,4 +1,4 @@
-"""What an actuator's law does to the recorded efforts beyond a gain.
+"""Share of an actuator's law, along the recorded efforts, that is more than a gain.
 
 The balance computes the effort along a smoothed motion. That effort passes through all values between the levels of a
 switched effort, which the actuator never saw. On two levels ±a every odd law is a gain, which the inertia and the forces

@@ -1,4 +1,4 @@
-"""What an effect that changes with time does to the effort beyond any law of the motion.
+"""Share of a time-dependent effect that no law of the motion reproduces.
 
 If the motion goes forth and back only once, a later time is also another direction: a fading actuator and a friction that
 differs by direction are then equivalent. Only a repeated motion separates time from direction.

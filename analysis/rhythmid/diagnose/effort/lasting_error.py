@@ -20,6 +20,7 @@ def lasting_share(error: Array, record: NDArray[np.int64], memory: int) -> float
 
     The prediction is linear. Each half of every record is predicted with the coefficients of the other halves, so that a
     chance correlation predicts nothing.
+
     Parameters
     ----------
     error : (n,) predicted less recorded, at neighbouring rows.

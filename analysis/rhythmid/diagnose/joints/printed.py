@@ -1,4 +1,4 @@
-"""A diagnosis of several joints as text on a terminal."""
+"""Print a diagnosis of several joints."""
 
 from rich.console import Console
 from rich.markup import escape

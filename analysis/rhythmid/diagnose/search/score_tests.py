@@ -187,7 +187,7 @@ def _body_force(model: Model, time: Array, x: Array, v: Array, f: Array) -> Arra
 def change_of_output(
     known: Trajectories, element: Element, values: Mapping[str, float]
 ) -> list[Array] | None:
-    """Change of each series' block-averaged output when the element with these values joins the fitted model.
+    """Change (blocks,) of each series' block-averaged output when the element with these values joins the fitted model.
 
     None when the model diverges with it.
     """
@@ -251,7 +251,7 @@ def _change_of_reference(known: Trajectories, index: int, change: Array) -> Arra
 
 
 def whitened(fit: Fit, samples: Sequence[Array], noise: NoiseModel) -> list[Array]:
-    """Used stretches of each series, whitened and concatenated."""
+    """Used stretches (n,) of each series, whitened under a noise model and concatenated; `samples` has one array a series."""
     series = fit.run.series
     return [one.whitened(noise, given, one.stretches(noise)) for one, given in zip(series, samples)]
 
