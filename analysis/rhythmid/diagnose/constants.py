@@ -44,7 +44,8 @@ RICHER = 0.02
 PRACTICAL = 0.003
 # the same as a share of the effort, of which models of real machines leave a larger share
 PRACTICAL_EFFORT = 0.005
-# standard errors within which a simpler or related law counts as predicting equally well (A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413)
+# standard errors within which a simpler or related law counts as predicting equally well
+# (A. Vehtari, A. Gelman, J. Gabry, Stat. Comput. 27 (2017) 1413)
 EQUIVALENT = 2.0
 
 # share of a bound, or of an effect, within which a value counts as being there: rounding of a descent that stopped at it
@@ -81,7 +82,7 @@ OPEN = 0.3
 VAGUE = 0.2
 VAGUENESS = 3.0
 # prior odds of a family on real machines, relative to the proof, which draws all effects equally often. Real machines have
-# friction more often. First runs stated names on recordings of real machines (docs/real.md): 26 of 28 names of friction and 5 of
+# friction. First runs stated names on recordings of real machines (docs/real.md): 26 of 28 names of friction and 5 of
 # 29 names of other families were accepted, a ratio of the odds of 60. Some causes of errors have been corrected since; so the
 # square root of the ratio is taken, and split evenly above and below one
 PRIOR_ODDS = {"friction": 3.0}

@@ -1,9 +1,9 @@
 """Log density of blocks of errors whose scale varies from block to block.
 
-A model's error is seldom as large in slow moves as in fast ones. With one scale for all blocks, a hypothesis that explains nearly
-everything in one record and half of a second one would score worse in the second than a hypothesis that explains nothing. The scale of each block is
-therefore unknown, log-normal about that of the blocks which the fit saw, and integrated out by Laplace's method
-(L. Tierney, J. B. Kadane, J. Am. Stat. Assoc. 81 (1986) 82).
+A model's error is seldom as large in slow moves as in fast ones. With one scale for all blocks, a hypothesis that explains
+nearly everything in one record and half of a second one would score worse in the second than a hypothesis that explains
+nothing. The scale of each block is therefore unknown, log-normal about that of the blocks which the fit saw, and integrated
+out by Laplace's method (L. Tierney, J. B. Kadane, J. Am. Stat. Assoc. 81 (1986) 82).
 """
 
 import math

@@ -40,9 +40,10 @@ class Estimated:
 class Stated:
     """A name stated by an answer, with its probability.
 
-    `right` is true in three cases. The name was concealed. The answer declares it indistinguishable from a concealed effect, in a
-    family of two or because the name is its special case. Or it names clutter that was present, or a law of the same family as such clutter,
-    for much of which the catalogue has no name. `related`: the name is of the same family as a concealed effect.
+    `right` is true in three cases. The name was concealed. The answer declares it indistinguishable from a concealed effect,
+    in a family of two or because the name is its special case. Or it names clutter that was present, or a law of the same
+    family as such clutter, for much of which the catalogue has no name. `related`: the name is of the same family as a
+    concealed effect.
     """
 
     name: str
